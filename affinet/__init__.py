@@ -1,0 +1,1 @@
+"""affinet: a scenario in, a run out."""

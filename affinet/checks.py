@@ -1,0 +1,162 @@
+"""What is checked before anything starts, in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from affinet import stability
+from agents.controllers import VaryingVelocity
+from agents.estimators.conral import ConsensusLocalization
+from agents.estimators.ga_rkf import GeometryAwareFilter
+from analysis.affine import Array
+from netem.timeline import Fault
+from world import stress
+from world.formation import Formation
+
+Level = Literal["ok", "note", "error"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The outcome of one check."""
+
+    check: str
+    level: Level
+    says: str
+
+    @property
+    def fatal(self) -> bool:
+        """Whether the scenario cannot fly."""
+        return self.level == "error"
+
+
+def framework(formation: Formation) -> list[Finding]:
+    """Whether graph, positions and leaders can carry an affine formation at all."""
+    return [_connected(formation), _edges(formation), _leaders(formation)]
+
+
+def not_rigid(why: str) -> Finding:
+    """The framework has no stabilising stress."""
+    return Finding("rigidity", "error", f"{why}; add edges, or move nodes off lines")
+
+
+def closed_loop(formation: Formation, L: Array, law: Any, estimator: Any, dt: float) -> list[Finding]:
+    """Whether stress, gains and step hold the formation."""
+    followers = ~formation.is_leader
+    L_ff = L[np.ix_(followers, followers)]
+    spectrum = np.linalg.eigvalsh(L)
+    nonzero = spectrum[formation.dimension + 1 :]
+    slow, fast = np.linalg.eigvalsh(L_ff)[[0, -1]]
+    found = [
+        Finding("rigidity", "ok", f"universally rigid: stress eigenvalues {nonzero[0]:.4f} to {nonzero[-1]:.4f}"),
+        Finding("followers", "ok", f"follower block eigenvalues {slow:.4f} to {fast:.4f}"),
+    ]
+    degree = np.diag(L)[followers]
+    if isinstance(law, VaryingVelocity):
+        found.append(_one_tick(law, L_ff, degree))
+    step = stability.step_matrix(law, L_ff, degree, dt)
+    if step is None:
+        found.append(Finding("step", "note", f"{type(law).__name__} is not a law of Table II; its step is not checked"))
+    else:
+        found.append(_step(stability.radius(step), law, dt, fast))
+    if isinstance(estimator, ConsensusLocalization | GeometryAwareFilter):
+        found.append(_consensus(formation, estimator.epsilon))
+    return found
+
+
+def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
+    """Faults that the run is too short for."""
+    return [
+        Finding("timeline", "note", f"'{fault.describe()}' at {fault.start * dt:g} s lies beyond the end of the run")
+        for fault in faults
+        if fault.start >= ticks
+    ]
+
+
+def _connected(formation: Formation) -> Finding:
+    B = stress.incidence(formation.agents, formation.edges)
+    reached = np.zeros(formation.agents, dtype=bool)
+    reached[0] = True
+    near = (B @ B.T) != 0.0
+    for _ in range(formation.agents):
+        reached = reached | near[reached].any(axis=0)
+    if reached.all():
+        edges = len(formation.edges)
+        return Finding("graph", "ok", f"{formation.agents} agents, {edges} undirected edges, connected")
+    apart = (np.flatnonzero(~reached) + 1).tolist()
+    return Finding("graph", "error", f"the graph is disconnected: agents {apart} cannot be reached from agent 1")
+
+
+def _edges(formation: Formation) -> Finding:
+    loops = [f"{i}-{j}" for i, j in formation.edges if i == j]
+    pairs = [tuple(sorted(edge)) for edge in formation.edges]
+    doubled = sorted({f"{i}-{j}" for i, j in pairs if pairs.count((i, j)) > 1})
+    if loops or doubled:
+        return Finding("edges", "error", f"every edge joins two agents, once; look at {', '.join(loops + doubled)}")
+    return Finding("edges", "ok", "every edge joins two agents, once")
+
+
+def _leaders(formation: Formation) -> Finding:
+    dimension = formation.dimension
+    rows = np.array(sorted(set(formation.leaders)), dtype=np.int64) - 1
+    spread = formation.nominal[rows] - formation.nominal[rows].mean(axis=0) if len(rows) else np.zeros((0, dimension))
+    rank = np.linalg.matrix_rank(spread) if len(rows) else 0
+    if rank < dimension:
+        return Finding(
+            "leaders",
+            "error",
+            f"leaders {[*formation.leaders]} do not span: an affine map of {dimension} dimensions needs "
+            f"{dimension + 1} leaders that lie on no common {'line' if dimension == 2 else 'plane'}",
+        )
+    if len(rows) == formation.agents:
+        return Finding("leaders", "error", "every agent is a leader: nobody is left to follow")
+    return Finding("leaders", "ok", f"leaders {[*formation.leaders]} span the plane" if dimension == 2 else "leaders span")
+
+
+def _one_tick(law: VaryingVelocity, L_ff: Array, degree: Array) -> Finding:
+    name = "one-tick radius"
+    if law.source == "feed-forward":
+        return Finding(name, "ok", "velocities are fed forward: no loop through the network")
+    radius = stability.one_tick_radius(L_ff, degree, law.relaxation)
+    if radius < 1.0:
+        return Finding(name, "ok", f"{radius:.3f} < 1: velocities heard one tick late settle")
+    return Finding(
+        name,
+        "error",
+        f"{radius:.3f} >= 1: velocities heard one tick late diverge; relax the law "
+        f"(relaxation below {_largest_relaxation(L_ff, degree):.3f}), choose other leaders, or feed velocities forward",
+    )
+
+
+def _largest_relaxation(L_ff: Array, degree: Array) -> float:
+    # The eigenvalues of D^-1 L_ff are real and positive, so the radius of I - eta D^-1 L_ff is below 1 for eta < 2 / max.
+    return 2.0 / stability.radius(L_ff / degree[:, None])
+
+
+def _step(radius: float, law: Any, dt: float, fast: float) -> Finding:
+    gain = getattr(law, "alpha", 1.0)
+    if radius < 1.0:
+        return Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {dt:g} s, gain {gain:g}: settles to 1/e in {_settle(radius, dt)}")
+    return Finding(
+        "step",
+        "error",
+        f"radius {radius:.4f} >= 1 at dt {dt:g} s: the step is too long for the gains "
+        f"(dt * gain * eigenvalue = {dt * gain * fast:.3f}); lower the gains, or dt",
+    )
+
+
+def _settle(radius: float, dt: float) -> str:
+    return f"{-dt / np.log(radius):.2f} s" if radius > 0.0 else "one tick"
+
+
+def _consensus(formation: Formation, epsilon: float) -> Finding:
+    B = stress.incidence(formation.agents, formation.edges)
+    laplacian = B @ B.T
+    bound = 2.0 / (np.linalg.eigvalsh(laplacian)[-1] + np.diag(laplacian).max() + 1.0)
+    if epsilon < bound:
+        return Finding("consensus", "ok", f"epsilon {epsilon:g} is below the bound {bound:.4f} of (14) on this graph")
+    return Finding("consensus", "error", f"epsilon {epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges")

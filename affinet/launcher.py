@@ -1,0 +1,182 @@
+"""Runtime 2: a swarm of processes over Zenoh, started, watched, killed and restarted from here."""
+
+from __future__ import annotations
+
+import secrets
+import tempfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from affinet.plan import Plan
+from affinet.supervision import Child, Crew, RunFailed
+from agents.controllers import needs_mission
+from agents.process import AgentBrief
+from netem.process import MediumBrief
+from netem.session import HUB, WORLD, Login, agent_name
+from world.process import WorldBrief
+
+# The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
+_MEDIUM_PATIENCE_S, _WORLD_PATIENCE_S, _LAUNCHER_PATIENCE_S = 3.0, 3.5, 4.0
+_START_S = 30.0
+
+
+@dataclass
+class Flight:
+    """What came of a run over processes.
+
+    Parameters
+    ----------
+    in_flight, uninstructed
+        Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
+    failure
+        Why the run ended early, if it did.
+    processes
+        Every process there was.
+    """
+
+    in_flight: int | None = None
+    uninstructed: int | None = None
+    failure: str | None = None
+    processes: list[dict[str, Any]] = field(default_factory=list)
+
+
+class Launcher:
+    """Flies one plan over processes."""
+
+    def __init__(self, plan: Plan, out: Path, viewer: str | None, watch: Callable[[int, float], None]) -> None:
+        """`watch` is called with the tick and the tracking error now and then."""
+        self._plan = plan
+        self._out = out
+        self._viewer = viewer
+        self._watch = watch
+        self._run = f"{out.name}-{secrets.token_hex(4)}"
+        self._logins: dict[str, Login] = {}
+        self._agents: dict[int, Child] = {}
+        self.flight = Flight()
+
+    def fly(self) -> Flight:
+        """Run to the end, or to the first thing that goes wrong."""
+        logs = self._out / "logs"
+        logs.mkdir(parents=True, exist_ok=True)
+        crew = Crew(logs)
+        with tempfile.TemporaryDirectory(prefix="affinet-") as private:
+            try:
+                with crew:
+                    self._start(crew, Path(private))
+                    self._fly(crew)
+            except RunFailed as failure:
+                self.flight.failure = str(failure)
+        self.flight.processes = [child.report() for child in crew.children]
+        return self.flight
+
+    def _start(self, crew: Crew, private: Path) -> None:
+        self._logins = self._make_logins(private)
+        crew.start("world", "world", self._world_brief(self._logins[WORLD]))
+        crew.start("netem", "netem", self._medium_brief(self._logins[HUB], private / "users"))
+        for number in range(1, self._plan.world.links.agents + 1):
+            self._start_agent(crew, number)
+        self._await_ready(crew, crew.children)
+
+    def _make_logins(self, private: Path) -> dict[str, Login]:
+        endpoint = f"unixsock-stream/{private}/z.sock"
+        names = [HUB, WORLD, *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1))]
+        logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
+        users = private / "users"
+        users.touch(mode=0o600)
+        users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
+        return logins
+
+    def _fly(self, crew: Crew) -> None:
+        world, medium = crew.children[0], crew.children[1]
+        world.order("go")
+        rota = 0
+        for child, event in crew.events(_LAUNCHER_PATIENCE_S, "the world to move on"):
+            match event["event"]:
+                case "tick":
+                    self._watch(event["k"], event["error"])
+                    crew.children[rota % len(crew.children)].measure()
+                    rota += 1
+                case "kill":
+                    for number in event["agents"]:
+                        crew.kill(self._agents[number])
+                    world.order("kill")
+                case "restart":
+                    fresh = [self._start_agent(crew, number) for number in event["agents"]]
+                    self._await_ready(crew, fresh)
+                    world.order("restart")
+                case "done" if child is world:
+                    self.flight.uninstructed = event["uninstructed"]
+                case "done" if child is medium:
+                    self.flight.in_flight = event["in_flight"]
+            if self.flight.uninstructed is not None and self.flight.in_flight is not None:
+                break
+        crew.release()
+        medium.order("leave")
+        crew.await_all_gone(_LAUNCHER_PATIENCE_S)
+
+    def _start_agent(self, crew: Crew, number: int) -> Child:
+        login = self._logins[agent_name(number)]
+        self._agents[number] = crew.start("agent", "agents", self._agent_brief(number, login), number)
+        return self._agents[number]
+
+    def _await_ready(self, crew: Crew, children: Iterable[Child]) -> None:
+        waiting = {child.name for child in children}
+        for child, event in crew.events(_START_S, "everybody to be ready"):
+            if event["event"] == "ready":
+                child.measure()
+                waiting.discard(child.name)
+            if not waiting:
+                return
+
+    def _world_brief(self, login: Login) -> WorldBrief:
+        record = self._plan.scenario.record
+        return WorldBrief(
+            run=self._run,
+            login=login,
+            out=str(self._out),
+            world=self._plan.world,
+            channels=self._plan.channels,
+            faults=self._plan.faults,
+            record_every=record.every if record.enabled else None,
+            viewer=self._viewer,
+            patience_s=_WORLD_PATIENCE_S,
+        )
+
+    def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
+        return MediumBrief(
+            run=self._run,
+            login=login,
+            dictionary_file=str(users),
+            seed=self._plan.scenario.seed,
+            links=self._plan.world.links,
+            channels=self._plan.channels,
+            profile=self._plan.profile,
+            faults=self._plan.faults,
+            leaders=self._plan.world.formation.is_leader,
+            patience_s=_MEDIUM_PATIENCE_S,
+        )
+
+    def _agent_brief(self, number: int, login: Login) -> AgentBrief:
+        plan, row = self._plan, number - 1
+        whole, links = plan.brief, plan.world.links
+        told = bool(whole.leader[row]) or needs_mission(plan.law.build())
+        return AgentBrief(
+            run=self._run,
+            login=login,
+            agent=number,
+            neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
+            estimator=plan.estimator,
+            law=plan.law,
+            leader_gain=plan.scenario.agents.leader_gain,
+            brief=replace(
+                whole,
+                nominal=whole.nominal[row],
+                relative=whole.relative[row],
+                present=whole.present[row],
+                stress=whole.stress[row],
+                leader=whole.leader[row],
+                mission=whole.mission if told else None,
+            ),
+        )

@@ -1,0 +1,384 @@
+"""The scenario file: TOML, as typed models. An unknown key, a wrong type or an impossible value is an error."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from world.formation import PRESETS
+
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Ticks = Annotated[int, Field(ge=0)]
+Matrix = list[list[float]]
+
+_LINK = re.compile(r"(\d+)(->|-)(\d+)")
+
+
+class ScenarioError(ValueError):
+    """What is wrong in a scenario, a line for each problem: file, key, and what would be right."""
+
+
+def directed(link: str) -> list[tuple[int, int]]:
+    """The directed links (src, dst) that "2->4" (one way) or "2-4" (both ways) names.
+
+    Raises
+    ------
+    ValueError
+        When it is neither.
+    """
+    if not (match := _LINK.fullmatch(link)):
+        raise ValueError(f"{link!r} is no link; write '2->4' for what 4 hears of 2, or '2-4' for both ways")
+    src, arrow, dst = int(match[1]), match[2], int(match[3])
+    return [(src, dst)] if arrow == "->" else [(src, dst), (dst, src)]
+
+
+def _link(link: str) -> str:
+    directed(link)
+    return link
+
+
+Link = Annotated[str, AfterValidator(_link)]
+
+
+class Section(BaseModel):
+    """A table of a scenario."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Formation(Section):
+    """Who flies: a preset, or nodes, edges and leaders. Positions in metres, agents numbered from 1."""
+
+    preset: str | None = None
+    nodes: Matrix | None = None
+    edges: list[Link] | None = None
+    leaders: list[int] | None = None
+    scale: Positive = 1.0
+    spread: NotNegative = 1.0
+
+    @model_validator(mode="after")
+    def _whole(self) -> Formation:
+        if self.preset is not None:
+            if self.preset not in PRESETS:
+                raise ValueError(f"no preset {self.preset!r}; there are {', '.join(PRESETS)}")
+            if self.nodes is not None or self.edges is not None:
+                raise ValueError("give a preset, or nodes and edges, not both")
+        elif self.nodes is None or self.edges is None or self.leaders is None:
+            raise ValueError("give a preset, or nodes, edges and leaders")
+        elif len({len(node) for node in self.nodes}) != 1 or len(self.nodes[0]) not in (2, 3):
+            raise ValueError("nodes need two coordinates each, or three each")
+        return self
+
+
+class Keyframe(Section):
+    """An affine map at a time: targets are theta p_i + offset, in metres."""
+
+    time: NotNegative
+    theta: Matrix
+    offset: list[float]
+
+
+class Manoeuvre(Section):
+    """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
+
+    preset: Literal["hover", "corridor"] | None = None
+    keyframes: list[Keyframe] = []
+
+    @model_validator(mode="after")
+    def _whole(self) -> Manoeuvre:
+        if (self.preset is None) == (not self.keyframes):
+            raise ValueError("give a preset ('hover', 'corridor'), or keyframes")
+        if self.keyframes and len(self.keyframes) < 2:
+            raise ValueError("give at least two keyframes")
+        times = [frame.time for frame in self.keyframes]
+        if any(later <= earlier for earlier, later in zip(times, times[1:], strict=False)):
+            raise ValueError(f"keyframe times must increase, got {times}")
+        return self
+
+
+class Time(Section):
+    """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick."""
+
+    dt: Positive
+    duration: Positive
+    mode: Literal["lockstep"] = "lockstep"
+    exchange: Literal["same-tick", "next-tick"] = "same-tick"
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks the run has."""
+        return round(self.duration / self.dt)
+
+    @model_validator(mode="after")
+    def _whole(self) -> Time:
+        if abs(self.ticks * self.dt - self.duration) > 1e-6 * self.dt or not self.ticks:
+            raise ValueError(f"duration {self.duration:g} s is not a whole number of ticks of {self.dt:g} s")
+        return self
+
+
+class Sensing(Section):
+    """The relative position sensor: a standard deviation in metres, or a covariance in square metres."""
+
+    sigma: NotNegative | None = None
+    covariance: Matrix | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Sensing:
+        if (self.sigma is None) == (self.covariance is None):
+            raise ValueError("give sigma (m) or covariance (m2)")
+        if self.sigma == 0.0:
+            raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
+        return self
+
+
+class Dynamics(Section):
+    """Single integrators; `disturbance` is the standard deviation of their displacement in a tick, per axis, in metres."""
+
+    model: Literal["single-integrator"] = "single-integrator"
+    disturbance: NotNegative = 0.0
+
+
+class Agents(Section):
+    """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s."""
+
+    estimator: str
+    law: str
+    leader_gain: NotNegative = 1.0
+    parameters: dict[str, dict[str, Any]] = {}
+
+
+class LinkProfile(Section):
+    """A link that differs from the others."""
+
+    link: Link
+    availability: Probability | None = None
+    delay_ticks: Ticks | None = None
+
+
+class Network(Section):
+    """The air: availability is the probability that a message gets through; delay is one way, in ticks.
+
+    `coupled` is Assumption 1 of paper 000: one verdict per directed link and tick for sensing and communication.
+    """
+
+    availability: Probability = 1.0
+    delay_ticks: Ticks = 0
+    coupled: bool = True
+    links: list[LinkProfile] = []
+
+
+class Lasting(Section):
+    """A fault with a beginning and, unless it lasts, an end; simulated seconds."""
+
+    at: NotNegative
+    until: Positive | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Lasting:
+        if self.until is not None and self.until <= self.at:
+            raise ValueError(f"ends at {self.until:g} s, before it begins at {self.at:g} s")
+        return self
+
+
+class Cut(Lasting):
+    """Links that carry nothing."""
+
+    verb: Literal["cut"]
+    links: Annotated[list[Link], Field(min_length=1)]
+
+
+class Partition(Lasting):
+    """Groups between which nothing passes."""
+
+    verb: Literal["partition"]
+    groups: Annotated[list[list[int]], Field(min_length=2)]
+
+
+class Depart(Lasting):
+    """Agents that leave the formation, and rejoin at the end; their bodies hold."""
+
+    verb: Literal["depart"]
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+class Kill(Section):
+    """Agents whose processes are killed (SIGKILL)."""
+
+    verb: Literal["kill"]
+    at: NotNegative
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+class Restart(Section):
+    """Killed agents that come back as fresh processes, knowing nothing."""
+
+    verb: Literal["restart"]
+    at: NotNegative
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+Event = Annotated[Cut | Partition | Depart | Kill | Restart, Field(discriminator="verb")]
+
+
+class Record(Section):
+    """The Rerun recording: one moment every so many ticks."""
+
+    enabled: bool = True
+    every: Annotated[int, Field(ge=1)] = 5
+
+
+class Scenario(Section):
+    """A whole scenario."""
+
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = 1
+    formation: Formation
+    manoeuvre: Manoeuvre
+    time: Time
+    sensing: Sensing
+    dynamics: Dynamics = Dynamics()
+    agents: Agents
+    network: Network = Network()
+    timeline: list[Event] = []
+    record: Record = Record()
+
+
+def shipped() -> list[str]:
+    """Names of the scenarios that come with affinet."""
+    folder = resources.files("affinet") / "scenarios"
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario in a file, or one that is shipped, with `a.b=c` overrides applied.
+
+    Raises
+    ------
+    ScenarioError
+        When there is no such scenario, or something in it is wrong.
+    """
+    path = Path(name)
+    if path.suffix == ".toml" and path.is_file():
+        text = path.read_text()
+    elif name in shipped():
+        path = Path(f"{name}.toml")
+        text = (resources.files("affinet") / "scenarios" / path.name).read_text()
+    else:
+        raise ScenarioError(f"{name}: no such file, and no such scenario; shipped are {', '.join(shipped())}")
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path.name}: not TOML: {error}") from error
+    for override in overrides:
+        _override(raw, override)
+    try:
+        return Scenario.model_validate(raw)
+    except ValidationError as error:
+        raise ScenarioError("\n".join(_explain(path.name, text, overrides, problem) for problem in error.errors())) from error
+
+
+def _override(raw: dict[str, Any], override: str) -> None:
+    key, equals, text = override.partition("=")
+    *tables, name = key.strip().split(".")
+    if not equals or not name:
+        raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    table: Any = raw
+    for step in tables:
+        table = table.setdefault(step, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"--set {override}: {step} is not a table")
+    table[name] = value
+
+
+def _explain(file: str, text: str, overrides: Sequence[str], problem: Mapping[str, Any]) -> str:
+    # The tag of a timeline entry stands in pydantic's path, but in no key of the file.
+    steps = [step for n, step in enumerate(problem["loc"]) if not (n == 2 and problem["loc"][0] == "timeline")]
+    key = ".".join(str(step + 1) if isinstance(step, int) else step for step in steps) or "scenario"
+    where = "--set" if any(override.partition("=")[0].strip() == key for override in overrides) else file
+    if where == file and (line := _line_of(text, steps)):
+        where = f"{file}:{line}"
+    return f"{where}: {key}: {_what_would_be_right(steps, problem)}"
+
+
+def _what_would_be_right(steps: Sequence[str | int], problem: Mapping[str, Any]) -> str:
+    message: str = problem["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if problem["type"] == "extra_forbidden":
+        known = _known_keys(steps[:-1])
+        close = difflib.get_close_matches(str(steps[-1]), known, n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        return f"unknown key; {hint}known here: {', '.join(known)}"
+    if problem["type"] == "missing":
+        return "is missing; it has no default"
+    given = problem.get("input")
+    return message if problem["type"] == "value_error" or isinstance(given, dict | list) else f"{message}, got {given!r}"
+
+
+def _known_keys(steps: Sequence[str | int]) -> list[str]:
+    models: list[Any] = [Scenario]
+    for step in steps:
+        if isinstance(step, int):
+            continue
+        annotations = [str(model.model_fields[step].annotation) for model in models if step in model.model_fields]
+        models = [model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)]
+    return sorted({field for model in models for field in model.model_fields})
+
+
+def _every_section() -> list[type[Section]]:
+    found, queue = [], [Section]
+    while queue:
+        for model in queue.pop().__subclasses__():
+            found.append(model)
+            queue.append(model)
+    return found
+
+
+def _line_of(text: str, steps: Sequence[str | int]) -> int | None:
+    """The line of a key in the file: a look for its table's header, then for the key below it."""
+    names = [str(step) for step in steps if isinstance(step, str)]
+    number = next((step for step in steps if isinstance(step, int)), 0)
+    lines = text.splitlines()
+    for depth in range(len(names), -1, -1):
+        header = ".".join(names[:depth])
+        heads = [n for n, line in enumerate(lines) if header and line.strip() in (f"[{header}]", f"[[{header}]]")]
+        start = heads[min(number, len(heads) - 1)] if heads else (-1 if not header else None)
+        if start is None:
+            continue
+        for n in range(start + 1, len(lines)):
+            if lines[n].startswith("["):
+                break
+            if depth < len(names) and re.match(rf"\s*{re.escape(names[depth])}\s*=", lines[n]):
+                return n + 1
+        return start + 1 if start >= 0 else None
+    return None
+
+
+def covariance(sensing: Sensing, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """R of one relative measurement, shape (D, D), in square metres.
+
+    Raises
+    ------
+    ScenarioError
+        When it is no covariance of this dimension.
+    """
+    if sensing.covariance is None:
+        return float(sensing.sigma or 0.0) ** 2 * np.eye(dimension)
+    matrix = np.array(sensing.covariance, dtype=np.float64)
+    if matrix.shape != (dimension, dimension) or (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
+        raise ScenarioError(
+            f"sensing.covariance: must be a symmetric positive definite {dimension} x {dimension} matrix, in m2"
+        )
+    return matrix

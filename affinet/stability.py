@@ -1,0 +1,60 @@
+"""Whether the gains hold the formation: the nominal closed loop, one tick at a time.
+
+With perfect estimates and leaders at rest the followers are a linear system per axis; it settles when the spectral
+radius of its step is below one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers import ConstantVelocity, Static, VaryingVelocity
+
+Array = NDArray[np.float64]
+
+
+def radius(matrix: Array) -> float:
+    """Spectral radius."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+
+
+def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array | None:
+    """One tick of the followers under a law of Table II.
+
+    Parameters
+    ----------
+    law
+        Of the followers.
+    stress
+        Follower block L_ff of the stress matrix, shape (F, F).
+    degree
+        gamma_i = sum_j l_ij of the followers, shape (F,).
+    dt
+        Tick, in seconds.
+
+    Returns
+    -------
+    Array or None
+        Step of the state the law has (positions, and its integral or its last input); None for a law not known here.
+    """
+    followers = len(stress)
+    identity = np.eye(followers)
+    if isinstance(law, Static):
+        return identity - dt * law.alpha * stress
+    if isinstance(law, ConstantVelocity):
+        pull = law.alpha + law.eta
+        return np.block([[identity - dt * pull * stress, -dt * law.eta * identity], [stress, identity]])
+    if isinstance(law, VaryingVelocity):
+        share = stress / degree[:, None]
+        held = (1.0 - law.relaxation) * identity
+        if law.source != "feed-forward":
+            held = held + law.relaxation * (identity - share)
+        pull = -law.relaxation * law.alpha * share
+        return np.block([[identity + dt * pull, dt * held], [pull, held]])
+    return None
+
+
+def one_tick_radius(stress: Array, degree: Array, relaxation: float) -> float:
+    """Radius of the velocity iteration I - eta D^-1 L_ff: inputs heard one tick late (errata of Table II)."""
+    return radius(np.eye(len(stress)) - relaxation * stress / degree[:, None])

@@ -1,0 +1,52 @@
+"""What an agent is told before take-off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.affine import Manoeuvre
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Brief:
+    """An agent's place in the formation; with leading axes, the places of many.
+
+    Parameters
+    ----------
+    dt
+        Tick, in seconds.
+    nominal
+        Own nominal position p_i, shape (..., D), in metres.
+    relative
+        Nominal relative positions p_ij = p_i - p_j, shape (..., n, D), in metres; 0 in padding.
+    present
+        Which neighbour slots are real, shape (..., n).
+    stress
+        Weights l_ij, shape (..., n); 0 in padding.
+    covariance
+        Of one relative measurement, shape (D, D), in square metres.
+    leader
+        Whether it follows the mission rather than its neighbours, shape (...).
+    mission
+        The manoeuvre, for those who are told it: leaders, and everybody under feed-forward.
+    """
+
+    dt: float
+    nominal: Array
+    relative: Array
+    present: Mask
+    stress: Array
+    covariance: Array
+    leader: Mask
+    mission: Manoeuvre | None
+
+    @property
+    def dimension(self) -> int:
+        """D."""
+        return self.nominal.shape[-1]

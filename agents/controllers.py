@@ -1,0 +1,190 @@
+"""The control laws of paper 000, Table II, and the leaders' pilot.
+
+Each law is a frozen dataclass of its gains with two pure methods over arrays with any leading axes. All steer by
+sum_j l_ij zhat_ij over the edges for which there is an estimate; an edge without one contributes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from agents.brief import Array, Brief
+from agents.estimators.base import Estimate, Heard
+from analysis.affine import Manoeuvre
+
+State = TypeVar("State")
+
+
+class Law(Protocol[State]):
+    """A control law for followers."""
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
+        """The state before the first tick, with `batch` as its leading axes."""
+
+    def command(
+        self, brief: Brief, state: State, tick: int, velocity: Array, estimate: Estimate, inputs: Heard
+    ) -> tuple[State, Array]:
+        """The input of this tick, shape (..., D), in metres per second.
+
+        `velocity` (..., D) is the input now flying, `inputs` what the neighbours said of theirs.
+        """
+
+
+class Nothing(NamedTuple):
+    """The state of a law that remembers nothing."""
+
+
+class Integral(NamedTuple):
+    """The running sum of the stress force, shape (..., D)."""
+
+    force: Array
+
+
+class LastHeard(NamedTuple):
+    """The neighbours' velocities as last heard, shape (..., n, D)."""
+
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class Static:
+    """u_i = -alpha sum_j l_ij zhat_ij (Table II, static leaders).
+
+    Parameters
+    ----------
+    alpha
+        Gain, per second.
+    """
+
+    alpha: float = 10.0
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+        """Nothing to remember."""
+        return Nothing()
+
+    def command(
+        self,
+        brief: Brief,
+        state: Nothing,
+        tick: int,  # noqa: ARG002
+        velocity: Array,  # noqa: ARG002
+        estimate: Estimate,
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Nothing, Array]:
+        """Fall toward the formation."""
+        return state, -self.alpha * stress_force(brief, estimate)
+
+
+@dataclass(frozen=True)
+class ConstantVelocity:
+    """u_i,k = -alpha sum_j l_ij zhat_ij,k - eta sum_t sum_j l_ij zhat_ij,t (Table II, constant-velocity leaders).
+
+    Parameters
+    ----------
+    alpha
+        Proportional gain, per second.
+    eta
+        Integral gain, per second. The sum over ticks is bare, so eta stands for a continuous gain times dt.
+    """
+
+    alpha: float = 10.0
+    eta: float = 0.1
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Integral:
+        """No force yet."""
+        return Integral(np.zeros((*batch, brief.dimension)))
+
+    def command(
+        self,
+        brief: Brief,
+        state: Integral,
+        tick: int,  # noqa: ARG002
+        velocity: Array,  # noqa: ARG002
+        estimate: Estimate,
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Integral, Array]:
+        """Fall toward the formation, and learn the velocity it moves with."""
+        force = stress_force(brief, estimate)
+        total = state.force + force
+        return Integral(total), -self.alpha * force - self.eta * total
+
+
+@dataclass(frozen=True)
+class VaryingVelocity:
+    """u_i = -(1 / gamma_i) sum_j l_ij (alpha zhat_ij - zdot_j), gamma_i = sum_j l_ij (Table II, varying-velocity leaders).
+
+    The law needs the neighbours' current velocities, which is an algebraic loop; over a network it becomes an iteration
+    that need not converge, so the velocities' source and a relaxation are choices (`affinet check` gives the radius).
+
+    Parameters
+    ----------
+    alpha
+        Gain, per second.
+    source
+        Where zdot_j comes from: what the neighbour communicated last; one's own velocity less the estimated relative
+        one; or the manoeuvre, known beforehand.
+    relaxation
+        eta in u <- (1 - eta) u_before + eta u_law, in (0, 1].
+    """
+
+    alpha: float = 1.0
+    source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
+    relaxation: float = 1.0
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastHeard:
+        """Neighbours at rest."""
+        return LastHeard(np.zeros((*batch, *brief.relative.shape[-2:])))
+
+    def command(
+        self, brief: Brief, state: LastHeard, tick: int, velocity: Array, estimate: Estimate, inputs: Heard
+    ) -> tuple[LastHeard, Array]:
+        """Move as the neighbours do, and fall toward the formation."""
+        heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
+        theirs = self._neighbours_velocity(brief, tick, velocity, estimate, heard)
+        gamma = brief.stress.sum(axis=-1)[..., None]
+        steady = np.where(gamma == 0.0, 1.0, gamma)
+        motion = (brief.stress[..., None] * theirs).sum(axis=-2)
+        law = (motion - self.alpha * stress_force(brief, estimate)) / steady
+        return LastHeard(heard), (1.0 - self.relaxation) * velocity + self.relaxation * law
+
+    def _neighbours_velocity(
+        self, brief: Brief, tick: int, velocity: Array, estimate: Estimate, heard: Array
+    ) -> Array:
+        if self.source == "communicated":
+            return heard
+        if self.source == "estimated":
+            if estimate.relative_velocity is None:
+                raise ValueError("the velocity source 'estimated' needs an estimator that tracks relative velocities")
+            return velocity[..., None, :] - estimate.relative_velocity
+        if brief.mission is None:
+            raise ValueError("the velocity source 'feed-forward' needs the mission in the brief")
+        return brief.mission.velocity(tick, brief.nominal[..., None, :] - brief.relative, brief.dt)
+
+
+def stress_force(brief: Brief, estimate: Estimate) -> Array:
+    """sum_j l_ij zhat_ij over the edges with an estimate, shape (..., D), in metres."""
+    weights = np.where(estimate.known, brief.stress, 0.0)
+    total: Array = (weights[..., None] * estimate.relative).sum(axis=-2)
+    return total
+
+
+def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: int, position: Array) -> Array:
+    """A leader's input: the target's velocity, and a pull toward the target, shape (..., D), in metres per second.
+
+    Parameters
+    ----------
+    gain
+        Of the pull, per second.
+    position
+        The leader's own, shape (..., D), in metres.
+    """
+    target = mission.target(tick, brief.nominal)
+    return mission.velocity(tick, brief.nominal, brief.dt) + gain * (target - position)
+
+
+def needs_mission(law: Law[Any]) -> bool:
+    """Whether the law makes followers use the manoeuvre."""
+    return isinstance(law, VaryingVelocity) and law.source == "feed-forward"

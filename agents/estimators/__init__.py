@@ -1,0 +1,1 @@
+"""Estimators of relative positions, one family a file; `base.py` says what an estimator is."""

@@ -1,0 +1,75 @@
+"""Geometry-aware relative Kalman filtering (paper 000, Algorithm 3): where an edge is not measured, the filter is corrected
+by what the geometry says of it, trusted the less the more the neighbours' perceived shapes disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask
+from agents.estimators.base import Channels, Estimate, Fields, Heard
+from agents.estimators.conral import Agreement, ConsensusLocalization
+from agents.estimators.ral import Perceived, RelativeAffineLocalization
+from agents.estimators.rkf import EdgeFilters, Tracks
+
+
+class Fusion(NamedTuple):
+    """The edge filters, and the state of the geometry that feeds them."""
+
+    tracks: Tracks
+    shape: Perceived | Agreement
+
+
+@dataclass(frozen=True)
+class GeometryAwareFilter(EdgeFilters):
+    """GA-RKF: RKF with the observation model (6).
+
+    Parameters
+    ----------
+    geometry
+        Where the perceived shape comes from: the agent's own fit, or the consensus with its neighbours.
+    epsilon
+        Step of that consensus (14).
+    """
+
+    geometry: Literal["ral", "conral"] = "conral"
+    epsilon: float = 0.05
+
+    def channels(self, dimension: int) -> Channels:
+        """What the geometry broadcasts."""
+        return self._shaper.channels(dimension)
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Fusion:
+        """All edges unknown, no shape perceived."""
+        return Fusion(self.unknown(brief, batch), self._shaper.init(brief, batch))
+
+    def sense(
+        self, brief: Brief, state: Fusion, measured: Array, seen: Mask
+    ) -> tuple[Fusion, Mapping[str, Fields]]:
+        """Perceive the shape; the filters wait for what the neighbours say of it."""
+        shape, said = self._shaper.sense(brief, state.shape, measured, seen)
+        return state._replace(shape=shape), said
+
+    def fuse(self, brief: Brief, state: Fusion, heard: Mapping[str, Heard]) -> tuple[Fusion, Estimate]:
+        """Correct every edge by its measurement, or else by its place in the perceived shape."""
+        seen = _perceived(state.shape).seen
+        shape, observed = self._shaper.fuse(brief, state.shape, heard)
+        trusted = np.isfinite(observed.psi)
+        penalty = np.where(trusted, observed.psi, 0.0)[..., None, None, None] * np.eye(brief.dimension)
+        R = observed.covariance + np.where(seen[..., None, None], 0.0, penalty)
+        usable = seen | (observed.known & trusted[..., None])
+        tracks = self.advance(brief, state.tracks, observed.relative, R, usable)
+        return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)
+
+    @cached_property
+    def _shaper(self) -> RelativeAffineLocalization | ConsensusLocalization:
+        return RelativeAffineLocalization() if self.geometry == "ral" else ConsensusLocalization(self.epsilon)
+
+
+def _perceived(shape: Perceived | Agreement) -> Perceived:
+    return shape.perceived if isinstance(shape, Agreement) else shape

@@ -1,0 +1,68 @@
+"""Relative affine localization (paper 000, section IV-A): where an edge is not measured, its place in the perceived shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask
+from agents.estimators import geometry
+from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
+
+THETA = "theta"
+
+
+class Perceived(NamedTuple):
+    """This tick's measurements (..., n, D), which edges were seen (..., n), and the map fitted to them."""
+
+    measured: Array
+    seen: Mask
+    local: geometry.Fit
+
+
+@dataclass(frozen=True)
+class RelativeAffineLocalization:
+    """RAL: the measurements, and Theta_i p_ij in place of the missing ones.
+
+    The printed Algorithm 2 replaces the measured edges instead; the input would then be Theta_i sum_j l_ij p_ij = 0 and the
+    formation not controlled at all (errata).
+    """
+
+    def channels(self, dimension: int) -> Channels:
+        """The local map, for the neighbours' convergence indicator."""
+        return {THETA: {"local": Field((dimension, dimension)), "feasible": Field((), bool)}}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Perceived:
+        """Nothing perceived yet."""
+        shape = (*batch, *brief.relative.shape[-2:])
+        square = (*batch, brief.dimension, brief.dimension)
+        nothing = geometry.Fit(np.zeros(square), np.zeros(batch, dtype=bool), np.zeros(square))
+        return Perceived(np.zeros(shape), np.zeros(shape[:-1], dtype=bool), nothing)
+
+    def sense(
+        self,
+        brief: Brief,
+        state: Perceived,  # noqa: ARG002
+        measured: Array,
+        seen: Mask,
+    ) -> tuple[Perceived, Mapping[str, Fields]]:
+        """Fit the local map."""
+        local = geometry.fit(brief.relative, measured, seen)
+        return Perceived(measured, seen, local), {THETA: {"local": local.theta, "feasible": local.feasible}}
+
+    def fuse(self, brief: Brief, state: Perceived, heard: Mapping[str, Heard]) -> tuple[Perceived, Estimate]:
+        """Complete the measurements by the local map."""
+        said = heard[THETA]
+        psi = geometry.indicator(state.local, said.fields["local"], said.fresh & said.fields["feasible"])
+        return state, complete(brief, state.measured, state.seen, state.local, psi)
+
+
+def complete(brief: Brief, measured: Array, seen: Mask, shape: geometry.Fit, psi: Array) -> Estimate:
+    """Measured edges as measured, the others from the perceived shape (Algorithm 2, lines 9-13, by the errata)."""
+    relative = np.where(seen[..., None], measured, geometry.apply(shape.theta, brief.relative))
+    geometric = geometry.covariance(brief.relative, shape.inverse, brief.covariance)
+    covariance = np.where(seen[..., None, None], brief.covariance, geometric)
+    return Estimate(relative, brief.present & (seen | shape.feasible[..., None]), covariance, psi)

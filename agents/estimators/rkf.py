@@ -1,0 +1,94 @@
+"""Relative Kalman filtering (paper 000, Algorithm 1): one filter an edge, which coasts when the edge is not measured.
+
+Each filter starts at zero with a wide prior, so the first measurement sets it; before that, its edge is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask
+from agents.estimators import kalman
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+
+
+class Tracks(NamedTuple):
+    """The edge filters: mean (..., n, 3 D), covariance (..., n, 3 D, 3 D), and whether ever corrected (..., n)."""
+
+    mean: Array
+    covariance: Array
+    known: Mask
+
+
+@dataclass(frozen=True)
+class EdgeFilters:
+    """A constant-acceleration filter for every edge (19)-(21).
+
+    Parameters
+    ----------
+    sigma_w
+        Standard deviation of the acceleration in the model, in metres per second squared.
+    prior_position, prior_velocity, prior_acceleration
+        Standard deviations before the first measurement, in SI units.
+    """
+
+    sigma_w: float = 0.5
+    prior_position: float = 10.0
+    prior_velocity: float = 2.0
+    prior_acceleration: float = 1.0
+
+    def unknown(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
+        """All edges unknown."""
+        shape = (*batch, brief.relative.shape[-2])
+        prior = np.repeat([self.prior_position, self.prior_velocity, self.prior_acceleration], brief.dimension)
+        covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
+        return Tracks(np.zeros((*shape, len(prior))), covariance, np.zeros(shape, dtype=bool))
+
+    def advance(self, brief: Brief, tracks: Tracks, position: Array, R: Array, usable: Mask) -> Tracks:
+        """All filters one tick ahead, corrected by positions (..., n, D) with covariances R (..., n, D, D) where usable."""
+        F, Q = kalman.constant_acceleration(brief.dimension, brief.dt, self.sigma_w)
+        predicted = kalman.predict(tracks.mean, tracks.covariance, F, Q)
+        return Tracks(*kalman.correct(*predicted, position, R, usable), tracks.known | usable)
+
+    def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
+        """What the filters say."""
+        dimension = brief.dimension
+        return Estimate(
+            relative=tracks.mean[..., :dimension],
+            known=tracks.known,
+            covariance=tracks.covariance[..., :dimension, :dimension],
+            psi=psi,
+            relative_velocity=tracks.mean[..., dimension : 2 * dimension],
+        )
+
+
+@dataclass(frozen=True)
+class RelativeKalmanFilter(EdgeFilters):
+    """RKF: correct the edges that are measured, propagate the others."""
+
+    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+        """Nothing: a neighbour's measurements of others say nothing of this edge."""
+        return {}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
+        """All edges unknown."""
+        return self.unknown(brief, batch)
+
+    def sense(
+        self, brief: Brief, state: Tracks, measured: Array, seen: Mask
+    ) -> tuple[Tracks, Mapping[str, Fields]]:
+        """Predict every edge, correct those measured."""
+        return self.advance(brief, state, measured, brief.covariance, seen), {}
+
+    def fuse(
+        self,
+        brief: Brief,
+        state: Tracks,
+        heard: Mapping[str, Heard],  # noqa: ARG002
+    ) -> tuple[Tracks, Estimate]:
+        """The filters' positions."""
+        return state, self.estimate(brief, state, no_indicator(state.known))

@@ -1,0 +1,165 @@
+"""One agent as a process (`python -m agents`): it hears the medium, lets `Agent` decide, and speaks on keys of its own."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from agents.agent import Agent, AgentState
+from agents.brief import Brief
+from agents.estimators.base import Heard
+from netem import channels, wire
+from netem.keys import Keys
+from netem.sequence import Numbering, Sequences
+from netem.session import Login, await_subscribers, client
+from netem.supervised import Supervisor
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An algorithm to run: "module:Class", and its parameters."""
+
+    path: str
+    parameters: dict[str, Any]
+
+    def build(self) -> Any:
+        """The algorithm."""
+        module, _, name = self.path.partition(":")
+        return getattr(importlib.import_module(module), name)(**self.parameters)
+
+
+@dataclass(frozen=True)
+class AgentBrief:
+    """All an agent process is told.
+
+    Parameters
+    ----------
+    run, login
+        Where it connects, and as whom.
+    agent, neighbours
+        Its number, and the numbers of the agents in its neighbour slots.
+    estimator, law, leader_gain, brief
+        What `Agent` is made of.
+    """
+
+    run: str
+    login: Login
+    agent: int
+    neighbours: tuple[int, ...]
+    estimator: Choice
+    law: Choice
+    leader_gain: float
+    brief: Brief
+
+
+class Node:
+    """One agent on the network."""
+
+    def __init__(self, session: zenoh.Session, brief: AgentBrief) -> None:
+        self._number = brief.agent
+        self._neighbours = brief.neighbours
+        self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
+        self._agent = Agent(brief.brief, brief.estimator.build(), brief.law.build(), brief.leader_gain)
+        self._width, self._dimension = brief.brief.relative.shape
+        self._state: AgentState = self._agent.init(())
+        self._heard = 0
+        self._numbers = Numbering()
+        self._inboxes = Sequences("the medium's")
+        keys = Keys(brief.run)
+        self._inbox = session.declare_subscriber(keys.inbox(self._number), zenoh.handlers.FifoChannel(64))
+        self._channels = self._agent.channels()
+        spoken = sorted([channels.MEASUREMENT, *self._channels])
+        self._broadcasts = {name: session.declare_publisher(keys.broadcast(self._number, name)) for name in spoken}
+        self._act = session.declare_publisher(keys.act(self._number))
+
+    def await_everybody(self) -> None:
+        """Wait until the medium and the world listen."""
+        await_subscribers([*self._broadcasts.values(), self._act])
+
+    def run(self) -> None:
+        """Sense, broadcast, hear and act until the medium says that the run is over."""
+        position: wire.Rows | None = None
+        while True:
+            inbox = wire.unpack_inbox(self._inbox.recv().payload.to_bytes())
+            self._inboxes.check("inbox", inbox.seq)
+            if isinstance(inbox, wire.SenseInbox):
+                position = inbox.position
+                self._sense(inbox)
+            elif isinstance(inbox, wire.ExchangeInbox):
+                self._exchange(inbox, position)
+            else:
+                return
+
+    def _sense(self, inbox: wire.SenseInbox) -> None:
+        measured = np.zeros((self._width, self._dimension))
+        seen = np.zeros(self._width, dtype=bool)
+        if inbox.neighbours:
+            slots = [self._slot[number] for number in inbox.neighbours]
+            measured[slots], seen[slots] = inbox.measured, True
+        self._state, said = self._agent.sense(self._state, measured, seen)
+        observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
+        for name, fields in {channels.MEASUREMENT: observed, **said}.items():
+            self._broadcasts[name].put(
+                wire.pack(wire.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
+            )
+
+    def _exchange(self, inbox: wire.ExchangeInbox, position: wire.Rows | None) -> None:
+        self._heard += len(inbox.messages)
+        own = None if position is None else np.array(position, dtype=np.float64)
+        self._state, action = self._agent.act(self._state, inbox.k, self._gather(inbox.messages), own)
+        estimate, degree = action.estimate, len(self._neighbours)
+        psi = float(estimate.psi)
+        act = wire.Act(
+            k=inbox.k,
+            src=self._number,
+            seq=self._numbers.next("act"),
+            velocity=action.velocity,
+            estimate=estimate.relative[:degree],
+            known=estimate.known[:degree],
+            psi=psi if np.isfinite(psi) else None,
+            heard=self._heard,
+        )
+        self._act.put(wire.pack(act))
+
+    def _gather(self, messages: wire.Rows) -> Mapping[str, Heard]:
+        # Messages come sorted by tick, so what stands in a slot in the end is the newest.
+        said: dict[str, dict[int, Any]] = {name: {} for name in self._channels}
+        for message in messages:
+            if message["channel"] in said:
+                said[message["channel"]][self._slot[message["src"]]] = message["payload"]
+        return {name: self._heard_on(name, said[name]) for name in self._channels}
+
+    def _heard_on(self, channel: str, said: dict[int, Any]) -> Heard:
+        slots = list(said)
+        fresh = np.zeros(self._width, dtype=bool)
+        fresh[slots] = True
+        gathered = {}
+        for name, field in self._channels[channel].items():
+            gathered[name] = rows = np.zeros((self._width, *field.shape), dtype=field.dtype)
+            if slots:
+                try:
+                    rows[slots] = [payload[name] for payload in said.values()]
+                except (KeyError, TypeError, ValueError) as error:
+                    who = [self._neighbours[slot] for slot in slots]
+                    raise wire.WireError(
+                        f"one of agents {who} broadcast a {channel!r} without a field {name!r} of shape {field.shape}: "
+                        f"{error!r} (see docs/protocol.md)"
+                    ) from error
+        return Heard(gathered, fresh)
+
+
+def main() -> None:
+    """Fly one agent until the run is over."""
+    supervisor = Supervisor()
+    brief = supervisor.brief(AgentBrief)
+    with zenoh.open(client(brief.login)) as session:
+        node = Node(session, brief)
+        node.await_everybody()
+        supervisor.tell("ready")
+        with supervisor.confessing():
+            node.run()

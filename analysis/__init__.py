@@ -1,0 +1,1 @@
+"""Arrays in, metrics and verdicts out; knows no process and no network."""

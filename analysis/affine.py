@@ -1,0 +1,36 @@
+"""Affine formations: a nominal shape under a sequence of affine maps (paper 000, section II-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """A sequence of affine maps: agent i's target in tick k is theta[k] p_i + offset[k].
+
+    Parameters
+    ----------
+    theta
+        Shape (ticks + 1, D, D).
+    offset
+        Shape (ticks + 1, D), in metres.
+    """
+
+    theta: Array
+    offset: Array
+
+    def target(self, tick: int, nominal: Array) -> Array:
+        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3)."""
+        position: Array = (self.theta[tick] @ nominal[..., None])[..., 0] + self.offset[tick]
+        return position
+
+    def velocity(self, tick: int, nominal: Array, dt: float) -> Array:
+        """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
+        travelled: Array = self.target(tick + 1, nominal) - self.target(tick, nominal)
+        return travelled / dt

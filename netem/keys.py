@@ -1,0 +1,48 @@
+"""Every key expression of a run, built in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of one run; `agent` is an agent's number, or "*" for all of them."""
+
+    run: str
+
+    def broadcast(self, agent: int | str, channel: str) -> str:
+        """What an agent broadcasts on one channel (agent to medium)."""
+        return f"affinet/{self.run}/agent/{agent}/tx/{channel}"
+
+    def inbox(self, agent: int | str) -> str:
+        """What the medium delivers to an agent (medium to agent)."""
+        return f"affinet/{self.run}/agent/{agent}/rx"
+
+    def act(self, agent: int | str) -> str:
+        """An agent's control input, and what it reports about itself (agent to world)."""
+        return f"affinet/{self.run}/agent/{agent}/act"
+
+    @property
+    def sense(self) -> str:
+        """The world's raw sensing of a tick (world to medium)."""
+        return f"affinet/{self.run}/world/sense"
+
+    @property
+    def journal(self) -> str:
+        """The verdicts of a tick (medium to world)."""
+        return f"affinet/{self.run}/netem/journal"
+
+    @staticmethod
+    def speaker(key: str) -> int:
+        """The agent in whose name a key speaks.
+
+        Raises
+        ------
+        ValueError
+            When the key is not a concrete key of one agent.
+        """
+        parts = key.split("/")
+        if len(parts) < 5 or parts[2] != "agent" or not parts[3].isdecimal() or "*" in key:
+            raise ValueError(f"{key!r} is not the key of one agent")
+        return int(parts[3])

@@ -1,0 +1,76 @@
+"""The directed links of a swarm: who can hear, and sense, whom.
+
+Link j -> i carries everything agent i learns of agent j: the measurement y_ij and what j broadcasts. Agents are numbered
+from 1; link arrays are ordered by (dst, src), so the links toward one agent stand together, in the order of its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Links:
+    """Directed links of the nominal graph.
+
+    Parameters
+    ----------
+    agents
+        How many agents there are.
+    src, dst
+        Agent numbers, shape (L,).
+    """
+
+    agents: int
+    src: Integers
+    dst: Integers
+
+    @classmethod
+    def both_ways(cls, agents: int, edges: Iterable[tuple[int, int]]) -> Links:
+        """The two directed links of every undirected edge."""
+        pairs = sorted({(i, j) for a, b in edges for i, j in ((a, b), (b, a))})
+        dst, src = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        return cls(agents, np.ascontiguousarray(src), np.ascontiguousarray(dst))
+
+    def __len__(self) -> int:
+        return len(self.src)
+
+    @cached_property
+    def index(self) -> dict[tuple[int, int], int]:
+        """Row of the link (src, dst)."""
+        return {(int(s), int(d)): row for row, (s, d) in enumerate(zip(self.src, self.dst, strict=True))}
+
+    @cached_property
+    def degree(self) -> Integers:
+        """Links toward each agent, shape (agents,)."""
+        return np.bincount(self.dst - 1, minlength=self.agents).astype(np.int64)
+
+    @cached_property
+    def present(self) -> Mask:
+        """Which neighbour slots of each agent are real, shape (agents, n); the rest is padding."""
+        return np.arange(int(self.degree.max(initial=0))) < self.degree[:, None]
+
+    @cached_property
+    def slots(self) -> Integers:
+        """Link row behind each agent's neighbour slot, shape (agents, n); padding points at row 0."""
+        rows = np.zeros(self.present.shape, dtype=np.int64)
+        rows[self.present] = np.arange(len(self))
+        return rows
+
+    @cached_property
+    def neighbours(self) -> Integers:
+        """Neighbour in each agent's slot as an array row (number - 1), shape (agents, n)."""
+        return np.where(self.present, self.src[self.slots] - 1, 0)
+
+    def touching(self, agents: Mask) -> Mask:
+        """Links with either end among `agents` (agents,), shape (L,)."""
+        touched: Mask = agents[self.src - 1] | agents[self.dst - 1]
+        return touched

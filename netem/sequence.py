@@ -1,0 +1,53 @@
+"""Sequence numbers: how a loss that nobody ordered is noticed."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+
+class UninstructedLoss(RuntimeError):
+    """A message vanished that no fault and no profile had dropped."""
+
+
+class Numbering:
+    """Gives each stream its next number, from 0."""
+
+    def __init__(self) -> None:
+        self._next: defaultdict[str, int] = defaultdict(int)
+
+    def next(self, stream: str) -> int:
+        """The number of the message about to be sent."""
+        number = self._next[stream]
+        self._next[stream] = number + 1
+        return number
+
+    def restart(self, stream: str) -> None:
+        """Begin again at 0: the other end is a new process."""
+        self._next[stream] = 0
+
+
+class Sequences:
+    """Checks that each stream from one kind of sender arrives whole and in order."""
+
+    def __init__(self, sender: str) -> None:
+        self._sender = sender
+        self._expected = Numbering()
+
+    def check(self, stream: str, number: int) -> None:
+        """Take note of a message.
+
+        Raises
+        ------
+        UninstructedLoss
+            When it is not the next one of its stream.
+        """
+        expected = self._expected.next(stream)
+        if number != expected:
+            raise UninstructedLoss(
+                f"{self._sender} {stream}: message {number} came where {expected} was due; "
+                f"the transport lost or doubled {abs(number - expected)} that nobody ordered"
+            )
+
+    def restart(self, stream: str) -> None:
+        """Expect 0 again: the sender is a new process."""
+        self._expected.restart(stream)

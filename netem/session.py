@@ -1,0 +1,143 @@
+"""Zenoh configuration of a run: a hermetic star on loopback, with a name and a password for each process.
+
+The medium is the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's
+messages to any other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from netem.keys import Keys
+
+HUB = "netem"
+WORLD = "world"
+
+# One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
+_RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
+ENVIRONMENT = {"ZENOH_RUNTIME": f"({_RUNTIME}, app: (worker_threads: 1))", "OPENBLAS_NUM_THREADS": "1"}
+
+_PRIORITIES = (
+    "control",
+    "real_time",
+    "interactive_high",
+    "interactive_low",
+    "data_high",
+    "data",
+    "data_low",
+    "background",
+)
+_LONGEST_QUEUE = 16
+
+
+def agent_name(agent: int) -> str:
+    """The name under which an agent logs in."""
+    return f"agent-{agent}"
+
+
+@dataclass(frozen=True)
+class Login:
+    """Where a process connects, and as whom."""
+
+    endpoint: str
+    name: str
+    password: str
+
+
+def client(login: Login) -> zenoh.Config:
+    """Configuration of an agent or the world: connects to the hub, and to nobody else."""
+    return _config(
+        {
+            "mode": "client",
+            "connect": {
+                "endpoints": [login.endpoint],
+                "timeout_ms": 10_000,
+                "exit_on_failure": True,
+                "retry": {"period_init_ms": 10, "period_max_ms": 50, "period_increase_factor": 1.5},
+            },
+        },
+        login,
+    )
+
+
+def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> zenoh.Config:
+    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do."""
+    return _config(
+        {"mode": "router", "listen": {"endpoints": [login.endpoint]}, "access_control": _access(keys, agents)},
+        login,
+        dictionary_file=dictionary_file,
+    )
+
+
+def await_subscribers(publishers: Iterable[zenoh.Publisher]) -> None:
+    """Wait until each publisher has somebody to hear it: what it sends from then on is not lost at the start."""
+    for publisher in publishers:
+        changes = publisher.declare_matching_listener(zenoh.handlers.FifoChannel(4))
+        if not publisher.matching_status.matching:
+            while not changes.recv().matching:
+                pass
+        changes.undeclare()
+
+
+def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
+    return zenoh.Config.from_json5(
+        json.dumps(
+            base
+            | {
+                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+                "transport": {
+                    "shared_memory": {"enabled": False},
+                    "link": {"tx": {"queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
+                    "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
+                },
+            }
+        )
+    )
+
+
+def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
+    rights = [
+        _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+        *(
+            _rights(
+                agent_name(agent),
+                says=[keys.broadcast(agent, "*"), keys.act(agent)],
+                hears=[keys.inbox(agent)],
+                learns=[keys.broadcast("*", "*"), keys.act("*")],
+            )
+            for agent in agents
+        ),
+    ]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": [rule for _, rules in rights for rule in rules],
+        "subjects": [{"id": name, "usernames": [name]} for name, _ in rights],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
+    }
+
+
+def _rights(
+    name: str, *, says: list[str], hears: list[str], learns: list[str]
+) -> tuple[str, list[dict[str, Any]]]:
+    def allow(what: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
+        return {
+            "id": f"{name}-{what}",
+            "permission": "allow",
+            "messages": [message],
+            "flows": [flow],
+            "key_exprs": keys,
+        }
+
+    return name, [
+        allow("says", "put", "ingress", says),
+        allow("hears", "put", "egress", hears),
+        allow("asks", "declare_subscriber", "ingress", hears),
+        # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
+        allow("learns", "declare_subscriber", "egress", learns),
+    ]

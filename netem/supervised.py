@@ -1,0 +1,117 @@
+"""The child's end of supervision: how a process of a run hears from the launcher, and tells it what happens.
+
+Supervision does not travel the air it supervises. A child gets its brief on standard input, hears orders there, and
+reports events on standard output, one JSON map a line. Standard input is also its lifeline: when it closes, the launcher is
+gone and the child goes too, so nothing is ever orphaned.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, NoReturn, TypeVar
+
+import msgpack
+
+from netem.plain import from_plain, plainly
+
+T = TypeVar("T")
+
+_LENGTH = struct.Struct("<I")
+_STDIN, _STDOUT, _STDERR = 0, 1, 2
+
+
+class Stalled(RuntimeError):
+    """Something that had to come did not come in time."""
+
+
+def brief_bytes(brief: Any) -> bytes:
+    """A brief as the launcher writes it to a child's standard input."""
+    packed: bytes = msgpack.packb(brief, default=plainly)
+    return _LENGTH.pack(len(packed)) + packed
+
+
+class Supervisor:
+    """The launcher, as a child sees it."""
+
+    def __init__(self) -> None:
+        # What the child or a library prints belongs in its log, not among the events.
+        self._events = os.dup(_STDOUT)
+        os.dup2(_STDERR, _STDOUT)
+        self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
+        signal.signal(signal.SIGTERM, _leave)
+
+    def brief(self, kind: type[T]) -> T:
+        """The child's brief; from then on the lifeline is watched."""
+        (length,) = _LENGTH.unpack(_read_exactly(_LENGTH.size))
+        brief = from_plain(kind, msgpack.unpackb(_read_exactly(length), strict_map_key=False))
+        threading.Thread(target=self._watch, daemon=True).start()
+        return brief
+
+    def tell(self, event: str, **facts: Any) -> None:
+        """Report an event to the launcher."""
+        os.write(self._events, json.dumps({"event": event} | facts).encode() + b"\n")
+
+    def await_order(self, order: str) -> None:
+        """Wait until the launcher gives this order.
+
+        Raises
+        ------
+        RuntimeError
+            When it gives another.
+        """
+        if (given := self._orders.get()) != order:
+            raise RuntimeError(f"the launcher ordered {given!r} where {order!r} was due")
+
+    @contextmanager
+    def confessing(self) -> Iterator[None]:
+        """Report why the block failed before the process goes down with it."""
+        try:
+            yield
+        except Exception as error:
+            self.tell("failed", reason=f"{error}" if isinstance(error, Stalled) else f"{type(error).__name__}: {error}")
+            raise
+
+    def _watch(self) -> None:
+        pending = b""
+        while chunk := os.read(_STDIN, 4096):
+            *lines, pending = (pending + chunk).split(b"\n")
+            for line in lines:
+                self._orders.put(line.decode())
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+@contextmanager
+def patience(seconds: float, missing: Callable[[], str]) -> Iterator[None]:
+    """Raise `Stalled`, saying what is `missing`, when the block takes longer than this. For the main thread."""
+
+    def expire(signum: int, frame: FrameType | None) -> NoReturn:
+        raise Stalled(f"waited {seconds:g} s for {missing()}")
+
+    previous = signal.signal(signal.SIGALRM, expire)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+def _leave(signum: int, frame: FrameType | None) -> NoReturn:
+    raise SystemExit(128 + signum)
+
+
+def _read_exactly(size: int) -> bytes:
+    read = b""
+    while len(read) < size:
+        if not (chunk := os.read(_STDIN, size - len(read))):
+            raise SystemExit("standard input closed before the brief was complete: this process is started by the launcher")
+        read += chunk
+    return read

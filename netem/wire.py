@@ -1,0 +1,197 @@
+"""Messages <-> MessagePack, validated: the only place that packs or unpacks what travels over Zenoh.
+
+Every message is a map of plain numbers and nested lists with `k` (tick), `src` (who says it) and `seq` (its number on its
+key, from 0). The maps are spelled out in docs/protocol.md; an agent needs nothing of ours to speak them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import Any, NamedTuple, TypeVar
+
+import msgpack
+import numpy as np
+from numpy.typing import NDArray
+
+from netem.draws import Array
+from netem.links import Mask
+from netem.plain import PlainError, from_plain, plainly
+
+T = TypeVar("T")
+Rows = list[Any]  # a nested list that is passed on as it came
+
+
+class WireError(ValueError):
+    """A message that does not say what its key promises."""
+
+
+class Phase(StrEnum):
+    """Which part of a tick an inbox belongs to."""
+
+    SENSE = "sense"
+    EXCHANGE = "exchange"
+    END = "end"
+
+
+class Sense(NamedTuple):
+    """World to medium: the raw sensing of tick k; `last` says that the run is over and nothing was sensed.
+
+    `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
+    (N, D), both in metres.
+    """
+
+    k: int
+    src: str
+    seq: int
+    last: bool
+    measured: Array | Rows
+    position: Array | Rows
+
+
+class SenseInbox(NamedTuple):
+    """Medium to agent: the measurements of tick k that reached it.
+
+    `neighbours` are the agents measured, shape (m,), `measured` their relative positions z_i - z_j, shape (m, D), in
+    metres; `position` is the agent's own, shape (D,), and only leaders, who have positioning, get it.
+    """
+
+    k: int
+    src: str
+    seq: int
+    phase: Phase
+    neighbours: Rows
+    measured: Rows
+    position: Rows | None
+
+
+class Broadcast(NamedTuple):
+    """Agent to its neighbours, through the medium: named fields of numbers and nested lists."""
+
+    k: int
+    src: int
+    channel: str
+    seq: int
+    payload: dict[str, Any]
+
+
+class ExchangeInbox(NamedTuple):
+    """Medium to agent: the broadcasts that arrive in the exchange of tick k, sorted by (k, src, channel).
+
+    They are plain maps with the fields of `Broadcast`, which the medium has read and checked before it passes them on.
+    """
+
+    k: int
+    src: str
+    seq: int
+    phase: Phase
+    messages: Rows
+
+
+class EndInbox(NamedTuple):
+    """Medium to agent: the run is over."""
+
+    k: int
+    src: str
+    seq: int
+    phase: Phase
+
+
+class Act(NamedTuple):
+    """Agent to world: its control input, and what it believes.
+
+    `velocity` is the input u_i, shape (D,), in metres per second; `estimate` the relative positions it acts on, one per
+    neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape (m,); `psi` its convergence
+    indicator, none where undefined; `heard` how many broadcasts it has received so far.
+    """
+
+    k: int
+    src: int
+    seq: int
+    velocity: Array
+    estimate: Array
+    known: Mask
+    psi: float | None
+    heard: int
+
+
+class Journal(NamedTuple):
+    """Medium to world: the verdicts of tick k.
+
+    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `late` the link row
+    of every message of an earlier tick that was delivered in this one; `dropped` the fate of every message whose receiver
+    went while it was under way.
+    """
+
+    k: int
+    src: str
+    seq: int
+    fates: NDArray[np.uint8]
+    late: NDArray[np.int64]
+    dropped: NDArray[np.uint8]
+
+
+INBOXES: dict[str, type[SenseInbox | ExchangeInbox | EndInbox]] = {
+    Phase.SENSE: SenseInbox,
+    Phase.EXCHANGE: ExchangeInbox,
+    Phase.END: EndInbox,
+}
+
+
+def pack(message: NamedTuple) -> bytes:
+    """A message as MessagePack."""
+    packed: bytes = msgpack.packb(message._asdict(), default=plainly)
+    return packed
+
+
+def unpack(kind: type[T], data: bytes) -> T:
+    """The message of this kind in `data`.
+
+    Raises
+    ------
+    WireError
+        When it is no such message: which field, what was expected, what came.
+    """
+    return _read(kind, _load(data))
+
+
+def unpack_inbox(data: bytes) -> SenseInbox | ExchangeInbox | EndInbox:
+    """What the medium sent an agent, by its phase.
+
+    Raises
+    ------
+    WireError
+        When it is no inbox.
+    """
+    plain = _load(data)
+    phase = plain.get("phase") if isinstance(plain, dict) else None
+    if phase not in INBOXES:
+        raise WireError(f"an inbox needs a phase among {list(INBOXES)}, got {phase!r} (see docs/protocol.md)")
+    return _read(INBOXES[phase], plain)
+
+
+def pack_exchange(k: int, seq: int, broadcasts: Sequence[bytes]) -> bytes:
+    """An exchange inbox around broadcasts that are packed already: the medium relays what was said, byte for byte."""
+    head: Mapping[str, Any] = {"k": k, "src": "netem", "seq": seq, "phase": Phase.EXCHANGE}
+    packer = msgpack.Packer(autoreset=False)
+    packer.pack_map_header(len(head) + 1)
+    for name, value in head.items():
+        packer.pack(name)
+        packer.pack(value)
+    packer.pack("messages")
+    packer.pack_array_header(len(broadcasts))
+    return packer.bytes() + b"".join(broadcasts)
+
+
+def _read(kind: type[T], plain: Any) -> T:
+    try:
+        return from_plain(kind, plain)
+    except PlainError as error:
+        raise WireError(f"{kind.__name__}: {error} (see docs/protocol.md)") from error
+
+
+def _load(data: bytes) -> Any:
+    try:
+        return msgpack.unpackb(data)
+    except (ValueError, msgpack.UnpackException) as error:
+        raise WireError(f"not MessagePack: {error}") from error

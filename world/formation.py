@@ -1,0 +1,72 @@
+"""Formations: nominal positions, nominal graph, leaders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Edges = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Formation:
+    """A nominal framework (paper 000, section II).
+
+    Parameters
+    ----------
+    nominal
+        Nominal positions P, shape (N, D), in metres.
+    edges
+        Undirected edges between agents, numbered from 1.
+    leaders
+        Agents that follow the manoeuvre.
+    """
+
+    nominal: Array
+    edges: Edges
+    leaders: tuple[int, ...]
+
+    @property
+    def agents(self) -> int:
+        """N."""
+        return len(self.nominal)
+
+    @property
+    def dimension(self) -> int:
+        """D."""
+        return self.nominal.shape[-1]
+
+    @property
+    def is_leader(self) -> NDArray[np.bool_]:
+        """Shape (N,)."""
+        return np.isin(np.arange(1, self.agents + 1), self.leaders)
+
+
+def _edges(text: str) -> Edges:
+    pairs = (pair.split("-") for pair in text.split())
+    return tuple((int(i), int(j)) for i, j in pairs)
+
+
+PRESETS: dict[str, Formation] = {
+    # Graph 1 of paper 000.
+    "zhao7": Formation(
+        nominal=np.array([[2, 0], [1, 1], [1, -1], [0, 1], [0, -1], [-1, 1], [-1, -1]], dtype=np.float64),
+        edges=_edges("1-2 1-3 1-4 1-5 2-4 2-7 3-5 3-6 4-5 4-6 5-7 6-7"),
+        leaders=(1, 2, 3),
+    ),
+    # Graph 2 of paper 000, the hexagon of paper 004. Of 110 admissible sets of leaders, 8 are stable under undamped
+    # one-tick varying-velocity control; 2, 6, 8 has the smallest radius (4, 5, 7 diverges).
+    "hexa10": Formation(
+        nominal=np.array(
+            [[3, 0], [2, 2], [2, -2], [1, 0], [0, 2], [0, -2], [-1, 0], [-2, 2], [-2, -2], [-3, 0]], dtype=np.float64
+        ),
+        edges=_edges(
+            "1-2 1-3 1-4 1-5 1-6 2-3 2-4 2-5 2-7 3-4 3-6 3-7 4-5 4-6 4-7 4-8 4-9 5-6 5-7 5-8 5-10 6-7 6-9 6-10 7-8 7-9 7-10 "
+            "8-9 8-10 9-10"
+        ),
+        leaders=(2, 6, 8),
+    ),
+}

@@ -1,0 +1,214 @@
+"""The world as a process (`python -m world`): it senses, waits for every agent to act, and steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zenoh
+
+from netem import wire
+from netem.keys import Keys
+from netem.links import Mask
+from netem.medium import Fate
+from netem.sequence import Numbering, Sequences
+from netem.session import WORLD, Login, await_subscribers, client
+from netem.supervised import Supervisor, patience
+from netem.timeline import Fault, Timeline
+from world.formation import Array
+from world.history import History, Moment
+from world.recorder import Recorder
+from world.world import World
+
+_TICKS_BETWEEN_REPORTS = 20
+
+
+@dataclass(frozen=True)
+class WorldBrief:
+    """All the world process is told.
+
+    Parameters
+    ----------
+    run, login
+        Where it connects, and as whom.
+    out
+        The run directory.
+    world, channels, faults
+        What it simulates and records.
+    record_every
+        Ticks from one recorded moment to the next; None records nothing.
+    viewer
+        URL of a viewer to stream to.
+    patience_s
+        How long to wait for the agents before the run is stalled, in seconds.
+    """
+
+    run: str
+    login: Login
+    out: str
+    world: World
+    channels: tuple[str, ...]
+    faults: tuple[Fault, ...]
+    record_every: int | None
+    viewer: str | None
+    patience_s: float
+
+
+class Theatre:
+    """The world of a run over Zenoh."""
+
+    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: WorldBrief) -> None:
+        self._brief = brief
+        self._world = brief.world
+        self._supervisor = supervisor
+        self._timeline = Timeline(brief.world.links, brief.faults)
+        keys = Keys(brief.run)
+        self._keys = keys
+        self._acts = session.declare_subscriber(keys.act("*"), zenoh.handlers.FifoChannel(4096))
+        self._journal = session.declare_subscriber(keys.journal, zenoh.handlers.FifoChannel(64))
+        self._sense = session.declare_publisher(keys.sense)
+        self._numbers = Numbering()
+        self._streams = Sequences("agent")
+        self._heard = np.zeros(brief.world.formation.agents, dtype=np.int64)
+        self._awaited: set[int] = set()
+        self.uninstructed = 0
+        self.history = History(
+            brief.world.ticks, brief.world.links, len(brief.channels), brief.world.formation.dimension
+        )
+
+    def await_everybody(self) -> None:
+        """Wait until the medium listens."""
+        await_subscribers([self._sense])
+
+    def run(self, recorder: Recorder | None) -> None:
+        """Fly all ticks."""
+        position = self._world.start()
+        moment: Moment | None = None
+        for tick in range(self._world.ticks):
+            self._kill_and_restart(tick)
+            self._publish(tick, position, last=False)
+            # Recording the tick before, while the agents work on this one.
+            if moment and recorder:
+                recorder.record(moment)
+            with patience(self._brief.patience_s, lambda tick=tick: self._missing(tick)):
+                journal = self._read_journal(tick)
+                acts = self._read_acts(tick)
+            moment = self._moment(tick, position, journal, acts)
+            position = self._world.step(tick, position, moment.velocity, self._timeline.at(tick).absent)
+            self.history.append(moment, position)
+            if tick % _TICKS_BETWEEN_REPORTS == 0:
+                self._supervisor.tell("tick", k=tick, error=moment.error)
+        if moment and recorder:
+            recorder.record(moment)
+        self._publish(self._world.ticks, position, last=True)
+
+    def _kill_and_restart(self, tick: int) -> None:
+        for event, agents in (("kill", self._timeline.killed(tick)), ("restart", self._timeline.restarted(tick))):
+            if agents:
+                self._supervisor.tell(event, agents=agents, k=tick)
+                self._supervisor.await_order(event)
+        for agent in self._timeline.restarted(tick):
+            self._streams.restart(f"{agent} act")
+            self._heard[agent - 1] = 0
+
+    def _publish(self, tick: int, position: Array, *, last: bool) -> None:
+        measured = self._world.measure(tick, position)
+        self._sense.put(
+            wire.pack(wire.Sense(tick, WORLD, self._numbers.next("sense"), last, measured, position))
+        )
+
+    def _read_journal(self, tick: int) -> wire.Journal:
+        journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
+        if journal.k != tick:
+            raise wire.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
+        return journal
+
+    def _read_acts(self, tick: int) -> dict[int, wire.Act]:
+        self._awaited = set((np.flatnonzero(~self._timeline.at(tick).dead) + 1).tolist())
+        acts = {}
+        while self._awaited:
+            sample = self._acts.recv()
+            speaker = self._keys.speaker(str(sample.key_expr))
+            act = wire.unpack(wire.Act, sample.payload.to_bytes())
+            if act.src != speaker or act.k != tick or speaker not in self._awaited:
+                raise wire.WireError(f"agent {speaker} acted as {act.src} in tick {act.k}; the world is in tick {tick}")
+            self._streams.check(f"{speaker} act", act.seq)
+            self._awaited.remove(speaker)
+            acts[speaker] = act
+        return acts
+
+    def _missing(self, tick: int) -> str:
+        if self._awaited:
+            return f"agents {sorted(self._awaited)} to act in tick {tick}"
+        return f"the medium's journal of tick {tick}"
+
+    def _moment(self, tick: int, position: Array, journal: wire.Journal, acts: dict[int, wire.Act]) -> Moment:
+        links = self._world.links
+        agents, width, dimension = links.agents, links.slots.shape[1], self._world.formation.dimension
+        velocity, psi = np.zeros((agents, dimension)), np.full(agents, np.nan)
+        estimate, known = np.zeros((agents, width, dimension)), np.zeros((agents, width), dtype=bool)
+        for agent, act in sorted(acts.items()):
+            row, degree = agent - 1, links.degree[agent - 1]
+            velocity[row] = act.velocity
+            estimate[row, :degree], known[row, :degree] = act.estimate, act.known
+            psi[row] = np.nan if act.psi is None else act.psi
+        self._account(journal, acts)
+        absent = self._timeline.at(tick).absent
+        return Moment(
+            tick=tick,
+            position=position,
+            target=self._world.target(tick),
+            error=self._world.error(tick, position, absent),
+            velocity=velocity,
+            estimate=estimate,
+            known=known,
+            psi=psi,
+            fates=journal.fates,
+            late=journal.late,
+            dropped=journal.dropped,
+        )
+
+    def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
+        """What the agents say they heard must be what the medium says it delivered, message by message."""
+        links = self._world.links
+        on_time = (journal.fates[1:] == Fate.DELIVERED).sum(axis=0)
+        handed = np.bincount(links.dst, weights=on_time, minlength=links.agents + 1)
+        handed += np.bincount(links.dst[journal.late], minlength=links.agents + 1)
+        for agent, act in acts.items():
+            self.uninstructed += abs(int(handed[agent]) - (act.heard - int(self._heard[agent - 1])))
+            self._heard[agent - 1] = act.heard
+
+
+def main() -> None:
+    """Run the world until the last tick."""
+    supervisor = Supervisor()
+    brief = supervisor.brief(WorldBrief)
+    world, out = brief.world, Path(brief.out)
+    timeline = Timeline(world.links, brief.faults)
+    recorder = None
+    if brief.record_every is not None:
+        recorder = Recorder(
+            out / "run.rrd",
+            run=brief.run,
+            formation=world.formation,
+            timeline=timeline,
+            dt=world.dt,
+            every=brief.record_every,
+            viewer=brief.viewer,
+        )
+    with zenoh.open(client(brief.login)) as session:
+        theatre = Theatre(session, supervisor, brief)
+        theatre.await_everybody()
+        supervisor.tell("ready")
+        supervisor.await_order("go")
+        try:
+            with supervisor.confessing():
+                theatre.run(recorder)
+        finally:
+            if recorder:
+                recorder.close()
+            theatre.history.save(out / "arrays.npz")
+        supervisor.tell("done", uninstructed=theatre.uninstructed)
+
+

@@ -1,0 +1,72 @@
+"""Stress of a framework, and whether it stabilises the formation (paper 004, sections 3.3 and 3.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import null_space
+
+from world.formation import Array, Edges, Formation
+
+# The smallest nonzero eigenvalue of a stress of unit norm below which the solver cannot tell it from zero.
+_RIGID = 1e-6
+
+
+class NotRigid(ValueError):
+    """No stress stabilises the framework."""
+
+
+def incidence(agents: int, edges: Edges) -> Array:
+    """Incidence matrix B of the undirected graph, shape (N, M): +1 where an edge leaves, -1 where it enters."""
+    B = np.zeros((agents, len(edges)))
+    for column, (i, j) in enumerate(edges):
+        B[i - 1, column], B[j - 1, column] = 1.0, -1.0
+    return B
+
+
+def laplacian(formation: Formation, weights: Array) -> Array:
+    """Stress matrix L = B diag(w) B^T, shape (N, N) (paper 004, eq. 3.4); off the diagonal L_ij = -l_ij."""
+    B = incidence(formation.agents, formation.edges)
+    return (B * weights) @ B.T
+
+
+def equilibrium(formation: Formation) -> Array:
+    """Basis of the weights that balance every agent, shape (M, K): all w with B diag(w) B^T P = 0."""
+    B = incidence(formation.agents, formation.edges)
+    extent = B.T @ formation.nominal
+    return null_space(np.concatenate([B * extent[:, d] for d in range(formation.dimension)]))
+
+
+def solve(formation: Formation) -> Array:
+    """Edge weights w, shape (M,), of the best-conditioned stabilising stress (paper 004, eq. 3.5).
+
+    The semidefinite program maximises the smallest eigenvalue that an affine formation does not make zero. The paper bounds
+    it by an arbitrary constant; here ||w|| <= 1 does, which also fixes the scale, so the answer is unique. The balance
+    L P = 0 is not left to the solver: w is sought among the weights that keep it exactly.
+
+    Raises
+    ------
+    NotRigid
+        When no stress is positive semidefinite of rank N - D - 1: the framework is not universally rigid (theorem 3.2).
+    """
+    import cvxpy as cp  # takes seconds to import, and only planning needs it
+
+    basis = equilibrium(formation)
+    affine = np.column_stack([formation.nominal, np.ones(formation.agents)])
+    Q = null_space(affine.T).T
+    if not basis.shape[1] or not len(Q):
+        raise NotRigid("no stress but zero balances the framework")
+    B = incidence(formation.agents, formation.edges)
+    coordinates, least = cp.Variable(basis.shape[1]), cp.Variable()
+    reduced = Q @ B @ cp.diag(basis @ coordinates) @ B.T @ Q.T
+    reduced = (reduced + reduced.T) / 2
+    problem = cp.Problem(
+        cp.Maximize(least), [reduced >> least * np.eye(len(Q)), cp.norm(coordinates, 2) <= 1.0]
+    )
+    problem.solve(solver=cp.CLARABEL)
+    if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE) or least.value < _RIGID:
+        raise NotRigid(
+            "the framework is not universally rigid: no stress is positive semidefinite of rank "
+            f"N - D - 1 = {len(Q)} (solver: {problem.status}, smallest eigenvalue {least.value})"
+        )
+    weights: Array = basis @ coordinates.value
+    return weights
