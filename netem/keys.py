@@ -32,17 +32,3 @@ class Keys:
     def journal(self) -> str:
         """The verdicts of a tick (medium to world)."""
         return f"affinet/{self.run}/netem/journal"
-
-    @staticmethod
-    def speaker(key: str) -> int:
-        """The agent in whose name a key speaks.
-
-        Raises
-        ------
-        ValueError
-            When the key is not a concrete key of one agent.
-        """
-        parts = key.split("/")
-        if len(parts) < 5 or parts[2] != "agent" or not parts[3].isdecimal() or "*" in key:
-            raise ValueError(f"{key!r} is not the key of one agent")
-        return int(parts[3])

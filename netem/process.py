@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import zenoh
@@ -53,12 +52,38 @@ class MediumBrief:
     patience_s: float
 
 
+@dataclass(frozen=True)
+class Sentence:
+    """All that is decided of a tick before it begins: verdicts ask who speaks to whom and when, never what is said.
+
+    Parameters
+    ----------
+    tick
+        k.
+    alive
+        Numbers of the agents whose processes live.
+    seen
+        For each agent, the neighbours whose measurement reaches it, and the link rows these stand in.
+    heard
+        For each agent, the broadcasts that reach it: (tick sent, source, channel), in order.
+    journal
+        The verdicts, packed for the world.
+    """
+
+    tick: int
+    alive: tuple[int, ...]
+    seen: dict[int, tuple[list[int], list[int]]]
+    heard: dict[int, list[tuple[int, int, str]]]
+    journal: bytes
+
+
 class Relay:
     """The medium of a run over Zenoh: one tick is sense, collect, deliver."""
 
     def __init__(self, session: zenoh.Session, brief: MediumBrief) -> None:
+        keys = Keys(brief.run)
+        agents = range(1, brief.links.agents + 1)
         self._brief = brief
-        self._keys = Keys(brief.run)
         self._links = brief.links
         self._medium = Medium(brief.seed, brief.channels, brief.profile, Timeline(brief.links, brief.faults))
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
@@ -67,14 +92,16 @@ class Relay:
         self._from_world = Sequences("world")
         self._from_agents = Sequences("agent")
         self._numbers = Numbering()
-        self._sense = session.declare_subscriber(self._keys.sense, zenoh.handlers.FifoChannel(16))
-        self._broadcasts = session.declare_subscriber(
-            self._keys.broadcast("*", "*"), zenoh.handlers.FifoChannel(4096)
-        )
-        self._journal = session.declare_publisher(self._keys.journal)
-        self._inboxes = {
-            agent: session.declare_publisher(self._keys.inbox(agent)) for agent in range(1, brief.links.agents + 1)
-        }
+        self._sense = session.declare_subscriber(keys.sense, zenoh.handlers.FifoChannel(16))
+        self._broadcasts = session.declare_subscriber(keys.broadcast("*", "*"), zenoh.handlers.FifoChannel(4096))
+        self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in self._spoken}
+        self._journal = session.declare_publisher(keys.journal)
+        self._inboxes = {agent: session.declare_publisher(keys.inbox(agent)) for agent in agents}
+
+    @property
+    def in_flight(self) -> int:
+        """Messages under way."""
+        return len(self._in_flight)
 
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
@@ -82,32 +109,53 @@ class Relay:
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
+        sentence = self._judge(0)
         while True:
             sense = wire.unpack(wire.Sense, self._sense.recv().payload.to_bytes())
             self._from_world.check("sense", sense.seq)
             if sense.last:
                 self._end(sense.k)
                 return
-            self._tick(sense)
+            self._welcome_back(sense.k)
+            self._hand_out_measurements(sense, sentence)
+            self._journal.put(sentence.journal)
+            self._collect(sentence)
+            self._hand_out_broadcasts(sentence)
+            # The agents now work on what they heard: time to decide the next tick.
+            self._in_flight = self._after
+            self._forget()
+            sentence = self._judge(sense.k + 1)
 
-    @property
-    def in_flight(self) -> int:
-        """Messages under way."""
-        return len(self._in_flight)
+    def _judge(self, tick: int) -> Sentence:
+        alive = ~self._medium.timeline.at(tick).dead
+        speaks = alive[self._links.src - 1]
+        offered = np.stack([speaks | (name == channels.SENSE) for name in self._brief.channels])
+        fates = self._medium.judge(tick, offered)
+        self._after, delivery = self._medium.deliver(tick, self._in_flight, fates)
+        journal = wire.Journal(tick, HUB, self._numbers.next("journal"), fates, delivery.late[:, 1], delivery.dropped)
+        numbers = tuple((np.flatnonzero(alive) + 1).tolist())
+        seen = self._seen(fates[0] == Fate.DELIVERED)
+        return Sentence(tick, numbers, seen, self._heard(tick, delivery), wire.pack(journal))
 
-    def _tick(self, sense: wire.Sense) -> None:
-        alive = ~self._medium.timeline.at(sense.k).dead
-        self._welcome_back(sense.k)
-        fates = self._medium.judge(sense.k, self._offered(alive))
-        self._hand_out_measurements(sense, fates[0] == Fate.DELIVERED, alive)
-        self._collect(sense.k, alive)
-        self._in_flight, delivery = self._medium.deliver(sense.k, self._in_flight, fates)
-        self._hand_out_broadcasts(sense.k, delivery, alive)
-        late = delivery.late[:, 1]
-        self._journal.put(
-            wire.pack(wire.Journal(sense.k, HUB, self._numbers.next("journal"), fates, late, delivery.dropped))
-        )
-        self._forget(sense.k)
+    def _seen(self, arrived: Mask) -> dict[int, tuple[list[int], list[int]]]:
+        seen: dict[int, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
+        rows = np.flatnonzero(arrived)
+        for row, src, dst in zip(rows.tolist(), self._links.src[rows].tolist(), self._links.dst[rows].tolist(), strict=True):
+            neighbours, links = seen[dst]
+            neighbours.append(src)
+            links.append(row)
+        return seen
+
+    def _heard(self, tick: int, delivery: Delivery) -> dict[int, list[tuple[int, int, str]]]:
+        # Late ones first, then those of this tick: sorted by tick, source and channel, as links and channels are.
+        links, rows = np.nonzero(delivery.sent[1:].T == tick)
+        on_time = np.stack([np.full_like(links, tick), links, rows + 1], axis=-1)
+        arriving = np.concatenate([delivery.late, on_time])
+        sources, receivers = self._links.src[arriving[:, 1]].tolist(), self._links.dst[arriving[:, 1]].tolist()
+        heard: dict[int, list[tuple[int, int, str]]] = defaultdict(list)
+        for (sent, _, channel), src, dst in zip(arriving.tolist(), sources, receivers, strict=True):
+            heard[dst].append((sent, src, self._brief.channels[channel]))
+        return heard
 
     def _welcome_back(self, tick: int) -> None:
         for agent in self._medium.timeline.restarted(tick):
@@ -115,65 +163,45 @@ class Relay:
             for name in self._spoken:
                 self._from_agents.restart(f"{agent} {name}")
 
-    def _offered(self, alive: Mask) -> Mask:
-        speaks = alive[self._links.src - 1]
-        return np.stack([np.ones_like(speaks) if name == channels.SENSE else speaks for name in self._brief.channels])
-
-    def _hand_out_measurements(self, sense: wire.Sense, seen: Mask, alive: Mask) -> None:
-        neighbours: dict[int, list[int]] = defaultdict(list)
-        measured: dict[int, list[Any]] = defaultdict(list)
-        for src, dst, y, arrived in zip(
-            self._links.src.tolist(), self._links.dst.tolist(), sense.measured, seen.tolist(), strict=True
-        ):
-            if arrived:
-                neighbours[dst].append(src)
-                measured[dst].append(y)
-        for agent in (np.flatnonzero(alive) + 1).tolist():
-            position = sense.position[agent - 1] if self._brief.leaders[agent - 1] else None
-            seq = self._numbers.next(f"inbox {agent}")
+    def _hand_out_measurements(self, sense: wire.Sense, sentence: Sentence) -> None:
+        for agent in sentence.alive:
+            neighbours, links = sentence.seen[agent]
             inbox = wire.SenseInbox(
-                sense.k, HUB, seq, wire.Phase.SENSE, neighbours[agent], measured[agent], position
+                k=sense.k,
+                src=HUB,
+                seq=self._numbers.next(f"inbox {agent}"),
+                phase=wire.Phase.SENSE,
+                neighbours=neighbours,
+                measured=[sense.measured[link] for link in links],
+                position=sense.position[agent - 1] if self._brief.leaders[agent - 1] else None,
             )
             self._inboxes[agent].put(wire.pack(inbox))
 
-    def _collect(self, tick: int, alive: Mask) -> None:
-        awaited = {(agent, name) for agent in (np.flatnonzero(alive) + 1).tolist() for name in self._spoken}
+    def _collect(self, sentence: Sentence) -> None:
+        tick = sentence.tick
+        awaited = {(agent, name) for agent in sentence.alive for name in self._spoken}
         with patience(self._brief.patience_s, lambda: _missing(tick, awaited)):
             while awaited:
                 sample = self._broadcasts.recv()
-                speaker = self._keys.speaker(str(sample.key_expr))
-                data = sample.payload.to_bytes()
+                key, data = str(sample.key_expr), sample.payload.to_bytes()
                 said = wire.unpack(wire.Broadcast, data)
-                if said.src != speaker or said.k != tick or (speaker, said.channel) not in awaited:
-                    raise wire.WireError(
-                        f"agent {speaker} said src {said.src}, tick {said.k}, channel {said.channel!r} on {sample.key_expr}"
-                        f" in tick {tick}"
-                    )
-                self._from_agents.check(f"{speaker} {said.channel}", said.seq)
-                self._said[tick, speaker, said.channel] = data
-                awaited.remove((speaker, said.channel))
+                if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
+                    raise wire.WireError(f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}")
+                self._from_agents.check(f"{said.src} {said.channel}", said.seq)
+                self._said[tick, said.src, said.channel] = data
+                awaited.remove((said.src, said.channel))
 
-    def _hand_out_broadcasts(self, tick: int, delivery: Delivery, alive: Mask) -> None:
-        inboxes: dict[int, list[bytes]] = defaultdict(list)
-        for sent, link, channel in delivery.late.tolist():
-            self._pass_on(inboxes, sent, link, channel)
-        for link, channel in np.argwhere(delivery.sent.T == tick).tolist():
-            if self._brief.channels[channel] != channels.SENSE:
-                self._pass_on(inboxes, tick, link, channel)
-        for agent in (np.flatnonzero(alive) + 1).tolist():
+    def _hand_out_broadcasts(self, sentence: Sentence) -> None:
+        for agent in sentence.alive:
+            arriving = [self._said[said] for said in sentence.heard[agent]]
             seq = self._numbers.next(f"inbox {agent}")
-            self._inboxes[agent].put(wire.pack_exchange(tick, seq, inboxes[agent]))
+            self._inboxes[agent].put(wire.pack_exchange(sentence.tick, seq, arriving))
 
-    def _pass_on(self, inboxes: dict[int, list[bytes]], sent: int, link: int, channel: int) -> None:
-        src, dst = int(self._links.src[link]), int(self._links.dst[link])
-        inboxes[dst].append(self._said[sent, src, self._brief.channels[channel]])
-
-    def _forget(self, tick: int) -> None:
-        awaited = {(sent, channel) for _, sent, channel, _ in self._in_flight.rows.tolist()}
-        if not awaited:
+    def _forget(self) -> None:
+        if not len(self._in_flight):
             self._said.clear()
             return
-        oldest = min(sent for sent, _ in awaited)
+        oldest = self._in_flight.rows[:, 1].min()
         self._said = {said: data for said, data in self._said.items() if said[0] >= oldest}
 
     def _end(self, tick: int) -> None:

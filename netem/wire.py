@@ -108,9 +108,9 @@ class Act(NamedTuple):
     k: int
     src: int
     seq: int
-    velocity: Array
-    estimate: Array
-    known: Mask
+    velocity: Array | Rows
+    estimate: Array | Rows
+    known: Mask | Rows
     psi: float | None
     heard: int
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import zenoh
@@ -55,6 +56,15 @@ class WorldBrief:
     patience_s: float
 
 
+class Past(NamedTuple):
+    """A tick that was flown, before it is written down."""
+
+    tick: int
+    position: Array
+    journal: wire.Journal
+    acts: dict[int, wire.Act]
+
+
 class Theatre:
     """The world of a run over Zenoh."""
 
@@ -64,7 +74,7 @@ class Theatre:
         self._supervisor = supervisor
         self._timeline = Timeline(brief.world.links, brief.faults)
         keys = Keys(brief.run)
-        self._keys = keys
+        self._acting = {keys.act(agent): agent for agent in range(1, brief.world.links.agents + 1)}
         self._acts = session.declare_subscriber(keys.act("*"), zenoh.handlers.FifoChannel(4096))
         self._journal = session.declare_subscriber(keys.journal, zenoh.handlers.FifoChannel(64))
         self._sense = session.declare_publisher(keys.sense)
@@ -84,24 +94,20 @@ class Theatre:
     def run(self, recorder: Recorder | None) -> None:
         """Fly all ticks."""
         position = self._world.start()
-        moment: Moment | None = None
+        past: Past | None = None
         for tick in range(self._world.ticks):
             self._kill_and_restart(tick)
-            self._publish(tick, position, last=False)
-            # Recording the tick before, while the agents work on this one.
-            if moment and recorder:
-                recorder.record(moment)
+            self._publish(tick, position)
+            if past:  # while the agents work on this tick
+                self._remember(past, position, recorder)
             with patience(self._brief.patience_s, lambda tick=tick: self._missing(tick)):
                 journal = self._read_journal(tick)
                 acts = self._read_acts(tick)
-            moment = self._moment(tick, position, journal, acts)
-            position = self._world.step(tick, position, moment.velocity, self._timeline.at(tick).absent)
-            self.history.append(moment, position)
-            if tick % _TICKS_BETWEEN_REPORTS == 0:
-                self._supervisor.tell("tick", k=tick, error=moment.error)
-        if moment and recorder:
-            recorder.record(moment)
-        self._publish(self._world.ticks, position, last=True)
+            past = Past(tick, position, journal, acts)
+            position = self._world.step(tick, position, self._velocity(acts), self._timeline.at(tick).absent)
+        if past:
+            self._remember(past, position, recorder)
+        self._sense.put(wire.pack(wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [])))
 
     def _kill_and_restart(self, tick: int) -> None:
         for event, agents in (("kill", self._timeline.killed(tick)), ("restart", self._timeline.restarted(tick))):
@@ -112,11 +118,9 @@ class Theatre:
             self._streams.restart(f"{agent} act")
             self._heard[agent - 1] = 0
 
-    def _publish(self, tick: int, position: Array, *, last: bool) -> None:
+    def _publish(self, tick: int, position: Array) -> None:
         measured = self._world.measure(tick, position)
-        self._sense.put(
-            wire.pack(wire.Sense(tick, WORLD, self._numbers.next("sense"), last, measured, position))
-        )
+        self._sense.put(wire.pack(wire.Sense(tick, WORLD, self._numbers.next("sense"), False, measured, position)))
 
     def _read_journal(self, tick: int) -> wire.Journal:
         journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
@@ -129,13 +133,12 @@ class Theatre:
         acts = {}
         while self._awaited:
             sample = self._acts.recv()
-            speaker = self._keys.speaker(str(sample.key_expr))
-            act = wire.unpack(wire.Act, sample.payload.to_bytes())
-            if act.src != speaker or act.k != tick or speaker not in self._awaited:
-                raise wire.WireError(f"agent {speaker} acted as {act.src} in tick {act.k}; the world is in tick {tick}")
-            self._streams.check(f"{speaker} act", act.seq)
-            self._awaited.remove(speaker)
-            acts[speaker] = act
+            key, act = str(sample.key_expr), wire.unpack(wire.Act, sample.payload.to_bytes())
+            if self._acting.get(key) != act.src or act.k != tick or act.src not in self._awaited:
+                raise wire.WireError(f"in tick {tick}, {key} said: agent {act.src} acts in tick {act.k}")
+            self._streams.check(f"{act.src} act", act.seq)
+            self._awaited.remove(act.src)
+            acts[act.src] = act
         return acts
 
     def _missing(self, tick: int) -> str:
@@ -143,30 +146,41 @@ class Theatre:
             return f"agents {sorted(self._awaited)} to act in tick {tick}"
         return f"the medium's journal of tick {tick}"
 
-    def _moment(self, tick: int, position: Array, journal: wire.Journal, acts: dict[int, wire.Act]) -> Moment:
+    def _velocity(self, acts: dict[int, wire.Act]) -> Array:
+        velocity = np.zeros((self._world.links.agents, self._world.formation.dimension))
+        velocity[[agent - 1 for agent in acts]] = [act.velocity for act in acts.values()]
+        return velocity
+
+    def _remember(self, past: Past, next_position: Array, recorder: Recorder | None) -> None:
+        self._account(past.journal, past.acts)
+        moment = self._moment(past)
+        self.history.append(moment, next_position)
+        if recorder:
+            recorder.record(moment)
+        if past.tick % _TICKS_BETWEEN_REPORTS == 0:
+            self._supervisor.tell("tick", k=past.tick, error=moment.error)
+
+    def _moment(self, past: Past) -> Moment:
         links = self._world.links
         agents, width, dimension = links.agents, links.slots.shape[1], self._world.formation.dimension
-        velocity, psi = np.zeros((agents, dimension)), np.full(agents, np.nan)
-        estimate, known = np.zeros((agents, width, dimension)), np.zeros((agents, width), dtype=bool)
-        for agent, act in sorted(acts.items()):
-            row, degree = agent - 1, links.degree[agent - 1]
-            velocity[row] = act.velocity
+        psi, known = np.full(agents, np.nan), np.zeros((agents, width), dtype=bool)
+        estimate = np.zeros((agents, width, dimension))
+        for agent, act in past.acts.items():
+            row, degree = agent - 1, len(act.known)
             estimate[row, :degree], known[row, :degree] = act.estimate, act.known
             psi[row] = np.nan if act.psi is None else act.psi
-        self._account(journal, acts)
-        absent = self._timeline.at(tick).absent
         return Moment(
-            tick=tick,
-            position=position,
-            target=self._world.target(tick),
-            error=self._world.error(tick, position, absent),
-            velocity=velocity,
+            tick=past.tick,
+            position=past.position,
+            target=self._world.target(past.tick),
+            error=self._world.error(past.tick, past.position, self._timeline.at(past.tick).absent),
+            velocity=self._velocity(past.acts),
             estimate=estimate,
             known=known,
             psi=psi,
-            fates=journal.fates,
-            late=journal.late,
-            dropped=journal.dropped,
+            fates=past.journal.fates,
+            late=past.journal.late,
+            dropped=past.journal.dropped,
         )
 
     def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
