@@ -17,8 +17,8 @@ from agents.estimators.base import Fields, Heard
 from analysis.affine import Array
 from netem import channels
 from netem.links import Integers, Mask
-from netem.medium import Fate, InFlight, Medium
-from world.history import History, Moment
+from netem.medium import Delivery, Fate, Fates, InFlight, Medium
+from world.history import History, Moment, Moments, gather
 
 Broadcasts = Mapping[str, Fields]
 
@@ -34,28 +34,32 @@ class Swarm:
         self._medium = Medium(plan.scenario.seed, plan.channels, plan.profile, plan.timeline)
         self._said: dict[int, Broadcasts] = {}
         self.in_flight = InFlight()
-        self.history = History(
-            plan.world.ticks, self._links, len(plan.channels), plan.world.formation.dimension
-        )
+        self.history = History(plan.world, len(plan.channels))
 
-    def fly(self, watch: Callable[[Moment], None]) -> None:
-        """All ticks; `watch` sees every moment."""
+    def fly(self, watch: Callable[[Moments], None], batch: int) -> None:
+        """All ticks; `watch` sees them, a batch at a time."""
         world, timeline = self._plan.world, self._medium.timeline
-        batch = (self._links.agents,)
-        position, state = world.start(), self._agents.init(batch)
+        agents = np.arange(1, self._links.agents + 1)
+        fresh = self._agents.init(agents.shape)
+        position, state = world.start(), fresh
+        moments: list[Moment] = []
         with np.errstate(over="ignore", invalid="ignore"):
             for tick in range(world.ticks):
-                now = timeline.at(tick)
-                if fresh := timeline.restarted(tick):
-                    state = renew(state, self._agents.init(batch), np.isin(np.arange(1, batch[0] + 1), fresh))
-                state, moment = self._tick(tick, position, state, now.dead)
-                position = world.step(tick, position, moment.velocity, now.absent)
-                self.history.append(moment, position)
-                watch(moment)
+                if restarted := timeline.restarted(tick):
+                    state = renew(state, fresh, np.isin(agents, restarted))
+                state, moment = self._tick(tick, position, state)
+                position = world.step(tick, position, moment.velocity, timeline.at(tick).absent)
+                moments.append(moment)
+                if len(moments) == batch or tick == world.ticks - 1:
+                    gathered = gather(world, timeline, tick + 1 - len(moments), moments)
+                    self.history.extend(gathered, position)
+                    watch(gathered)
+                    moments = []
 
-    def _tick(self, tick: int, position: Array, state: AgentState, dead: Mask) -> tuple[AgentState, Moment]:
+    def _tick(self, tick: int, position: Array, state: AgentState) -> tuple[AgentState, Moment]:
         world, links = self._plan.world, self._links
-        fates = self._medium.judge(tick, self._offered(~dead))
+        alive = ~self._medium.timeline.at(tick).dead
+        fates = self._medium.judge(tick, self._offered(alive))
         seen = (fates[0] == Fate.DELIVERED)[links.slots] & links.present
         measured = np.where(seen[..., None], world.measure(tick, position)[links.slots], 0.0)
         state, self._said[tick] = self._agents.sense(state, measured, seen)
@@ -63,7 +67,7 @@ class Swarm:
         heard = {name: self._hear(name, delivery.sent[self._plan.channels.index(name)]) for name in self._fields}
         state, action = self._agents.act(state, tick, heard, position)
         self._forget(tick)
-        return state, self._moment(tick, position, dead, action, fates=fates, late=delivery.late[:, 1], dropped=delivery.dropped)
+        return state, self._moment(position, alive, action, fates, delivery)
 
     def _offered(self, alive: Mask) -> Mask:
         speaks = alive[self._links.src - 1]
@@ -89,19 +93,16 @@ class Swarm:
         oldest = int(self.in_flight.rows[:, 1].min(initial=tick + 1))
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
 
-    def _moment(self, tick: int, position: Array, dead: Mask, action: Action, **air: Any) -> Moment:
-        world, estimate = self._plan.world, action.estimate
-        alive = ~dead
-        known = estimate.known & alive[:, None]
-        real = (self._links.present & alive[:, None])[..., None]
+    def _moment(self, position: Array, alive: Mask, action: Action, fates: Fates, delivery: Delivery) -> Moment:
+        estimate = action.estimate
+        real = self._links.present & alive[:, None]
         return Moment(
-            tick=tick,
             position=position,
-            target=world.target(tick),
-            error=world.error(tick, position, self._medium.timeline.at(tick).absent),
             velocity=np.where(alive[:, None], action.velocity, 0.0),
-            estimate=np.where(real, estimate.relative, 0.0),
-            known=known,
-            psi=np.where(alive & np.isfinite(estimate.psi), estimate.psi, np.nan),
-            **air,
+            estimate=np.where(real[..., None], estimate.relative, 0.0),
+            known=estimate.known & real,
+            psi=np.where(alive, estimate.psi, np.nan),
+            fates=fates,
+            late=len(delivery.late),
+            dropped=delivery.dropped,
         )

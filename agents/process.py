@@ -113,7 +113,6 @@ class Node:
         own = None if position is None else np.array(position, dtype=np.float64)
         self._state, action = self._agent.act(self._state, inbox.k, self._gather(inbox.messages), own)
         estimate, degree = action.estimate, len(self._neighbours)
-        psi = float(estimate.psi)
         act = wire.Act(
             k=inbox.k,
             src=self._number,
@@ -121,7 +120,7 @@ class Node:
             velocity=action.velocity,
             estimate=estimate.relative[:degree],
             known=estimate.known[:degree],
-            psi=psi if np.isfinite(psi) else None,
+            psi=float(estimate.psi),
             heard=self._heard,
         )
         self._act.put(wire.pack(act))

@@ -25,10 +25,17 @@ class Manoeuvre:
     theta: Array
     offset: Array
 
-    def target(self, tick: int, nominal: Array) -> Array:
-        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3)."""
-        position: Array = (self.theta[tick] @ nominal[..., None])[..., 0] + self.offset[tick]
-        return position
+    def target(self, tick: int | NDArray[np.int64], nominal: Array) -> Array:
+        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3); with ticks (T,), of each.
+
+        Returns
+        -------
+        Array
+            Shape (..., D), or (T, ..., D).
+        """
+        axes = tuple(range(np.ndim(tick), np.ndim(tick) + nominal.ndim - 1))
+        theta = np.expand_dims(self.theta[tick], axes)
+        return (theta @ nominal[..., None])[..., 0] + np.expand_dims(self.offset[tick], axes)
 
     def velocity(self, tick: int, nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""

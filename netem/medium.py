@@ -22,7 +22,7 @@ from netem import delay, loss
 from netem.draws import Purpose, Tape, uniform
 from netem.links import Integers, Mask
 from netem.profile import Profile
-from netem.timeline import Timeline, Verb
+from netem.timeline import Conditions, Timeline, Verb
 
 Fates = NDArray[np.uint8]
 
@@ -135,6 +135,8 @@ class Medium:
         self.links = timeline.links
         self._sensing = np.array([name == channel_names.SENSE for name in self.channels])
         codes = [_SHARED_DRAW] if profile.coupled else [channel_names.code(name) for name in self.channels]
+        self._last_conditions: Conditions | None = None
+        self._last_standing: Fates = np.empty(0, dtype=np.uint8)
         self._loss = Tape(lambda ticks: self._loss_draws(seed, codes, ticks))
 
     def judge(self, tick: int, offered: Mask) -> Fates:
@@ -152,20 +154,10 @@ class Medium:
         Fates
             Shape (C, L).
         """
-        now = self.timeline.at(tick)
-        dead, departed = self.links.touching(now.dead), self.links.touching(now.departed)
         lost = loss.lost(self.profile.availability, self._loss.at(tick))
-        fates = np.where(self._due(tick) > tick, np.uint8(Fate.DELAYED), np.uint8(Fate.DELIVERED))
-        for reason, held in (
-            (Fate.LOST, lost),
-            (Fate.PARTITION, now.partitioned),
-            (Fate.CUT, now.cut),
-            (Fate.DEPARTED, departed),
-            (Fate.DEAD, dead),
-            (Fate.SILENT, ~offered),
-        ):
-            fates[np.broadcast_to(held, fates.shape)] = reason
-        return fates
+        standing = self._standing(self.timeline.at(tick))
+        passed = np.where(lost & (standing < Fate.DEAD), np.uint8(Fate.LOST), standing)
+        return np.where(offered, passed, np.uint8(Fate.SILENT))
 
     def deliver(self, tick: int, in_flight: InFlight, fates: Fates) -> tuple[InFlight, Delivery]:
         """What arrives in this tick: the messages just passed, and those under way that are due.
@@ -188,6 +180,20 @@ class Medium:
         late = late[np.lexsort((late[:, 2], late[:, 1], late[:, 0]))]
         np.maximum.at(sent, (late[:, 2], late[:, 1]), late[:, 0])
         return InFlight(waiting), Delivery(sent, late, gone[gone != Fate.SILENT].astype(np.uint8))
+
+    def _standing(self, now: Conditions) -> Fates:
+        """What the layers other than loss make of a message under the same conditions, shape (C, L)."""
+        if now is not self._last_conditions:
+            fates = np.where(self._due(0) > 0, np.uint8(Fate.DELAYED), np.uint8(Fate.DELIVERED))
+            for reason, held in (
+                (Fate.PARTITION, now.partitioned),
+                (Fate.CUT, now.cut),
+                (Fate.DEPARTED, self.links.touching(now.departed)),
+                (Fate.DEAD, self.links.touching(now.dead)),
+            ):
+                fates[:, held] = reason
+            self._last_conditions, self._last_standing = now, fates
+        return self._last_standing
 
     def _due(self, tick: int) -> Integers:
         communicated = delay.due(tick, self.profile.delay_ticks, self.profile.least_delay)

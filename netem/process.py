@@ -132,10 +132,17 @@ class Relay:
         offered = np.stack([speaks | (name == channels.SENSE) for name in self._brief.channels])
         fates = self._medium.judge(tick, offered)
         self._after, delivery = self._medium.deliver(tick, self._in_flight, fates)
-        journal = wire.Journal(tick, HUB, self._numbers.next("journal"), fates, delivery.late[:, 1], delivery.dropped)
-        numbers = tuple((np.flatnonzero(alive) + 1).tolist())
-        seen = self._seen(fates[0] == Fate.DELIVERED)
-        return Sentence(tick, numbers, seen, self._heard(tick, delivery), wire.pack(journal))
+        seen, heard = self._seen(fates[0] == Fate.DELIVERED), self._heard(tick, delivery)
+        journal = wire.Journal(
+            k=tick,
+            src=HUB,
+            seq=self._numbers.next("journal"),
+            fates=fates,
+            handed=[len(heard[agent]) for agent in self._inboxes],
+            late=len(delivery.late),
+            dropped=delivery.dropped,
+        )
+        return Sentence(tick, tuple((np.flatnonzero(alive) + 1).tolist()), seen, heard, wire.pack(journal))
 
     def _seen(self, arrived: Mask) -> dict[int, tuple[list[int], list[int]]]:
         seen: dict[int, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))

@@ -102,7 +102,7 @@ class Act(NamedTuple):
 
     `velocity` is the input u_i, shape (D,), in metres per second; `estimate` the relative positions it acts on, one per
     neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape (m,); `psi` its convergence
-    indicator, none where undefined; `heard` how many broadcasts it has received so far.
+    indicator, NaN where undefined; `heard` how many broadcasts it has received so far.
     """
 
     k: int
@@ -111,24 +111,25 @@ class Act(NamedTuple):
     velocity: Array | Rows
     estimate: Array | Rows
     known: Mask | Rows
-    psi: float | None
+    psi: float
     heard: int
 
 
 class Journal(NamedTuple):
     """Medium to world: the verdicts of tick k.
 
-    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `late` the link row
-    of every message of an earlier tick that was delivered in this one; `dropped` the fate of every message whose receiver
-    went while it was under way.
+    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `handed` how many
+    broadcasts were put into each agent's inbox, shape (N,); `late` how many of them, of all agents, were sent in earlier
+    ticks; `dropped` the fate of every message whose receiver went while it was under way.
     """
 
     k: int
     src: str
     seq: int
-    fates: NDArray[np.uint8]
-    late: NDArray[np.int64]
-    dropped: NDArray[np.uint8]
+    fates: NDArray[np.uint8] | Rows
+    handed: Rows
+    late: int
+    dropped: NDArray[np.uint8] | Rows
 
 
 INBOXES: dict[str, type[SenseInbox | ExchangeInbox | EndInbox]] = {

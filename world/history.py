@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from netem.links import Links, Mask
+from analysis.metrics import tracking_error
+from netem.links import Mask
 from netem.medium import FATE_OF, Fate, Fates
 from netem.timeline import Timeline
 from world.formation import Array
+from world.world import World
 
 
 Arrays = dict[str, NDArray[Any]]
 
 
-@dataclass(frozen=True)
-class Moment:
-    """What happened in one tick.
+class Moment(NamedTuple):
+    """What happened in one tick, as arrays or as the nested lists that came over the wire.
 
     Parameters
     ----------
-    tick
-        k.
-    position, target
-        Where the agents are and should be, shape (N, D), in metres.
-    error
-        Tracking error (15), in square metres.
-    velocity
-        Inputs, shape (N, D), in metres per second.
+    position, velocity
+        Where the agents are, and their inputs, shape (N, D), in metres and metres per second.
     estimate, known
         Estimated relative positions, shape (N, n, D), in metres, and where there are any, shape (N, n).
     psi
@@ -40,29 +36,84 @@ class Moment:
     fates
         Verdicts, shape (C, L).
     late
-        Messages of earlier ticks delivered in this one: their link rows, shape (m,).
+        How many messages of earlier ticks were delivered in this one.
     dropped
         Fates of messages whose receiver went while they were under way, shape (d,).
     """
 
-    tick: int
+    position: Any
+    velocity: Any
+    estimate: Any
+    known: Any
+    psi: Any
+    fates: Any
+    late: int
+    dropped: Any
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Consecutive ticks; every array begins with them. Messages that arrived late, or were dropped under way, are counted.
+
+    Parameters
+    ----------
+    first
+        The first tick.
+    target
+        Where the manoeuvre wants the agents, shape (T, N, D), in metres.
+    error
+        Tracking error (15), shape (T,), in square metres.
+    late
+        How many arrived late, shape (T,).
+    dropped
+        How many were dropped under way, by fate, shape (T, fates).
+    """
+
+    first: int
     position: Array
-    target: Array
-    error: float
     velocity: Array
     estimate: Array
     known: Mask
     psi: Array
     fates: Fates
     late: NDArray[np.int64]
-    dropped: Fates
+    dropped: NDArray[np.int64]
+    target: Array
+    error: Array
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """Their numbers, shape (T,)."""
+        return np.arange(self.first, self.first + len(self.error))
+
+
+def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments:
+    """Consecutive moments as arrays, with what they are measured against."""
+    position, velocity, estimate, known, psi, fates, late, dropped = zip(*moments, strict=True)
+    ticks = np.arange(first, first + len(moments))
+    where, target = np.array(position), world.target(ticks)
+    present = np.array([~timeline.at(tick).absent for tick in ticks.tolist()])
+    return Moments(
+        first=first,
+        position=where,
+        velocity=np.array(velocity),
+        estimate=np.array(estimate),
+        known=np.array(known, dtype=bool),
+        psi=np.array(psi),
+        fates=np.array(fates, dtype=np.uint8),
+        late=np.array(late),
+        dropped=np.array([np.bincount(np.array(gone, dtype=np.int64), minlength=len(Fate)) for gone in dropped]),
+        target=target,
+        error=tracking_error(where, target, present),
+    )
 
 
 class History:
     """The moments of a run, gathered; arrays begin with the ticks."""
 
-    def __init__(self, ticks: int, links: Links, channels: int, dimension: int) -> None:
-        agents, width = links.agents, links.slots.shape[1]
+    def __init__(self, world: World, channels: int) -> None:
+        links, ticks = world.links, world.ticks
+        agents, width, dimension = links.agents, links.slots.shape[1], world.formation.dimension
         self.ticks = 0
         self.position = np.zeros((ticks + 1, agents, dimension))
         self.target = np.zeros((ticks, agents, dimension))
@@ -75,15 +126,13 @@ class History:
         self.late = np.zeros(ticks, dtype=np.int64)
         self.dropped = np.zeros((ticks, len(Fate)), dtype=np.int64)
 
-    def append(self, moment: Moment, next_position: Array) -> None:
-        """Take in one tick, and where it led."""
-        k = moment.tick
-        self.position[k], self.position[k + 1] = moment.position, next_position
-        self.target[k], self.error[k], self.velocity[k] = moment.target, moment.error, moment.velocity
-        self.estimate[k], self.known[k], self.psi[k] = moment.estimate, moment.known, moment.psi
-        self.fates[k] = moment.fates
-        self.late[k], self.dropped[k] = len(moment.late), np.bincount(moment.dropped, minlength=len(Fate))
-        self.ticks = k + 1
+    def extend(self, moments: Moments, next_position: Array) -> None:
+        """Take in the next ticks, and where they led."""
+        span = slice(self.ticks, self.ticks + len(moments.error))
+        for name in ("position", "target", "error", "velocity", "estimate", "known", "psi", "fates", "late", "dropped"):
+            getattr(self, name)[span] = getattr(moments, name)
+        self.position[span.stop] = next_position
+        self.ticks = span.stop
 
     def arrays(self) -> Arrays:
         """All arrays by name, up to the last tick."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import zenoh
@@ -12,17 +11,17 @@ import zenoh
 from netem import wire
 from netem.keys import Keys
 from netem.links import Mask
-from netem.medium import Fate
 from netem.sequence import Numbering, Sequences
 from netem.session import WORLD, Login, await_subscribers, client
 from netem.supervised import Supervisor, patience
 from netem.timeline import Fault, Timeline
 from world.formation import Array
-from world.history import History, Moment
+from world.history import History, Moment, gather
 from world.recorder import Recorder
 from world.world import World
 
-_TICKS_BETWEEN_REPORTS = 20
+# Ticks written down at once.
+_LEAST_BATCH = 50
 
 
 @dataclass(frozen=True)
@@ -56,15 +55,6 @@ class WorldBrief:
     patience_s: float
 
 
-class Past(NamedTuple):
-    """A tick that was flown, before it is written down."""
-
-    tick: int
-    position: Array
-    journal: wire.Journal
-    acts: dict[int, wire.Act]
-
-
 class Theatre:
     """The world of a run over Zenoh."""
 
@@ -80,12 +70,14 @@ class Theatre:
         self._sense = session.declare_publisher(keys.sense)
         self._numbers = Numbering()
         self._streams = Sequences("agent")
-        self._heard = np.zeros(brief.world.formation.agents, dtype=np.int64)
+        self._heard = dict.fromkeys(self._acting.values(), 0)
         self._awaited: set[int] = set()
+        self._moments: list[Moment] = []
+        self._batch = _LEAST_BATCH + -_LEAST_BATCH % (brief.record_every or 1)
+        self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
+        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
         self.uninstructed = 0
-        self.history = History(
-            brief.world.ticks, brief.world.links, len(brief.channels), brief.world.formation.dimension
-        )
+        self.history = History(brief.world, len(brief.channels))
 
     def await_everybody(self) -> None:
         """Wait until the medium listens."""
@@ -94,19 +86,18 @@ class Theatre:
     def run(self, recorder: Recorder | None) -> None:
         """Fly all ticks."""
         position = self._world.start()
-        past: Past | None = None
         for tick in range(self._world.ticks):
             self._kill_and_restart(tick)
             self._publish(tick, position)
-            if past:  # while the agents work on this tick
-                self._remember(past, position, recorder)
+            if tick % self._batch == 0:  # while the agents work on this tick
+                self._write_down(tick, position, recorder)
             with patience(self._brief.patience_s, lambda tick=tick: self._missing(tick)):
                 journal = self._read_journal(tick)
                 acts = self._read_acts(tick)
-            past = Past(tick, position, journal, acts)
-            position = self._world.step(tick, position, self._velocity(acts), self._timeline.at(tick).absent)
-        if past:
-            self._remember(past, position, recorder)
+            moment = self._moment(position, journal, acts)
+            self._moments.append(moment)
+            position = self._world.step(tick, position, moment.velocity, self._timeline.at(tick).absent)
+        self._write_down(self._world.ticks, position, recorder)
         self._sense.put(wire.pack(wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [])))
 
     def _kill_and_restart(self, tick: int) -> None:
@@ -116,7 +107,7 @@ class Theatre:
                 self._supervisor.await_order(event)
         for agent in self._timeline.restarted(tick):
             self._streams.restart(f"{agent} act")
-            self._heard[agent - 1] = 0
+            self._heard[agent] = 0
 
     def _publish(self, tick: int, position: Array) -> None:
         measured = self._world.measure(tick, position)
@@ -146,52 +137,35 @@ class Theatre:
             return f"agents {sorted(self._awaited)} to act in tick {tick}"
         return f"the medium's journal of tick {tick}"
 
-    def _velocity(self, acts: dict[int, wire.Act]) -> Array:
-        velocity = np.zeros((self._world.links.agents, self._world.formation.dimension))
-        velocity[[agent - 1 for agent in acts]] = [act.velocity for act in acts.values()]
-        return velocity
-
-    def _remember(self, past: Past, next_position: Array, recorder: Recorder | None) -> None:
-        self._account(past.journal, past.acts)
-        moment = self._moment(past)
-        self.history.append(moment, next_position)
-        if recorder:
-            recorder.record(moment)
-        if past.tick % _TICKS_BETWEEN_REPORTS == 0:
-            self._supervisor.tell("tick", k=past.tick, error=moment.error)
-
-    def _moment(self, past: Past) -> Moment:
-        links = self._world.links
-        agents, width, dimension = links.agents, links.slots.shape[1], self._world.formation.dimension
-        psi, known = np.full(agents, np.nan), np.zeros((agents, width), dtype=bool)
-        estimate = np.zeros((agents, width, dimension))
-        for agent, act in past.acts.items():
-            row, degree = agent - 1, len(act.known)
-            estimate[row, :degree], known[row, :degree] = act.estimate, act.known
-            psi[row] = np.nan if act.psi is None else act.psi
+    def _moment(self, position: Array, journal: wire.Journal, acts: dict[int, wire.Act]) -> Moment:
+        self._account(journal, acts)
+        everybody = [acts.get(agent, self._nobody) for agent in self._heard]
         return Moment(
-            tick=past.tick,
-            position=past.position,
-            target=self._world.target(past.tick),
-            error=self._world.error(past.tick, past.position, self._timeline.at(past.tick).absent),
-            velocity=self._velocity(past.acts),
-            estimate=estimate,
-            known=known,
-            psi=psi,
-            fates=past.journal.fates,
-            late=past.journal.late,
-            dropped=past.journal.dropped,
+            position=position,
+            velocity=np.array([act.velocity for act in everybody]),
+            estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
+            known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
+            psi=[act.psi for act in everybody],
+            fates=journal.fates,
+            late=journal.late,
+            dropped=journal.dropped,
         )
+
+    def _write_down(self, tick: int, next_position: Array, recorder: Recorder | None) -> None:
+        if not self._moments:
+            return
+        moments = gather(self._world, self._timeline, tick - len(self._moments), self._moments)
+        self._moments = []
+        self.history.extend(moments, next_position)
+        if recorder:
+            recorder.record(moments)
+        self._supervisor.tell("tick", k=tick, error=float(moments.error[-1]))
 
     def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
         """What the agents say they heard must be what the medium says it delivered, message by message."""
-        links = self._world.links
-        on_time = (journal.fates[1:] == Fate.DELIVERED).sum(axis=0)
-        handed = np.bincount(links.dst, weights=on_time, minlength=links.agents + 1)
-        handed += np.bincount(links.dst[journal.late], minlength=links.agents + 1)
         for agent, act in acts.items():
-            self.uninstructed += abs(int(handed[agent]) - (act.heard - int(self._heard[agent - 1])))
-            self._heard[agent - 1] = act.heard
+            self.uninstructed += abs(journal.handed[agent - 1] - (act.heard - self._heard[agent]))
+            self._heard[agent] = act.heard
 
 
 def main() -> None:

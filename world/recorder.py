@@ -1,11 +1,10 @@
 """A run as a Rerun recording: trajectories, graphs, target, indicators, verdicts and events on simulated time.
 
-Moments are gathered and logged as columns, many ticks at once: that is several times cheaper than tick by tick.
+Many ticks are logged at once, as columns: that is several times cheaper than tick by tick.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from netem.medium import REASONS, Fate
+from netem.medium import REASONS, Fate, Fates
 from netem.timeline import Timeline
 from world.formation import Array, Formation
-from world.history import Moment
+from world.history import Moments
 
-_BATCH = 100
 _TIMELINE = "sim_time"
 
 _LEADER, _FOLLOWER, _DEAD, _DEPARTED = 0xF2B705FF, 0x3FA7F5FF, 0x7A1F1FFF, 0x6E6E6EFF
@@ -69,43 +67,26 @@ class Recorder:
         self._timeline = timeline
         self._dt = dt
         self._every = every
-        self._moments: list[Moment] = []
-        self._counts: list[NDArray[np.int64]] = []
-        self._running = np.zeros(len(Fate), dtype=np.int64)
         self._edges = np.array(formation.edges, dtype=np.int64) - 1
         self._stream = rr.RecordingStream("affinet", recording_id=run)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
         self._stream.set_sinks(*sinks, default_blueprint=_blueprint(formation))
         self._log_static()
 
-    def record(self, moment: Moment) -> None:
-        """Take in one tick; it is written with its batch."""
-        self._running += np.bincount(moment.fates.ravel(), minlength=len(Fate))
-        self._log_events(moment.tick)
-        if moment.tick % self._every:
-            return
-        self._moments.append(moment)
-        self._counts.append(self._running)
-        self._running = np.zeros(len(Fate), dtype=np.int64)
-        if len(self._moments) >= _BATCH:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the moments gathered so far."""
-        if not self._moments:
-            return
-        moments, counts = self._moments, np.array(self._counts)
-        self._moments, self._counts = [], []
-        time = [rr.TimeColumn(_TIMELINE, duration=[moment.tick * self._dt for moment in moments])]
-        self._log_agents(time, moments)
-        self._log_graph(time, moments)
-        self._scalars("metrics/tracking_error", time, np.array([[moment.error] for moment in moments]))
-        self._scalars("metrics/psi", time, np.array([moment.psi for moment in moments]))
-        self._scalars("metrics/messages", time, counts[:, list(_COUNTED)] / self._every)
+    def record(self, moments: Moments) -> None:
+        """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
+        for tick in moments.ticks.tolist():
+            self._log_events(tick)
+        kept = slice(None, None, self._every)
+        time = [rr.TimeColumn(_TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
+        self._log_agents(time, moments.ticks[kept], moments.position[kept])
+        self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
+        self._scalars("metrics/tracking_error", time, moments.error[kept, None])
+        self._scalars("metrics/psi", time, moments.psi[kept])
+        self._scalars("metrics/messages", time, self._messages_per_tick(moments))
 
     def close(self) -> None:
-        """Write the rest and end the file."""
-        self.flush()
+        """End the file."""
         self._stream.disconnect()
 
     def _log_static(self) -> None:
@@ -139,29 +120,33 @@ class Recorder:
             for text in ended:
                 self._stream.log("events", rr.TextLog(text, level="INFO"))
 
-    def _log_agents(self, time: list[rr.TimeColumn], moments: Sequence[Moment]) -> None:
+    def _messages_per_tick(self, moments: Moments) -> Array:
+        starts = np.arange(0, len(moments.ticks), self._every)
+        counts = np.stack([(moments.fates == fate).sum(axis=(1, 2)) for fate in _COUNTED], axis=-1)
+        lengths = np.diff(np.append(starts, len(moments.ticks)))
+        means: Array = np.add.reduceat(counts, starts, axis=0) / lengths[:, None]
+        return means
+
+    def _log_agents(self, time: list[rr.TimeColumn], ticks: NDArray[np.int64], position: Array) -> None:
         agents = self._formation.agents
-        positions = _spatial(np.array([moment.position for moment in moments]))
-        colours = np.array([self._agent_colours(moment.tick) for moment in moments]).ravel()
-        columns = rr.Points3D.columns(positions=positions.reshape(-1, 3), colors=colours)
+        colours = np.array([self._agent_colours(tick) for tick in ticks.tolist()]).ravel()
+        columns = rr.Points3D.columns(positions=_spatial(position).reshape(-1, 3), colors=colours)
         for path in ("swarm/agents", "swarm/trail"):
-            self._stream.send_columns(path, time, columns.partition([agents] * len(moments)))
+            self._stream.send_columns(path, time, columns.partition([agents] * len(ticks)))
 
     def _agent_colours(self, tick: int) -> NDArray[np.uint32]:
         now = self._timeline.at(tick)
         flying = np.where(self._formation.is_leader, _LEADER, _FOLLOWER)
         return np.where(now.dead, _DEAD, np.where(now.departed, _DEPARTED, flying)).astype(np.uint32)
 
-    def _log_graph(self, time: list[rr.TimeColumn], moments: Sequence[Moment]) -> None:
-        position = _spatial(np.array([moment.position for moment in moments]))
-        target = _spatial(np.array([moment.target for moment in moments]))
+    def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
+        position, target = _spatial(flown), _spatial(wanted)
         links = self._timeline.links
         receiver, sender = position[:, links.dst - 1], position[:, links.src - 1]
         # Half an edge for each direction: the half at an agent shows whether that agent hears and sees the other.
         halves = np.stack([(receiver + sender) / 2, receiver], axis=-2)
         palette = np.array([_LINK_COLOURS[fate] for fate in Fate], dtype=np.uint32)
-        colours = palette[np.array([moment.fates[0] for moment in moments])]
-        self._segments("swarm/graph/functional", time, halves, colours)
+        self._segments("swarm/graph/functional", time, halves, palette[fates])
         self._segments("swarm/graph/nominal", time, position[:, self._edges])
         self._segments("swarm/target", time, target[:, self._edges])
 

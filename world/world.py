@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
-from analysis.metrics import tracking_error
 from netem.draws import Purpose, Tape
 from netem.links import Links
 from world import dynamics, sensors
@@ -55,8 +54,8 @@ class World:
         offset = normal(self.seed, Purpose.INITIAL_POSITION, src=agents, axes=self.formation.dimension)
         return self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, self.spread * offset)
 
-    def target(self, tick: int) -> Array:
-        """Where the manoeuvre wants every agent, shape (N, D)."""
+    def target(self, tick: int | NDArray[np.int64]) -> Array:
+        """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
         return self.manoeuvre.target(tick, self.formation.nominal)
 
     def measure(self, tick: int, position: Array) -> Array:
@@ -67,10 +66,6 @@ class World:
         """Positions in the next tick; the body of an agent that is absent holds still."""
         flown = np.where(absent[:, None], 0.0, velocity)
         return dynamics.single_integrator(position, flown, self.dt, self._disturbances.at(tick))
-
-    def error(self, tick: int, position: Array, absent: NDArray[np.bool_]) -> float:
-        """Tracking error (15) over the agents present, in square metres."""
-        return float(tracking_error(position, self.target(tick), ~absent))
 
     @cached_property
     def _sensor_noise(self) -> Tape:
