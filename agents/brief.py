@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,12 @@ class Brief:
     covariance: Array
     leader: Mask
     mission: Manoeuvre | None
+
+    @cached_property
+    def degree(self) -> Array:
+        """gamma_i = sum_j l_ij, shape (...)."""
+        total: Array = self.stress.sum(axis=-1)
+        return total
 
     @property
     def dimension(self) -> int:

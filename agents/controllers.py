@@ -144,10 +144,8 @@ class VaryingVelocity:
         """Move as the neighbours do, and fall toward the formation."""
         heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
         theirs = self._neighbours_velocity(brief, tick, velocity, estimate, heard)
-        gamma = brief.stress.sum(axis=-1)[..., None]
-        steady = np.where(gamma == 0.0, 1.0, gamma)
         motion = (brief.stress[..., None] * theirs).sum(axis=-2)
-        law = (motion - self.alpha * stress_force(brief, estimate)) / steady
+        law = (motion - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
         return LastHeard(heard), (1.0 - self.relaxation) * velocity + self.relaxation * law
 
     def _neighbours_velocity(

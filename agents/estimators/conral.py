@@ -20,10 +20,11 @@ from agents.estimators.ral import THETA, Perceived, RelativeAffineLocalization, 
 
 
 class Agreement(NamedTuple):
-    """What is perceived in this tick, and the consensus map that outlasts it."""
+    """What is perceived in this tick, the consensus map that outlasts it, and the covariance of its edges."""
 
     perceived: Perceived
     consensus: geometry.Fit
+    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,10 @@ class ConsensusLocalization:
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Agreement:
         """Nothing perceived, nothing agreed."""
         perceived = RelativeAffineLocalization().init(brief, batch)
-        inverse, _ = geometry.gram(brief.relative, brief.present)
-        pooled = np.broadcast_to(inverse, perceived.local.inverse.shape)
-        return Agreement(perceived, perceived.local._replace(inverse=pooled))
+        inverse_gram, _ = geometry.gram(brief.relative, brief.present)
+        covariance = geometry.covariance(brief.relative, inverse_gram, brief.covariance)
+        shape = (*perceived.seen.shape, *brief.covariance.shape)
+        return Agreement(perceived, perceived.local, np.broadcast_to(covariance, shape))
 
     def sense(
         self, brief: Brief, state: Agreement, measured: Array, seen: Mask
@@ -62,36 +64,29 @@ class ConsensusLocalization:
             "consensus": consensus.theta,
             "started": consensus.feasible,
         }
-        return Agreement(Perceived(measured, seen, local), consensus), {THETA: said}
+        return state._replace(perceived=Perceived(measured, seen, local), consensus=consensus), {THETA: said}
 
     def fuse(self, brief: Brief, state: Agreement, heard: Mapping[str, Heard]) -> tuple[Agreement, Estimate]:
         """One step of consensus; complete the measurements by its map."""
-        perceived, said = state.perceived, heard[THETA]
+        said = heard[THETA]
         voices = said.fresh & said.fields["started"]
         psi = geometry.indicator(state.consensus, said.fields["consensus"], voices)
         consensus = self._step(state, said, voices)
-        estimate = complete(brief, perceived.measured, perceived.seen, consensus, psi)
-        return Agreement(perceived, consensus), estimate
+        estimate = complete(brief, state.perceived, consensus, state.covariance, psi)
+        return state._replace(consensus=consensus), estimate
 
     def _step(self, state: Agreement, said: Heard, voices: Mask) -> geometry.Fit:
         own, local = state.consensus, state.perceived.local
         fits = said.fresh & said.fields["feasible"]
-        pull = (
-            _sum(voices, said.fields["consensus"] - own.theta[..., None, :, :])
-            + _sum(fits, said.fields["local"] - own.theta[..., None, :, :])
-            + np.where(local.feasible[..., None, None], local.theta - own.theta, 0.0)
-        )
+        agreed, number = geometry.total(voices, said.fields["consensus"]), voices.sum(axis=-1)
+        drawn = agreed + geometry.total(fits, said.fields["local"]) + local.theta
+        weight = number + fits.sum(axis=-1) + local.feasible
+        pull = drawn - weight[..., None, None] * own.theta
         stepped = own._replace(theta=own.theta + self.epsilon * pull)
-        number = voices.sum(axis=-1)
-        agreed = _sum(voices, said.fields["consensus"]) / np.maximum(number, 1)[..., None, None]
-        return _start(stepped, agreed, number > 0)
+        return _start(stepped, agreed / np.maximum(number, 1)[..., None, None], number > 0)
 
 
 def _start(running: geometry.Fit, first: Array, given: Mask) -> geometry.Fit:
     theta = np.where(running.feasible[..., None, None], running.theta, first)
     return running._replace(theta=theta, feasible=running.feasible | given)
 
-
-def _sum(counts: Mask, maps: Array) -> Array:
-    total: Array = np.where(counts[..., None, None], maps, 0.0).sum(axis=-3)
-    return total

@@ -14,6 +14,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators.base import Channels, Estimate, Fields, Heard
 from agents.estimators.conral import Agreement, ConsensusLocalization
+from agents.estimators.geometry import identity
 from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
 
@@ -60,8 +61,8 @@ class GeometryAwareFilter(EdgeFilters):
         seen = _perceived(state.shape).seen
         shape, observed = self._shaper.fuse(brief, state.shape, heard)
         trusted = np.isfinite(observed.psi)
-        penalty = np.where(trusted, observed.psi, 0.0)[..., None, None, None] * np.eye(brief.dimension)
-        R = observed.covariance + np.where(seen[..., None, None], 0.0, penalty)
+        penalty = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
+        R = observed.covariance + penalty[..., None, None] * identity(brief.dimension)
         usable = seen | (observed.known & trusted[..., None])
         tracks = self.advance(brief, state.tracks, observed.relative, R, usable)
         return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from agents.brief import Array, Mask
+from agents.estimators.small import determinant, inverse
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 _SINGULAR = 1e-9
@@ -21,13 +23,13 @@ class Fit(NamedTuple):
         Shape (..., D, D); 0 where not feasible.
     feasible
         Where enough neighbours are seen to determine it, shape (...).
-    inverse
+    inverse_gram
         (H H^T)^-1 of the neighbours behind it, shape (..., D, D); the identity where not feasible.
     """
 
     theta: Array
     feasible: Mask
-    inverse: Array
+    inverse_gram: Array
 
 
 def gram(relative: Array, seen: Mask) -> tuple[Array, Mask]:
@@ -50,9 +52,9 @@ def gram(relative: Array, seen: Mask) -> tuple[Array, Mask]:
     dimension = relative.shape[-1]
     H = np.where(seen[..., None], relative, 0.0)
     HHt = np.swapaxes(H, -1, -2) @ H
-    scale = np.trace(HHt, axis1=-2, axis2=-1) / dimension
-    feasible = np.linalg.det(HHt) > _SINGULAR * scale**dimension
-    return np.linalg.inv(np.where(feasible[..., None, None], HHt, np.eye(dimension))), feasible
+    scale = np.einsum("...ii", HHt) / dimension
+    feasible = determinant(HHt) > _SINGULAR * scale**dimension
+    return inverse(np.where(feasible[..., None, None], HHt, identity(dimension))), feasible
 
 
 def fit(relative: Array, measured: Array, seen: Mask) -> Fit:
@@ -61,22 +63,21 @@ def fit(relative: Array, measured: Array, seen: Mask) -> Fit:
     Parameters
     ----------
     relative, measured
-        p_ij and y_ij, shape (..., n, D).
+        p_ij and y_ij, shape (..., n, D); the latter 0 where not seen.
     seen
         Shape (..., n).
     """
-    inverse, feasible = gram(relative, seen)
-    Y = np.where(seen[..., None], measured, 0.0)
-    theta = np.swapaxes(Y, -1, -2) @ relative @ inverse
-    return Fit(np.where(feasible[..., None, None], theta, 0.0), feasible, inverse)
+    inverse_gram, feasible = gram(relative, seen)
+    theta = np.swapaxes(measured, -1, -2) @ relative @ inverse_gram
+    return Fit(np.where(feasible[..., None, None], theta, 0.0), feasible, inverse_gram)
 
 
-def covariance(relative: Array, inverse: Array, R: Array) -> Array:
+def covariance(relative: Array, inverse_gram: Array, R: Array) -> Array:
     """Covariance of the geometric estimate Theta p_ij, shape (..., n, D, D) (eq. 12).
 
     With one R for all edges, and an identity of size N_i,k as it must be, (12) is (p_ij^T (H H^T)^-1 p_ij) R.
     """
-    leverage = (relative @ inverse * relative).sum(axis=-1)
+    leverage = (relative @ inverse_gram * relative).sum(axis=-1)
     return leverage[..., None, None] * R
 
 
@@ -99,7 +100,20 @@ def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
     counts
         Which of them count, shape (..., n).
     """
-    distance = ((own.theta[..., None, :, :] - theirs) ** 2).sum(axis=(-2, -1))
+    difference = theirs - own.theta[..., None, :, :]
     number = counts.sum(axis=-1)
-    mean = np.where(counts, distance, 0.0).sum(axis=-1) / np.maximum(number, 1)
+    mean = total(counts, difference * difference).sum(axis=(-2, -1)) / np.maximum(number, 1)
     return np.where(own.feasible & (number > 0), mean, np.nan)
+
+
+def total(counts: Mask, maps: Array) -> Array:
+    """Sum of the maps (..., n, D, D) that count, shape (..., D, D)."""
+    flat = maps.reshape(*maps.shape[:-2], -1)
+    summed = counts[..., None, :].astype(np.float64) @ flat
+    return summed.reshape(*maps.shape[:-3], *maps.shape[-2:])
+
+
+@cache
+def identity(dimension: int) -> Array:
+    """The identity matrix."""
+    return np.eye(dimension)

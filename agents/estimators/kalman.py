@@ -1,7 +1,7 @@
 """The Kalman core: predict and correct, over stacks of independent filters.
 
 The state of one relative edge stacks position, velocity and acceleration, D numbers each, so that the observed position is
-its first D entries. Sums run in `matmul` and `linalg`, matrix by matrix: a stack of filters gives the bits of each alone.
+its first D entries. Sums run in `matmul`, matrix by matrix: a stack of filters gives the bits of each alone.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 
 from agents.brief import Array, Mask
+from agents.estimators.small import inverse
 
 
 @cache
@@ -41,7 +42,7 @@ def constant_acceleration(dimension: int, dt: float, sigma_w: float) -> tuple[Ar
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:
     """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S)."""
-    return (F @ mean[..., None])[..., 0], F @ covariance @ F.T + Q
+    return mean @ F.T, F @ covariance @ F.T + Q
 
 
 def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> tuple[Array, Array]:
@@ -60,7 +61,7 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     """
     dimension = observed.shape[-1]
     innovation = observed - mean[..., :dimension]
-    gain = covariance[..., :dimension] @ np.linalg.inv(covariance[..., :dimension, :dimension] + R)
+    gain = covariance[..., :dimension] @ inverse(covariance[..., :dimension, :dimension] + R)
     gain = np.where(usable[..., None, None], gain, 0.0)
     corrected = mean + (gain @ innovation[..., None])[..., 0]
     return corrected, covariance - gain @ covariance[..., :dimension, :]

@@ -57,12 +57,16 @@ class RelativeAffineLocalization:
         """Complete the measurements by the local map."""
         said = heard[THETA]
         psi = geometry.indicator(state.local, said.fields["local"], said.fresh & said.fields["feasible"])
-        return state, complete(brief, state.measured, state.seen, state.local, psi)
+        covariance = geometry.covariance(brief.relative, state.local.inverse_gram, brief.covariance)
+        return state, complete(brief, state, state.local, covariance, psi)
 
 
-def complete(brief: Brief, measured: Array, seen: Mask, shape: geometry.Fit, psi: Array) -> Estimate:
-    """Measured edges as measured, the others from the perceived shape (Algorithm 2, lines 9-13, by the errata)."""
-    relative = np.where(seen[..., None], measured, geometry.apply(shape.theta, brief.relative))
-    geometric = geometry.covariance(brief.relative, shape.inverse, brief.covariance)
+def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric: Array, psi: Array) -> Estimate:
+    """Measured edges as measured, the others from a shape (Algorithm 2, lines 9-13, by the errata).
+
+    `geometric` is the covariance of the shape's edges, shape (..., n, D, D).
+    """
+    seen = perceived.seen
+    relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))
     covariance = np.where(seen[..., None, None], brief.covariance, geometric)
     return Estimate(relative, brief.present & (seen | shape.feasible[..., None]), covariance, psi)

@@ -1,0 +1,28 @@
+"""Determinant and inverse of stacks of D x D matrices: closed form in two dimensions, LAPACK in three.
+
+At this size a call into LAPACK is mostly preparation; an agent makes two of each in every tick.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.brief import Array
+
+
+def determinant(matrix: Array) -> Array:
+    """Determinants, shape (...), of matrices (..., D, D)."""
+    if matrix.shape[-1] != 2:
+        return np.asarray(np.linalg.det(matrix))
+    product: Array = matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
+    return product
+
+
+def inverse(matrix: Array) -> Array:
+    """Inverses of regular matrices (..., D, D)."""
+    if matrix.shape[-1] != 2:
+        return np.linalg.inv(matrix)
+    adjugate = np.empty_like(matrix)
+    adjugate[..., 0, 0], adjugate[..., 1, 1] = matrix[..., 1, 1], matrix[..., 0, 0]
+    adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrix[..., 0, 1], -matrix[..., 1, 0]
+    return adjugate / determinant(matrix)[..., None, None]
