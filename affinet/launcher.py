@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import tempfile
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,6 +33,8 @@ class Flight:
         Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
     failure
         Why the run ended early, if it did.
+    start_s, wall_s
+        From the first process started to the first tick, and from there to the end, in seconds.
     processes
         Every process there was.
     """
@@ -39,6 +42,8 @@ class Flight:
     in_flight: int | None = None
     uninstructed: int | None = None
     failure: str | None = None
+    start_s: float = 0.0
+    wall_s: float = 0.0
     processes: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -61,11 +66,12 @@ class Launcher:
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
         crew = Crew(logs)
+        launched = time.perf_counter()
         with tempfile.TemporaryDirectory(prefix="affinet-") as private:
             try:
                 with crew:
                     self._start(crew, Path(private))
-                    self._fly(crew)
+                    self._fly(crew, launched)
             except RunFailed as failure:
                 self.flight.failure = str(failure)
         self.flight.processes = [child.report() for child in crew.children]
@@ -88,9 +94,11 @@ class Launcher:
         users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
         return logins
 
-    def _fly(self, crew: Crew) -> None:
+    def _fly(self, crew: Crew, launched: float) -> None:
         world, medium = crew.children[0], crew.children[1]
         world.order("go")
+        first_tick = time.perf_counter()
+        self.flight.start_s = first_tick - launched
         rota = 0
         for child, event in crew.events(_LAUNCHER_PATIENCE_S, "the world to move on"):
             match event["event"]:
@@ -110,6 +118,7 @@ class Launcher:
                     self.flight.uninstructed = event["uninstructed"]
                 case "done" if child is medium:
                     self.flight.in_flight = event["in_flight"]
+            self.flight.wall_s = time.perf_counter() - first_tick
             if self.flight.uninstructed is not None and self.flight.in_flight is not None:
                 break
         crew.release()

@@ -28,6 +28,7 @@ class PlanError(ValueError):
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         super().__init__("\n".join(f"{finding.check}: {finding.says}" for finding in findings if finding.fatal))
+        self.findings = tuple(findings)
 
 
 @dataclass(frozen=True)

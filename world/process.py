@@ -20,7 +20,6 @@ from world.history import History, Moment, gather
 from world.recorder import Recorder
 from world.world import World
 
-# Ticks written down at once.
 _LEAST_BATCH = 50
 
 
@@ -55,6 +54,11 @@ class WorldBrief:
     patience_s: float
 
 
+def batch_of(every: int) -> int:
+    """How many ticks are written down at once: a multiple of those from one recorded moment to the next."""
+    return _LEAST_BATCH + -_LEAST_BATCH % every
+
+
 class Theatre:
     """The world of a run over Zenoh."""
 
@@ -73,7 +77,7 @@ class Theatre:
         self._heard = dict.fromkeys(self._acting.values(), 0)
         self._awaited: set[int] = set()
         self._moments: list[Moment] = []
-        self._batch = _LEAST_BATCH + -_LEAST_BATCH % (brief.record_every or 1)
+        self._batch = batch_of(brief.record_every or 1)
         self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
         self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
         self.uninstructed = 0

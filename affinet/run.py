@@ -1,0 +1,104 @@
+"""Fly a plan in one of the runtimes, and leave a run directory behind."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from affinet import outcome
+from affinet.inprocess import Swarm
+from affinet.launcher import Launcher
+from affinet.outcome import Outcome
+from affinet.plan import Plan
+from world import history
+from world.history import Moments
+from world.process import batch_of
+from world.recorder import Recorder
+
+Runtime = Literal["processes", "inprocess"]
+Watch = Callable[[int, float], None]
+
+
+def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | None = None) -> Outcome:
+    """Run a plan.
+
+    Parameters
+    ----------
+    plan
+        What to fly.
+    runtime
+        Over processes, or in this one; the answers are the same bits.
+    out
+        The run directory, new.
+    watch
+        Called with the tick reached and its tracking error, in square metres, now and then.
+    viewer
+        URL of a Rerun viewer that is listening.
+
+    Raises
+    ------
+    FileExistsError
+        When `out` holds a run already.
+    """
+    outcome.prepare(plan, out)
+    done = (_over_processes if runtime == "processes" else _in_process)(plan, out, watch, viewer)
+    done.save()
+    return done
+
+
+def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+    launcher = Launcher(plan, out, viewer, watch)
+    flight = launcher.fly()
+    path = out / "arrays.npz"
+    return outcome.judge(
+        plan,
+        history.load(path) if path.exists() else None,
+        in_flight=flight.in_flight,
+        uninstructed=flight.uninstructed,
+        failure=flight.failure,
+        wall_s=flight.wall_s,
+        processes=flight.processes,
+        out=out,
+    )
+
+
+def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+    record = plan.scenario.record
+    recorder = None
+    if record.enabled:
+        recorder = Recorder(
+            out / "run.rrd",
+            run=out.name,
+            formation=plan.world.formation,
+            timeline=plan.timeline,
+            dt=plan.world.dt,
+            every=record.every,
+            viewer=viewer,
+        )
+    swarm = Swarm(plan)
+
+    def see(moments: Moments) -> None:
+        if recorder:
+            recorder.record(moments)
+        watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+
+    started = time.perf_counter()
+    try:
+        swarm.fly(see, batch_of(record.every))
+    finally:
+        if recorder:
+            recorder.close()
+    wall_s = time.perf_counter() - started
+    swarm.history.save(out / "arrays.npz")
+    return outcome.judge(
+        plan,
+        swarm.history.arrays(),
+        in_flight=len(swarm.in_flight),
+        uninstructed=0,
+        failure=None,
+        wall_s=wall_s,
+        processes=[],
+        out=out,
+    )

@@ -1,0 +1,59 @@
+"""A Rerun viewer to watch a run in while it flies."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+_START_S = 10.0
+
+
+class NoViewer(RuntimeError):
+    """No viewer could be started: why."""
+
+
+def open_viewer() -> str:
+    """Start a viewer on loopback that outlives the run, and return the URL to stream to.
+
+    Raises
+    ------
+    NoViewer
+        When it cannot start, as on a machine without a screen.
+    """
+    beside = Path(sys.executable).with_name("rerun")
+    command = str(beside) if beside.exists() else shutil.which("rerun")
+    if command is None:
+        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
+    port = _free_port()
+    viewer = subprocess.Popen(
+        [command, "--bind", "127.0.0.1", "--port", str(port), "--expect-data-soon"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + _START_S
+    while not _listens(port):
+        if viewer.poll() is not None:
+            said = viewer.stderr.read().decode(errors="replace").strip().splitlines() if viewer.stderr else []
+            raise NoViewer(f"the Rerun viewer ended at once: {said[-1] if said else 'it did not say why'}")
+        if time.monotonic() > deadline:
+            viewer.terminate()
+            raise NoViewer(f"the Rerun viewer did not listen within {_START_S:g} s")
+    return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(0.2)
+        return probe.connect_ex(("127.0.0.1", port)) == 0
