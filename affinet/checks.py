@@ -71,7 +71,11 @@ def closed_loop(formation: Formation, L: Array, law: Any, estimator: Any, dt: fl
 def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
     """Faults that the run is too short for."""
     return [
-        Finding("timeline", "note", f"'{fault.describe()}' at {fault.start * dt:g} s lies beyond the end of the run")
+        Finding(
+            "timeline",
+            "note",
+            f"'{fault.describe()}' at {fault.start * dt:g} s lies beyond the end of the run",
+        )
         for fault in faults
         if fault.start >= ticks
     ]
@@ -114,7 +118,11 @@ def _leaders(formation: Formation) -> Finding:
         )
     if len(rows) == formation.agents:
         return Finding("leaders", "error", "every agent is a leader: nobody is left to follow")
-    return Finding("leaders", "ok", f"leaders {[*formation.leaders]} span the plane" if dimension == 2 else "leaders span")
+    return Finding(
+        "leaders",
+        "ok",
+        f"leaders {[*formation.leaders]} span the plane" if dimension == 2 else "leaders span",
+    )
 
 
 def _one_tick(law: VaryingVelocity, L_ff: Array, degree: Array) -> Finding:
@@ -140,7 +148,11 @@ def _largest_relaxation(L_ff: Array, degree: Array) -> float:
 def _step(radius: float, law: Any, dt: float, fast: float) -> Finding:
     gain = getattr(law, "alpha", 1.0)
     if radius < 1.0:
-        return Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {dt:g} s, gain {gain:g}: settles to 1/e in {_settle(radius, dt)}")
+        return Finding(
+            "step",
+            "ok",
+            f"radius {radius:.6f} < 1 at dt {dt:g} s, gain {gain:g}: settles to 1/e in {_settle(radius, dt)}",
+        )
     return Finding(
         "step",
         "error",
@@ -159,4 +171,8 @@ def _consensus(formation: Formation, epsilon: float) -> Finding:
     bound = 2.0 / (np.linalg.eigvalsh(laplacian)[-1] + np.diag(laplacian).max() + 1.0)
     if epsilon < bound:
         return Finding("consensus", "ok", f"epsilon {epsilon:g} is below the bound {bound:.4f} of (14) on this graph")
-    return Finding("consensus", "error", f"epsilon {epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges")
+    return Finding(
+        "consensus",
+        "error",
+        f"epsilon {epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges",
+    )

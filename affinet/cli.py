@@ -56,9 +56,19 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")
     for command in (run, check):
         command.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(scenario.shipped())}")
-        command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override any key, like time.dt=0.02")
+        command.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="override any key, like time.dt=0.02",
+        )
         command.add_argument("--estimator", metavar="NAME", help="agents.estimator")
-        command.add_argument("--availability", metavar="P", help="network.availability, the probability that a message gets through")
+        command.add_argument(
+            "--availability",
+            metavar="P",
+            help="network.availability, the probability that a message gets through",
+        )
         command.add_argument("--seed", metavar="N", help="seed")
         command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
         command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
@@ -150,10 +160,19 @@ def _show(outcome: Outcome, plan: Plan) -> None:
         ("flown", f"{outcome.ticks} ticks, {outcome.ticks * plan.world.dt:g} s in {outcome.wall_s:.1f} s"),
         ("speed", f"{outcome.ticks_per_s:.0f} ticks/s, {outcome.real_time_factor:.2f} x real time"),
         ("tracking error", "  ".join(f"{name} {_figure(value)} m²" for name, value in error.items())),
-        ("messages", f"{messages['offered']} offered, {messages['delivered']} delivered, {messages['in_flight']} in flight"),
-        ("dropped", ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none"),
+        (
+            "messages",
+            f"{messages['offered']} offered, {messages['delivered']} delivered, {messages['in_flight']} in flight",
+        ),
+        (
+            "dropped",
+            ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
+        ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
-        *(("fault", f"{fault['at']:g} s: {fault['fault']} held {fault['messages']} messages") for fault in outcome.faults),
+        *(
+            ("fault", f"{fault['at']:g} s: {fault['fault']} held {fault['messages']} messages")
+            for fault in outcome.faults
+        ),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
     ]

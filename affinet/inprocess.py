@@ -76,9 +76,7 @@ class Swarm:
     def _hear(self, channel: str, sent: Integers) -> Heard:
         sent_to_slot = np.where(self._links.present, sent[self._links.slots], -1)
         fresh = sent_to_slot >= 0
-        gathered = {
-            name: self._gather(channel, name, sent_to_slot, fresh) for name in self._fields[channel]
-        }
+        gathered = {name: self._gather(channel, name, sent_to_slot, fresh) for name in self._fields[channel]}
         return Heard(gathered, fresh)
 
     def _gather(self, channel: str, field: str, sent: Integers, fresh: Mask) -> Any:

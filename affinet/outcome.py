@@ -123,7 +123,13 @@ def prepare(plan: Plan, out: Path) -> None:
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:
     if arrays is None:
-        return {"offered": 0, "delivered": 0, "dropped": {}, "in_flight": in_flight, "uninstructed": uninstructed}
+        return {
+            "offered": 0,
+            "delivered": 0,
+            "dropped": {},
+            "in_flight": in_flight,
+            "uninstructed": uninstructed,
+        }
     ledger = Ledger.of(arrays["fates"], arrays["late"], arrays["dropped"])
     return {
         "offered": ledger.offered,

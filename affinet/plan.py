@@ -145,7 +145,7 @@ def _world(given: Scenario, formation: Formation) -> World:
 
 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
-    seconds = given.time.dt * np.arange(given.time.ticks + 1)
+    seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
     section = given.manoeuvre
     if section.preset == "hover":
         return maneuver.hover(seconds, dimension)

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -101,7 +102,7 @@ class Manoeuvre(Section):
         if self.keyframes and len(self.keyframes) < 2:
             raise ValueError("give at least two keyframes")
         times = [frame.time for frame in self.keyframes]
-        if any(later <= earlier for earlier, later in zip(times, times[1:], strict=False)):
+        if any(later <= earlier for earlier, later in pairwise(times)):
             raise ValueError(f"keyframe times must increase, got {times}")
         return self
 
@@ -284,7 +285,9 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
     try:
         return Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError("\n".join(_explain(path.name, text, overrides, problem) for problem in error.errors())) from error
+        raise ScenarioError(
+            "\n".join(_explain(path.name, text, overrides, problem) for problem in error.errors())
+        ) from error
 
 
 def _override(raw: dict[str, Any], override: str) -> None:
@@ -324,7 +327,9 @@ def _what_would_be_right(steps: Sequence[str | int], problem: Mapping[str, Any])
     if problem["type"] == "missing":
         return "is missing; it has no default"
     given = problem.get("input")
-    return message if problem["type"] == "value_error" or isinstance(given, dict | list) else f"{message}, got {given!r}"
+    return (
+        message if problem["type"] == "value_error" or isinstance(given, dict | list) else f"{message}, got {given!r}"
+    )
 
 
 def _known_keys(steps: Sequence[str | int]) -> list[str]:
@@ -333,7 +338,9 @@ def _known_keys(steps: Sequence[str | int]) -> list[str]:
         if isinstance(step, int):
             continue
         annotations = [str(model.model_fields[step].annotation) for model in models if step in model.model_fields]
-        models = [model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)]
+        models = [
+            model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)
+        ]
     return sorted({field for model in models for field in model.model_fields})
 
 

@@ -43,8 +43,8 @@ def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array |
     if isinstance(law, Static):
         return identity - dt * law.alpha * stress
     if isinstance(law, ConstantVelocity):
-        pull = law.alpha + law.eta
-        return np.block([[identity - dt * pull * stress, -dt * law.eta * identity], [stress, identity]])
+        at_once = law.alpha + law.eta
+        return np.block([[identity - dt * at_once * stress, -dt * law.eta * identity], [stress, identity]])
     if isinstance(law, VaryingVelocity):
         share = stress / degree[:, None]
         held = (1.0 - law.relaxation) * identity

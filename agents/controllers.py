@@ -148,9 +148,7 @@ class VaryingVelocity:
         law = (motion - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
         return LastHeard(heard), (1.0 - self.relaxation) * velocity + self.relaxation * law
 
-    def _neighbours_velocity(
-        self, brief: Brief, tick: int, velocity: Array, estimate: Estimate, heard: Array
-    ) -> Array:
+    def _neighbours_velocity(self, brief: Brief, tick: int, velocity: Array, estimate: Estimate, heard: Array) -> Array:
         if self.source == "communicated":
             return heard
         if self.source == "estimated":

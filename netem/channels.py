@@ -25,7 +25,9 @@ def check(name: str) -> str:
         When it cannot.
     """
     if not _NAME.fullmatch(name):
-        raise ValueError(f"channel {name!r}: use lower-case letters, digits and '-', starting with a letter, at most 32")
+        raise ValueError(
+            f"channel {name!r}: use lower-case letters, digits and '-', starting with a letter, at most 32"
+        )
     return name
 
 

@@ -102,7 +102,10 @@ def uniform(
     if not 0 <= seed < 2**64:
         raise ValueError(f"seed {seed} is outside [0, 2**64)")
     ticks, sources, targets, channels = np.broadcast_arrays(
-        _words("tick", tick, 32), _words("src", src, 16), _words("dst", dst, 16), _words("channel", channel, 32)
+        _words("tick", tick, 32),
+        _words("src", src, 16),
+        _words("dst", dst, 16),
+        _words("channel", channel, 32),
     )
     blocks = np.arange((lanes + 1) // 2, dtype=np.uint64)
     counter = (

@@ -47,7 +47,12 @@ class Fate(IntEnum):
         return self.name.lower()
 
 
-FATE_OF = {Verb.KILL: Fate.DEAD, Verb.DEPART: Fate.DEPARTED, Verb.CUT: Fate.CUT, Verb.PARTITION: Fate.PARTITION}
+FATE_OF = {
+    Verb.KILL: Fate.DEAD,
+    Verb.DEPART: Fate.DEPARTED,
+    Verb.CUT: Fate.CUT,
+    Verb.PARTITION: Fate.PARTITION,
+}
 REASONS = tuple(fate for fate in Fate if fate >= Fate.DEAD)
 
 

@@ -38,7 +38,8 @@ def plainly(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if is_dataclass(value):
-        return {name: getattr(value, name) for name in _names(type(value))}
+        kind: Any = type(value)
+        return {name: getattr(value, name) for name in _names(kind)}
     raise TypeError(f"{type(value).__name__} has no plain form")
 
 
@@ -50,12 +51,13 @@ def from_plain(kind: type[T], value: Any) -> T:
     PlainError
         When a field is missing, unknown or of the wrong type.
     """
-    built: T = _reader(kind)(value)
+    hint: Any = kind
+    built: T = _reader(hint)(value)
     return built
 
 
 @cache
-def _names(kind: type) -> tuple[str, ...]:
+def _names(kind: Any) -> tuple[str, ...]:
     return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else getattr(kind, "_fields", ())
 
 
@@ -176,7 +178,7 @@ def _map(hint: Any) -> Reader:
     return read
 
 
-def _record(kind: type) -> Reader:
+def _record(kind: Any) -> Reader:
     hints = get_type_hints(kind)
     names = _names(kind)
     expected = frozenset(names)

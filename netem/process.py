@@ -147,7 +147,9 @@ class Relay:
     def _seen(self, arrived: Mask) -> dict[int, tuple[list[int], list[int]]]:
         seen: dict[int, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
         rows = np.flatnonzero(arrived)
-        for row, src, dst in zip(rows.tolist(), self._links.src[rows].tolist(), self._links.dst[rows].tolist(), strict=True):
+        for row, src, dst in zip(
+            rows.tolist(), self._links.src[rows].tolist(), self._links.dst[rows].tolist(), strict=True
+        ):
             neighbours, links = seen[dst]
             neighbours.append(src)
             links.append(row)
@@ -155,10 +157,14 @@ class Relay:
 
     def _heard(self, tick: int, delivery: Delivery) -> dict[int, list[tuple[int, int, str]]]:
         # Late ones first, then those of this tick: sorted by tick, source and channel, as links and channels are.
-        links, rows = np.nonzero(delivery.sent[1:].T == tick)
+        fresh: Mask = np.equal(delivery.sent[1:].T, tick)
+        links, rows = np.nonzero(fresh)
         on_time = np.stack([np.full_like(links, tick), links, rows + 1], axis=-1)
         arriving = np.concatenate([delivery.late, on_time])
-        sources, receivers = self._links.src[arriving[:, 1]].tolist(), self._links.dst[arriving[:, 1]].tolist()
+        sources, receivers = (
+            self._links.src[arriving[:, 1]].tolist(),
+            self._links.dst[arriving[:, 1]].tolist(),
+        )
         heard: dict[int, list[tuple[int, int, str]]] = defaultdict(list)
         for (sent, _, channel), src, dst in zip(arriving.tolist(), sources, receivers, strict=True):
             heard[dst].append((sent, src, self._brief.channels[channel]))
@@ -193,7 +199,9 @@ class Relay:
                 key, data = str(sample.key_expr), sample.payload.to_bytes()
                 said = wire.unpack(wire.Broadcast, data)
                 if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
-                    raise wire.WireError(f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}")
+                    raise wire.WireError(
+                        f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}"
+                    )
                 self._from_agents.check(f"{said.src} {said.channel}", said.seq)
                 self._said[tick, said.src, said.channel] = data
                 awaited.remove((said.src, said.channel))

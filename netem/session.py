@@ -68,7 +68,11 @@ def client(login: Login) -> zenoh.Config:
 def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> zenoh.Config:
     """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do."""
     return _config(
-        {"mode": "router", "listen": {"endpoints": [login.endpoint]}, "access_control": _access(keys, agents)},
+        {
+            "mode": "router",
+            "listen": {"endpoints": [login.endpoint]},
+            "access_control": _access(keys, agents),
+        },
         login,
         dictionary_file=dictionary_file,
     )
@@ -78,10 +82,10 @@ def await_subscribers(publishers: Iterable[zenoh.Publisher]) -> None:
     """Wait until each publisher has somebody to hear it: what it sends from then on is not lost at the start."""
     for publisher in publishers:
         changes = publisher.declare_matching_listener(zenoh.handlers.FifoChannel(4))
-        if not publisher.matching_status.matching:
-            while not changes.recv().matching:
-                pass
-        changes.undeclare()
+        matching: Any = publisher.matching_status
+        while not matching.matching:
+            matching = changes.recv()
+        changes.undeclare()  # type: ignore[no-untyped-call]
 
 
 def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
@@ -122,9 +126,7 @@ def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
     }
 
 
-def _rights(
-    name: str, *, says: list[str], hears: list[str], learns: list[str]
-) -> tuple[str, list[dict[str, Any]]]:
+def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:
     def allow(what: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
         return {
             "id": f"{name}-{what}",

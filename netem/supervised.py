@@ -76,7 +76,10 @@ class Supervisor:
         try:
             yield
         except Exception as error:
-            self.tell("failed", reason=f"{error}" if isinstance(error, Stalled) else f"{type(error).__name__}: {error}")
+            self.tell(
+                "failed",
+                reason=f"{error}" if isinstance(error, Stalled) else f"{type(error).__name__}: {error}",
+            )
             raise
 
     def _watch(self) -> None:
@@ -92,7 +95,7 @@ class Supervisor:
 def patience(seconds: float, missing: Callable[[], str]) -> Iterator[None]:
     """Raise `Stalled`, saying what is `missing`, when the block takes longer than this. For the main thread."""
 
-    def expire(signum: int, frame: FrameType | None) -> NoReturn:
+    def expire(_signum: int, _frame: FrameType | None) -> NoReturn:
         raise Stalled(f"waited {seconds:g} s for {missing()}")
 
     previous = signal.signal(signal.SIGALRM, expire)
@@ -104,7 +107,7 @@ def patience(seconds: float, missing: Callable[[], str]) -> Iterator[None]:
         signal.signal(signal.SIGALRM, previous)
 
 
-def _leave(signum: int, frame: FrameType | None) -> NoReturn:
+def _leave(signum: int, _frame: FrameType | None) -> NoReturn:
     raise SystemExit(128 + signum)
 
 
@@ -112,6 +115,8 @@ def _read_exactly(size: int) -> bytes:
     read = b""
     while len(read) < size:
         if not (chunk := os.read(_STDIN, size - len(read))):
-            raise SystemExit("standard input closed before the brief was complete: this process is started by the launcher")
+            raise SystemExit(
+                "standard input closed before the brief was complete: this process is started by the launcher"
+            )
         read += chunk
     return read

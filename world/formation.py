@@ -61,7 +61,8 @@ PRESETS: dict[str, Formation] = {
     # one-tick varying-velocity control; 2, 6, 8 has the smallest radius (4, 5, 7 diverges).
     "hexa10": Formation(
         nominal=np.array(
-            [[3, 0], [2, 2], [2, -2], [1, 0], [0, 2], [0, -2], [-1, 0], [-2, 2], [-2, -2], [-3, 0]], dtype=np.float64
+            [[3, 0], [2, 2], [2, -2], [1, 0], [0, 2], [0, -2], [-1, 0], [-2, 2], [-2, -2], [-3, 0]],
+            dtype=np.float64,
         ),
         edges=_edges(
             "1-2 1-3 1-4 1-5 1-6 2-3 2-4 2-5 2-7 3-4 3-6 3-7 4-5 4-6 4-7 4-8 4-9 5-6 5-7 5-8 5-10 6-7 6-9 6-10 7-8 7-9 7-10 "

@@ -18,7 +18,6 @@ from netem.timeline import Timeline
 from world.formation import Array
 from world.world import World
 
-
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -129,7 +128,18 @@ class History:
     def extend(self, moments: Moments, next_position: Array) -> None:
         """Take in the next ticks, and where they led."""
         span = slice(self.ticks, self.ticks + len(moments.error))
-        for name in ("position", "target", "error", "velocity", "estimate", "known", "psi", "fates", "late", "dropped"):
+        for name in (
+            "position",
+            "target",
+            "error",
+            "velocity",
+            "estimate",
+            "known",
+            "psi",
+            "fates",
+            "late",
+            "dropped",
+        ):
             getattr(self, name)[span] = getattr(moments, name)
         self.position[span.stop] = next_position
         self.ticks = span.stop

@@ -55,7 +55,9 @@ def corridor(seconds: Array) -> Manoeuvre:
 def hover(seconds: Array, dimension: int) -> Manoeuvre:
     """The nominal formation at rest."""
     ticks = len(seconds)
-    return Manoeuvre(np.broadcast_to(np.eye(dimension), (ticks, dimension, dimension)).copy(), np.zeros((ticks, dimension)))
+    return Manoeuvre(
+        np.broadcast_to(np.eye(dimension), (ticks, dimension, dimension)).copy(), np.zeros((ticks, dimension))
+    )
 
 
 def keyframes(seconds: Array, times: Sequence[float], theta: Array, offset: Array) -> Manoeuvre:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ import zenoh
 
 from netem import wire
 from netem.keys import Keys
-from netem.links import Mask
 from netem.sequence import Numbering, Sequences
 from netem.session import WORLD, Login, await_subscribers, client
 from netem.supervised import Supervisor, patience
@@ -95,7 +95,7 @@ class Theatre:
             self._publish(tick, position)
             if tick % self._batch == 0:  # while the agents work on this tick
                 self._write_down(tick, position, recorder)
-            with patience(self._brief.patience_s, lambda tick=tick: self._missing(tick)):
+            with patience(self._brief.patience_s, partial(self._missing, tick)):
                 journal = self._read_journal(tick)
                 acts = self._read_acts(tick)
             moment = self._moment(position, journal, acts)
@@ -105,7 +105,10 @@ class Theatre:
         self._sense.put(wire.pack(wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [])))
 
     def _kill_and_restart(self, tick: int) -> None:
-        for event, agents in (("kill", self._timeline.killed(tick)), ("restart", self._timeline.restarted(tick))):
+        for event, agents in (
+            ("kill", self._timeline.killed(tick)),
+            ("restart", self._timeline.restarted(tick)),
+        ):
             if agents:
                 self._supervisor.tell(event, agents=agents, k=tick)
                 self._supervisor.await_order(event)
@@ -202,5 +205,3 @@ def main() -> None:
                 recorder.close()
             theatre.history.save(out / "arrays.npz")
         supervisor.tell("done", uninstructed=theatre.uninstructed)
-
-

@@ -96,7 +96,10 @@ class Recorder:
             ("swarm/agents", rr.Points3D.from_fields(radii=0.03 * reach, labels=numbers)),
             ("swarm/trail", rr.Points3D.from_fields(radii=rr.Radius.ui_points(1.0))),
             ("swarm/target", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.7), colors=0x8888AA60)),
-            ("swarm/graph/nominal", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.5), colors=0x55555580)),
+            (
+                "swarm/graph/nominal",
+                rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.5), colors=0x55555580),
+            ),
             ("swarm/graph/functional", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.8))),
             ("metrics/tracking_error", rr.SeriesLines(names="tracking error (m²)", colors=0xFFFFFFFF)),
             ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),

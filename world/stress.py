@@ -59,9 +59,7 @@ def solve(formation: Formation) -> Array:
     coordinates, least = cp.Variable(basis.shape[1]), cp.Variable()
     reduced = Q @ B @ cp.diag(basis @ coordinates) @ B.T @ Q.T
     reduced = (reduced + reduced.T) / 2
-    problem = cp.Problem(
-        cp.Maximize(least), [reduced >> least * np.eye(len(Q)), cp.norm(coordinates, 2) <= 1.0]
-    )
+    problem = cp.Problem(cp.Maximize(least), [reduced >> least * np.eye(len(Q)), cp.norm(coordinates, 2) <= 1.0])
     problem.solve(solver=cp.CLARABEL)
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE) or least.value < _RIGID:
         raise NotRigid(

@@ -87,12 +87,14 @@ class World:
     def _disturbances(self) -> Tape:
         agents = np.arange(1, self.formation.agents + 1)
         return Tape(
-            lambda ticks: self.disturbance
-            * normal(
-                self.seed,
-                Purpose.PROCESS_NOISE,
-                tick=ticks[:, None],
-                src=agents,
-                axes=self.formation.dimension,
+            lambda ticks: (
+                self.disturbance
+                * normal(
+                    self.seed,
+                    Purpose.PROCESS_NOISE,
+                    tick=ticks[:, None],
+                    src=agents,
+                    axes=self.formation.dimension,
+                )
             )
         )

@@ -89,4 +89,3 @@ class ConsensusLocalization:
 def _start(running: geometry.Fit, first: Array, given: Mask) -> geometry.Fit:
     theta = np.where(running.feasible[..., None, None], running.theta, first)
     return running._replace(theta=theta, feasible=running.feasible | given)
-

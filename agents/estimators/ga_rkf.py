@@ -1,5 +1,7 @@
-"""Geometry-aware relative Kalman filtering (paper 000, Algorithm 3): where an edge is not measured, the filter is corrected
-by what the geometry says of it, trusted the less the more the neighbours' perceived shapes disagree.
+"""Geometry-aware relative Kalman filtering (paper 000, Algorithm 3).
+
+Where an edge is not measured, its filter is corrected by what the geometry says of it, trusted the less the more the
+neighbours' perceived shapes disagree.
 """
 
 from __future__ import annotations
@@ -7,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from agents.brief import Array, Brief, Mask
-from agents.estimators.base import Channels, Estimate, Fields, Heard
+from agents.estimators.base import Channels, Estimate, Estimator, Fields, Heard
 from agents.estimators.conral import Agreement, ConsensusLocalization
 from agents.estimators.geometry import identity
 from agents.estimators.ral import Perceived, RelativeAffineLocalization
@@ -49,9 +51,7 @@ class GeometryAwareFilter(EdgeFilters):
         """All edges unknown, no shape perceived."""
         return Fusion(self.unknown(brief, batch), self._shaper.init(brief, batch))
 
-    def sense(
-        self, brief: Brief, state: Fusion, measured: Array, seen: Mask
-    ) -> tuple[Fusion, Mapping[str, Fields]]:
+    def sense(self, brief: Brief, state: Fusion, measured: Array, seen: Mask) -> tuple[Fusion, Mapping[str, Fields]]:
         """Perceive the shape; the filters wait for what the neighbours say of it."""
         shape, said = self._shaper.sense(brief, state.shape, measured, seen)
         return state._replace(shape=shape), said
@@ -68,7 +68,7 @@ class GeometryAwareFilter(EdgeFilters):
         return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)
 
     @cached_property
-    def _shaper(self) -> RelativeAffineLocalization | ConsensusLocalization:
+    def _shaper(self) -> Estimator[Any]:
         return RelativeAffineLocalization() if self.geometry == "ral" else ConsensusLocalization(self.epsilon)
 
 

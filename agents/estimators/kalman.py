@@ -37,7 +37,7 @@ def constant_acceleration(dimension: int, dt: float, sigma_w: float) -> tuple[Ar
     deflection = np.array([dt**2 / 2, dt, 1.0])
     F = np.kron(transition, identity)
     Q = sigma_w**2 * np.kron(np.outer(deflection, deflection), identity)
-    return F, Q
+    return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
 
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:

@@ -78,9 +78,7 @@ class RelativeKalmanFilter(EdgeFilters):
         """All edges unknown."""
         return self.unknown(brief, batch)
 
-    def sense(
-        self, brief: Brief, state: Tracks, measured: Array, seen: Mask
-    ) -> tuple[Tracks, Mapping[str, Fields]]:
+    def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""
         return self.advance(brief, state, measured, brief.covariance, seen), {}
 

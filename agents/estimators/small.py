@@ -13,7 +13,7 @@ from agents.brief import Array
 def determinant(matrix: Array) -> Array:
     """Determinants, shape (...), of matrices (..., D, D)."""
     if matrix.shape[-1] != 2:
-        return np.asarray(np.linalg.det(matrix))
+        return np.asarray(np.linalg.det(matrix), dtype=np.float64)
     product: Array = matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
     return product
 
@@ -21,7 +21,7 @@ def determinant(matrix: Array) -> Array:
 def inverse(matrix: Array) -> Array:
     """Inverses of regular matrices (..., D, D)."""
     if matrix.shape[-1] != 2:
-        return np.linalg.inv(matrix)
+        return np.linalg.inv(matrix).astype(np.float64, copy=False)
     adjugate = np.empty_like(matrix)
     adjugate[..., 0, 0], adjugate[..., 1, 1] = matrix[..., 1, 1], matrix[..., 0, 0]
     adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrix[..., 0, 1], -matrix[..., 1, 0]

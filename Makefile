@@ -1,0 +1,38 @@
+# Two commands on a fresh machine with Python 3.11+ and make: `make demo` and `make test`.
+
+UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: demo test test-all lint types imports bench clean
+
+demo: $(READY) ## fly the corridor over processes
+	$(BIN)/affinet run corridor
+
+test: lint types imports ## everything that must hold, in minutes
+	$(BIN)/pytest
+
+test-all: lint types imports ## and the slow proofs
+	$(BIN)/pytest -m "slow or not slow" --timeout 1800
+
+lint: $(READY)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+types: $(READY)
+	$(BIN)/mypy
+
+imports: $(READY)
+	$(BIN)/lint-imports
+
+bench: $(READY) ## the tick against the floor
+	$(BIN)/python bench/lockstep.py
+
+$(READY): pyproject.toml uv.lock
+	test -x $(BIN)/python || python3 -m venv .venv
+	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
+	$(UV) sync --locked --quiet
+	touch $@
+
+clean:
+	rm -rf .venv runs
