@@ -22,9 +22,9 @@ from affinet import scenario
 from affinet.checks import Finding
 from affinet.outcome import Outcome
 from affinet.plan import Plan, PlanError
+from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import fly
 from affinet.scenario import ScenarioError
-from affinet.viewer import NoViewer, open_viewer
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import secrets
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from affinet.plan import Plan
-from affinet.supervision import Child, Crew, RunFailed
+from affinet.supervision import Child, Crew, RunFailed, module
 from agents.controllers import needs_mission
 from agents.process import AgentBrief
 from netem.process import MediumBrief
@@ -19,7 +19,7 @@ from netem.session import HUB, WORLD, Login, agent_name
 from world.process import WorldBrief
 
 # The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
-_MEDIUM_PATIENCE_S, _WORLD_PATIENCE_S, _LAUNCHER_PATIENCE_S = 3.0, 3.5, 4.0
+_MEDIUM_PATIENCE_S, _WORLD_PATIENCE_S, _LAUNCHER_PATIENCE_S = 3.0, 3.3, 3.6
 _START_S = 30.0
 
 
@@ -50,12 +50,33 @@ class Flight:
 class Launcher:
     """Flies one plan over processes."""
 
-    def __init__(self, plan: Plan, out: Path, viewer: str | None, watch: Callable[[int, float], None]) -> None:
-        """`watch` is called with the tick and the tracking error now and then."""
+    def __init__(
+        self,
+        plan: Plan,
+        out: Path,
+        *,
+        watch: Callable[[int, float], None],
+        viewer: str | None = None,
+        programs: Mapping[int, Sequence[str]] | None = None,
+    ) -> None:
+        """Nothing is started yet.
+
+        Parameters
+        ----------
+        plan, out
+            What to fly, and the run directory.
+        watch
+            Called with the tick and the tracking error now and then.
+        viewer
+            URL of a Rerun viewer that is listening.
+        programs
+            Command lines that fly some agents in place of `python -m agents` (docs/protocol.md).
+        """
         self._plan = plan
         self._out = out
         self._viewer = viewer
         self._watch = watch
+        self._programs = programs or {}
         self._run = f"{out.name}-{secrets.token_hex(4)}"
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}
@@ -79,8 +100,8 @@ class Launcher:
 
     def _start(self, crew: Crew, private: Path) -> None:
         self._logins = self._make_logins(private)
-        crew.start("world", "world", self._world_brief(self._logins[WORLD]))
-        crew.start("netem", "netem", self._medium_brief(self._logins[HUB], private / "users"))
+        crew.start("world", module("world"), self._world_brief(self._logins[WORLD]))
+        crew.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(crew, number)
         self._await_ready(crew, crew.children)
@@ -127,7 +148,8 @@ class Launcher:
 
     def _start_agent(self, crew: Crew, number: int) -> Child:
         login = self._logins[agent_name(number)]
-        self._agents[number] = crew.start("agent", "agents", self._agent_brief(number, login), number)
+        program = self._programs.get(number) or module("agents")
+        self._agents[number] = crew.start("agent", program, self._agent_brief(number, login), number)
         return self._agents[number]
 
     def _await_ready(self, crew: Crew, children: Iterable[Child]) -> None:

@@ -12,6 +12,7 @@ from affinet.inprocess import Swarm
 from affinet.launcher import Launcher
 from affinet.outcome import Outcome
 from affinet.plan import Plan
+from affinet.rerun_command import mend
 from world import history
 from world.history import Moments
 from world.process import batch_of
@@ -49,9 +50,10 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
 
 
 def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
-    launcher = Launcher(plan, out, viewer, watch)
-    flight = launcher.fly()
-    path = out / "arrays.npz"
+    flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
+    path, recording = out / "arrays.npz", out / "run.rrd"
+    if flight.failure and not path.exists() and recording.exists():
+        mend(recording)  # the world was killed, or never got far: it could not close its recording
     return outcome.judge(
         plan,
         history.load(path) if path.exists() else None,

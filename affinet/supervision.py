@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +26,7 @@ from netem.session import ENVIRONMENT
 from netem.supervised import brief_bytes
 
 _LAST_LINES = 12
-_GRACE_S = 2.5
+_GRACE_S = 1.2
 
 
 class RunFailed(RuntimeError):
@@ -103,6 +103,11 @@ class Child:
         return self.process.stdin
 
 
+def module(package: str) -> list[str]:
+    """The command line of `python -m package`."""
+    return [sys.executable, "-P", "-m", package]
+
+
 class Crew:
     """All children of a run; leaving the block leaves none behind."""
 
@@ -118,13 +123,13 @@ class Crew:
         self._end_all()
         self._selector.close()
 
-    def start(self, role: str, package: str, brief: Any, number: int | None = None) -> Child:
-        """Start `python -m package` with this brief."""
+    def start(self, role: str, program: Sequence[str], brief: Any, number: int | None = None) -> Child:
+        """Start a program, and give it its brief."""
         log = self._logs / (f"{role}.log" if number is None else f"{role}-{number}.log")
         path = os.pathsep.join(entry for entry in sys.path if entry)
         with log.open("ab") as standard_error:
             process = subprocess.Popen(
-                [sys.executable, "-P", "-m", package],
+                program,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=standard_error,

@@ -1,4 +1,4 @@
-"""A Rerun viewer to watch a run in while it flies."""
+"""What the `rerun` command does for us: a viewer to watch a run in, and the mending of a recording cut short."""
 
 from __future__ import annotations
 
@@ -13,7 +13,25 @@ _START_S = 10.0
 
 
 class NoViewer(RuntimeError):
-    """No viewer could be started: why."""
+    """The command is not there, or no viewer could be started: why."""
+
+
+def mend(recording: Path) -> None:
+    """Give a recording whose writer was killed the ending it lacks, so that every tool reads it.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        When it cannot be mended.
+    """
+    mended = recording.with_suffix(".mended.rrd")
+    subprocess.run(
+        [_command(), "rrd", "merge", "-o", str(mended), str(recording)],
+        check=True,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+    )
+    mended.replace(recording)
 
 
 def open_viewer() -> str:
@@ -24,13 +42,9 @@ def open_viewer() -> str:
     NoViewer
         When it cannot start, as on a machine without a screen.
     """
-    beside = Path(sys.executable).with_name("rerun")
-    command = str(beside) if beside.exists() else shutil.which("rerun")
-    if command is None:
-        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
     port = _free_port()
     viewer = subprocess.Popen(
-        [command, "--bind", "127.0.0.1", "--port", str(port), "--expect-data-soon"],
+        [_command(), "--bind", "127.0.0.1", "--port", str(port), "--expect-data-soon"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -45,6 +59,14 @@ def open_viewer() -> str:
             viewer.terminate()
             raise NoViewer(f"the Rerun viewer did not listen within {_START_S:g} s")
     return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def _command() -> str:
+    beside = Path(sys.executable).with_name("rerun")
+    command = str(beside) if beside.exists() else shutil.which("rerun")
+    if command is None:
+        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
+    return command
 
 
 def _free_port() -> int:
