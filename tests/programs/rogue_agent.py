@@ -1,0 +1,47 @@
+"""An agent that flies as it should, and on the side listens to everything and speaks in everybody's name."""
+
+import json
+import sys
+
+import zenoh
+
+from agents.process import AgentBrief, Node
+from netem.keys import Keys
+from netem.session import client
+from netem.supervised import Supervisor
+
+PEERS = range(1, 8)
+
+
+def main() -> None:
+    supervisor = Supervisor()
+    brief = supervisor.brief(AgentBrief)
+    keys = Keys(brief.run)
+    with zenoh.open(client(brief.login)) as session, zenoh.open(client(brief.login)) as side:
+        node = Node(session, brief)
+        overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
+        inboxes = [side.declare_subscriber(keys.inbox(peer), zenoh.handlers.FifoChannel(10_000)) for peer in PEERS]
+        node.await_everybody()
+        supervisor.tell("ready")
+        lies = 0
+        for peer in PEERS:
+            if peer == brief.agent:
+                continue
+            for key in (keys.broadcast(peer, "theta"), keys.broadcast(peer, "input"), keys.act(peer), keys.inbox(peer)):
+                for _ in range(20):
+                    side.put(key, b"a lie", allowed_destination=zenoh.Locality.REMOTE)
+                    lies += 1
+        for key in (keys.sense, keys.journal, keys.broadcast("*", "*"), keys.act("*")):
+            side.put(key, b"a lie", allowed_destination=zenoh.Locality.REMOTE)
+            side.delete(key, allowed_destination=zenoh.Locality.REMOTE)
+        node.run()
+        heard = set()
+        for subscriber in (overheard, *inboxes):
+            while (sample := subscriber.try_recv()) is not None:
+                heard.add(str(sample.key_expr).removeprefix(f"affinet/{brief.run}/"))
+        with open(sys.argv[1], "w") as file:
+            json.dump({"heard": sorted(heard), "lies": lies}, file)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""No death of any process leaves an orphan, a hang or an unreadable recording."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from rerun.chunk import RrdReader
+
+PATIENCE = 30.0
+
+
+class Running:
+    """A long run in a process of its own, flying when the block begins; nothing of it is left when it ends."""
+
+    def __init__(self, out):
+        self.out = out
+
+    def __enter__(self):
+        self.launcher = subprocess.Popen(
+            [
+                sys.executable,
+                "-m",
+                "affinet.cli",
+                "run",
+                "corridor",
+                "--duration",
+                "60",
+                "--json",
+                "--out",
+                str(self.out),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        await_true(lambda: self.recorded() > 150_000, "the run never got going")
+        self.children = psutil.Process(self.launcher.pid).children()
+        return self
+
+    def __exit__(self, *_):
+        for process in [self.launcher, *self.children]:
+            if process.is_running() if isinstance(process, psutil.Process) else process.poll() is None:
+                process.kill()
+        self.launcher.communicate()
+
+    def recorded(self):
+        path = self.out / "run.rrd"
+        return path.stat().st_size if path.exists() else 0
+
+    def child(self, package):
+        return next(c for c in self.children if c.cmdline()[-2:] == ["-m", package])
+
+    def ends(self):
+        began = time.monotonic()
+        said, complained = self.launcher.communicate(timeout=PATIENCE)
+        _, alive = psutil.wait_procs(self.children, timeout=PATIENCE)
+        assert not alive
+        return time.monotonic() - began, said, complained
+
+
+def await_true(condition, otherwise):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, otherwise
+        os.sched_yield()
+
+
+def moments(recording):
+    chunks = RrdReader(str(recording)).stream().to_chunks()
+    return sum(chunk.num_rows for chunk in chunks if str(chunk.entity_path) == "/metrics/tracking_error")
+
+
+@pytest.mark.parametrize("package", ["agents", "netem", "world"])
+def test_a_death_ends_the_run_with_its_reason(package, out):
+    with Running(out) as run:
+        victim = run.child(package)
+        victim.kill()
+        took, said, _ = run.ends()
+    summary = json.loads(said.splitlines()[-1])
+    assert took < 5
+    assert run.launcher.returncode == 1
+    assert summary["verdict"] == "fail"
+    assert f"(pid {victim.pid}) was killed by SIGKILL" in summary["reasons"][0]
+    assert moments(out / "run.rrd") > 10
+
+
+def test_a_frozen_agent_ends_the_run_and_is_named(out):
+    with Running(out) as run:
+        frozen = run.child("agents")
+        frozen.suspend()
+        took, said, _ = run.ends()
+    reason = json.loads(said.splitlines()[-1])["reasons"][0]
+    assert took < 6  # 3 to 3.3 s of patience, 1.2 s of grace for a process that cannot even be asked to leave
+    assert "waited" in reason
+    assert "agent" in reason
+
+
+def test_a_killed_launcher_leaves_no_orphan_and_a_readable_recording(out):
+    with Running(out) as run:
+        run.launcher.kill()
+        took, _, _ = run.ends()
+    assert took < 5
+    assert moments(out / "run.rrd") > 10
+
+
+def test_ctrl_c_leaves_in_order(out):
+    with Running(out) as run:
+        run.launcher.send_signal(signal.SIGINT)
+        took, _, complained = run.ends()
+    assert run.launcher.returncode == 130
+    assert took < 5
+    assert "interrupted" in complained
+    assert moments(out / "run.rrd") > 10

@@ -1,0 +1,71 @@
+"""An agent hears a peer only through the medium, speaks only as itself, and needs nothing of ours to do so."""
+
+import json
+import sys
+from pathlib import Path
+
+import zenoh
+from flying import digest_of, plan_of
+
+from affinet.launcher import Launcher
+from world import history
+
+PROGRAMS = Path(__file__).parent / "programs"
+
+
+def fly(plan, out, **programs):
+    out.mkdir()
+    commands = {int(agent.removeprefix("agent_")): command for agent, command in programs.items()}
+    flight = Launcher(plan, out, watch=lambda *_: None, programs=commands).fly()
+    assert flight.failure is None, flight.failure
+    assert flight.uninstructed == 0
+    return history.load(out / "arrays.npz")
+
+
+def test_a_rogue_gets_nothing_through(out, tmp_path):
+    cut_off = (
+        "time.duration=2",
+        'timeline=[{verb="cut",at=0.0,links=["5-1","5-3","5-4","5-7"]}]',
+    )
+    report = tmp_path / "report.json"
+    rogue = [sys.executable, str(PROGRAMS / "rogue_agent.py"), str(report)]
+    arrays = fly(plan_of("corridor", *cut_off), out, agent_5=rogue)
+    told = json.loads(report.read_text())
+    assert told["lies"] == 6 * 4 * 20
+    assert told["heard"] == ["agent/5/rx"]
+    assert history.digest(arrays) == digest_of("corridor", *cut_off)
+
+
+def test_a_wrong_password_is_refused(out):
+    from netem.session import Login, client
+
+    plan = plan_of("corridor", "time.duration=2")
+    refused = []
+
+    class Intruding(Launcher):
+        def _make_logins(self, private):
+            logins = super()._make_logins(private)
+            self.endpoint = logins["netem"].endpoint
+            return logins
+
+    def intrude(_tick, _error):
+        if not refused:
+            try:
+                zenoh.open(client(Login(launcher.endpoint, "agent-1", "guess"))).close()
+                refused.append(False)
+            except zenoh.ZError:
+                refused.append(True)
+
+    out.mkdir()
+    launcher = Intruding(plan, out, watch=intrude)
+    launcher.fly()
+    assert refused == [True]
+
+
+def test_a_foreign_agent_flies_with_zenoh_and_messagepack_alone(out):
+    plan = plan_of("corridor", "time.duration=2", 'agents.estimator="none"')
+    foreign = [sys.executable, str(PROGRAMS / "foreign_agent.py")]
+    arrays = fly(plan, out, agent_6=foreign)
+    assert (arrays["velocity"][:, 5] == 0.0).all()
+    assert (arrays["position"][0, 5] == arrays["position"][-1, 5]).all()
+    assert (arrays["velocity"][1:, 4] != 0.0).all()

@@ -1,0 +1,85 @@
+"""What a recording holds."""
+
+import numpy as np
+import pytest
+from flying import plan_of
+from rerun.chunk import RrdReader
+
+from affinet.run import fly
+from netem.medium import Fate
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    out = tmp_path_factory.mktemp("recording") / "run"
+    faults = (
+        'timeline=[{verb="cut",at=0.5,until=1.0,links=["4-6"]},{verb="kill",at=1.2,agents=[7]},'
+        '{verb="restart",at=1.6,agents=[7]},{verb="partition",at=1.7,until=1.9,groups=[[1,2,3],[4,5,6,7]]}]'
+    )
+    fly(plan_of("corridor", "time.duration=2", faults), "inprocess", out, lambda *_: None)
+    return out
+
+
+@pytest.fixture(scope="module")
+def chunks(flown):
+    return RrdReader(str(flown / "run.rrd")).stream().to_chunks()
+
+
+def column(chunks, path, name):
+    found = [chunk.to_record_batch() for chunk in chunks if str(chunk.entity_path) == path and not chunk.is_static]
+    return [value for batch in found if name in batch.schema.names for value in batch.column(name).to_pylist()]
+
+
+def test_it_holds_the_swarm_the_graphs_the_target_and_the_metrics(chunks):
+    assert {
+        "/swarm/agents",
+        "/swarm/trail",
+        "/swarm/target",
+        "/swarm/graph/nominal",
+        "/swarm/graph/functional",
+        "/metrics/tracking_error",
+        "/metrics/psi",
+        "/metrics/messages",
+        "/events",
+    } <= {str(chunk.entity_path) for chunk in chunks}
+
+
+def test_it_is_on_simulated_time(chunks):
+    seconds = [value.total_seconds() for value in column(chunks, "/metrics/tracking_error", "sim_time")]
+    assert seconds == pytest.approx(np.arange(0.0, 2.0, 0.05).tolist())
+
+
+def test_the_tracking_error_is_that_of_the_run(chunks, flown):
+    recorded = [value[0] for value in column(chunks, "/metrics/tracking_error", "Scalars:scalars")]
+    assert recorded == np.load(flown / "arrays.npz")["error"][::5].tolist()
+
+
+def test_messages_are_counted_over_all_ticks(chunks, flown):
+    per_tick = np.array(column(chunks, "/metrics/messages", "Scalars:scalars"))
+    fates = np.load(flown / "arrays.npz")["fates"]
+    assert per_tick[:, 0].sum() * 5 == pytest.approx((fates == Fate.DELIVERED).sum())
+    assert per_tick.sum() * 5 == pytest.approx((fates != Fate.SILENT).sum())
+
+
+def test_faults_are_told_as_text(chunks):
+    told = [value[0] for value in column(chunks, "/events", "TextLog:text")]
+    assert told == [
+        "cut 4->6, 6->4",
+        "heal: cut 4->6, 6->4",
+        "kill 7",
+        "restart 7",
+        "partition 1,2,3 | 4,5,6,7",
+        "heal: partition 1,2,3 | 4,5,6,7",
+    ]
+
+
+def test_colours_tell_leaders_from_followers_from_the_dead(chunks):
+    colours = column(chunks, "/swarm/agents", "Points3D:colors")
+    alive, dead = colours[0], colours[28]  # at 1.4 s agent 7 is dead
+    assert alive[0] == alive[1] == alive[2] != alive[3]
+    assert alive[3] == alive[6] != dead[6]
+
+
+def test_colours_tell_what_became_of_an_edge(chunks):
+    colours = column(chunks, "/swarm/graph/functional", "LineStrips3D:colors")
+    assert len({colour for moment in colours for colour in moment}) >= 5  # delivered, lost, cut, dead, partition

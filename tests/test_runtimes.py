@@ -1,0 +1,145 @@
+"""One implementation, two runtimes, the same bits."""
+
+import json
+
+import numpy as np
+import pytest
+from flying import digest_of, plan_of
+
+from affinet import scenario
+from affinet.run import fly
+from world import history
+
+# A coarse tick flies each scenario to its end, through every fault, in seconds.
+COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
+
+
+def processes(out, name, *overrides):
+    return fly(plan_of(name, *overrides), "processes", out, lambda *_: None)
+
+
+@pytest.mark.parametrize("name", scenario.shipped())
+def test_processes_give_the_bits_of_one_process(name, out):
+    outcome = processes(out, name, *COARSE)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of(name, *COARSE)
+
+
+def test_two_runs_over_processes_agree_and_two_seeds_do_not(tmp_path):
+    short = ("time.duration=3", "time.dt=0.05")
+    first, second = (processes(tmp_path / run, "partition", *short).digest for run in "ab")
+    other = processes(tmp_path / "c", "partition", *short, "seed=2").digest
+    assert first == second != other
+
+
+@pytest.mark.parametrize(
+    "air",
+    [
+        ("network.delay_ticks=2",),
+        ('time.exchange="next-tick"', "agents.parameters.varying-velocity.relaxation=0.3"),
+        (
+            "network.coupled=false",
+            "network.delay_ticks=1",
+            'network.links=[{link="2->4",availability=0.1,delay_ticks=5}]',
+        ),
+        ('agents.estimator="none"', 'agents.law="static"'),
+        ('agents.parameters.varying-velocity.source="feed-forward"', "dynamics.disturbance=0.001"),
+        ('agents.parameters.varying-velocity.source="estimated"', 'agents.parameters.ga-rkf.geometry="ral"'),
+        ('timeline=[{verb="kill",at=0.5,agents=[4,6]},{verb="restart",at=1.0,agents=[4]}]', "network.delay_ticks=3"),
+    ],
+    ids=["delay", "next-tick", "uncoupled", "bare", "feed-forward", "estimated", "kill-under-delay"],
+)
+def test_every_kind_of_air_and_agent_agrees(air, out):
+    overrides = ("time.duration=2", *air)
+    outcome = processes(out, "corridor", *overrides)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("corridor", *overrides)
+
+
+OCTAHEDRON = """
+[formation]
+nodes = [[1,0,0], [-1,0,0], [0,1,0], [0,-1,0], [0,0,1], [0,0,-1], [0.3,0.2,0.1]]
+edges = ["1-2","1-3","1-4","1-5","1-6","1-7","2-3","2-4","2-5","2-6","2-7","3-4","3-5","3-6","3-7","4-5","4-6","4-7","5-6","5-7","6-7"]
+leaders = [1, 3, 5, 7]
+[manoeuvre]
+keyframes = [
+  { time = 0.0, theta = [[1,0,0],[0,1,0],[0,0,1]], offset = [0,0,0] },
+  { time = 2.0, theta = [[1,0,0],[0,0.8,0.2],[0,0,1.2]], offset = [1,0,2] },
+]
+[time]
+dt = 0.02
+duration = 2.0
+[sensing]
+sigma = 0.05
+[agents]
+estimator = "ga-rkf"
+law = "constant-velocity"
+[network]
+availability = 0.8
+"""  # noqa: E501
+
+
+def test_three_dimensions_agree_too(tmp_path, out):
+    (tmp_path / "octahedron.toml").write_text(OCTAHEDRON)
+    name = str(tmp_path / "octahedron.toml")
+    outcome = processes(out, name)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of(name)
+
+
+def test_a_run_leaves_its_scenario_arrays_recording_and_summary(out):
+    outcome = processes(out, "corridor", "time.duration=1")
+    names = {"scenario.json", "arrays.npz", "run.rrd", "summary.json", "logs"}
+    assert {path.name for path in out.iterdir()} == names
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["digest"] == outcome.digest == history.digest(history.load(out / "arrays.npz"))
+    roles = [(process["role"], process["id"]) for process in summary["processes"]]
+    assert roles == [("world", None), ("netem", None), *(("agent", number) for number in range(1, 8))]
+    assert all(process["exit"] == 0 for process in summary["processes"])
+
+
+def test_an_agent_stays_below_60_mb(out):
+    outcome = processes(out, "hexa", "time.duration=2")
+    assert max(p["rss_mb"] for p in outcome.processes if p["role"] == "agent") < 60
+
+
+def test_every_message_is_accounted_for(out):
+    outcome = processes(out, "corridor", "time.duration=2", "network.delay_ticks=3", "network.availability=0.6")
+    messages = outcome.messages
+    assert messages["uninstructed"] == 0
+    assert messages["in_flight"] > 0
+    assert messages["offered"] == 200 * 24 * 4
+    assert messages["offered"] == messages["delivered"] + sum(messages["dropped"].values()) + messages["in_flight"]
+
+
+def test_a_fault_that_never_bit_makes_the_run_vacuous(out):
+    kill_then_cut = (
+        'timeline=[{verb="kill",at=0.2,agents=[4]},{verb="cut",at=0.5,until=0.8,links=["4-6"]}]',
+        "time.duration=1",
+    )
+    outcome = fly(plan_of("corridor", *kill_then_cut), "inprocess", out, lambda *_: None)
+    assert outcome.verdict == "vacuous"
+    assert "cut" in outcome.reasons[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("name", scenario.shipped())
+def test_shipped_scenarios_agree_in_full(name, seed, out):
+    overrides = (f"seed={seed}",)
+    outcome = processes(out, name, *overrides)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of(name, *overrides)
+
+
+def test_estimation_pays_off_when_half_of_the_messages_are_lost():
+    def mean_error(estimator, seed):
+        from affinet.inprocess import Swarm
+
+        lossy = (f'agents.estimator="{estimator}"', "network.availability=0.5", f"seed={seed}")
+        swarm = Swarm(plan_of("corridor", *lossy))
+        swarm.fly(lambda _: None, batch=50)
+        return swarm.history.error.mean()
+
+    bare, aware = (np.mean([mean_error(name, seed) for seed in range(1, 6)]) for name in ("none", "ga-rkf"))
+    assert bare > 5 * aware

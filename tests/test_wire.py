@@ -1,0 +1,342 @@
+"""The wire: every message survives the trip, and what is no such message is refused by name and field."""
+
+from dataclasses import asdict, replace
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.brief import Brief
+from analysis.affine import Manoeuvre
+from netem import wire
+from netem.links import Links
+from netem.plain import PlainError, from_plain, plainly
+from netem.process import MediumBrief
+from netem.profile import Profile
+from netem.session import Login
+from netem.timeline import Fault, Verb
+from netem.wire import Phase, WireError
+
+
+def name(message):
+    return type(message).__name__
+
+
+MESSAGES = [
+    wire.Sense(k=7, src="world", seq=7, last=False, measured=[[0.5, -1.0]], position=[[1.0, 2.0], [0.5, 3.0]]),
+    wire.SenseInbox(k=7, src="netem", seq=14, phase=Phase.SENSE, neighbours=[2], measured=[[0.5, 1.0]], position=None),
+    wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
+    wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
+    wire.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
+    wire.Act(k=7, src=3, seq=7, velocity=[1.0, 2.0], estimate=[[1.0, 0.0]], known=[True], psi=0.25, heard=12),
+    wire.Journal(k=7, src="netem", seq=7, fates=[[0, 1], [2, 7]], handed=[1, 0], late=1, dropped=[3]),
+]
+FIELDS = [
+    pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in message._fields
+]
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=name)
+def test_a_message_survives_the_trip(message):
+    assert wire.unpack(type(message), wire.pack(message)) == message
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=name)
+def test_a_message_is_a_plain_map_for_any_messagepack_codec(message):
+    plain = msgpack.unpackb(wire.pack(message))
+    assert plain == message._asdict()
+    assert {"k", "src", "seq"} <= plain.keys()
+
+
+@pytest.mark.parametrize("message", [m for m in MESSAGES if hasattr(m, "phase")], ids=name)
+def test_an_inbox_is_known_by_its_phase(message):
+    assert wire.unpack_inbox(wire.pack(message)) == message
+
+
+def test_arrays_travel_as_nested_lists():
+    sense = MESSAGES[0]._replace(measured=np.array([[0.1, 0.2]]), position=np.zeros((2, 2)))
+    arrived = wire.unpack(wire.Sense, wire.pack(sense))
+    assert arrived.measured == [[0.1, 0.2]]
+    assert arrived.position == [[0.0, 0.0], [0.0, 0.0]]
+
+
+def test_numpy_scalars_travel_as_numbers():
+    act = MESSAGES[5]._replace(k=np.int64(7), psi=np.float64(0.25), heard=np.int32(12), known=np.array([True]))
+    assert wire.unpack(wire.Act, wire.pack(act)) == MESSAGES[5]
+
+
+def test_an_undefined_indicator_travels_as_nan():
+    assert np.isnan(wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(psi=np.nan))).psi)
+
+
+def test_numbers_arrive_bit_for_bit():
+    numbers = [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf]
+    arrived = wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(velocity=np.array(numbers)))).velocity
+    assert np.array(arrived).tobytes() == np.array(numbers).tobytes()
+
+
+def test_a_whole_number_will_do_for_a_number():
+    arrived = wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {"psi": 1}))
+    assert type(arrived.psi) is float
+
+
+# ---- what is no such message
+
+
+@pytest.mark.parametrize(("message", "field"), FIELDS)
+def test_a_missing_field_is_named(message, field):
+    plain = {name: value for name, value in message._asdict().items() if name != field}
+    with pytest.raises(
+        WireError, match=rf"^{type(message).__name__} has .*unknown \[\], missing \['{field}'\]"
+    ) as error:
+        wire.unpack(type(message), msgpack.packb(plain))
+    assert "docs/protocol.md" in str(error.value)
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=name)
+def test_an_unknown_field_is_named(message):
+    data = msgpack.packb(message._asdict() | {"colour": "red"})
+    with pytest.raises(WireError, match=rf"^{type(message).__name__} has .*unknown \['colour'\], missing \[\]"):
+        wire.unpack(type(message), data)
+
+
+@pytest.mark.parametrize(("message", "field"), FIELDS)
+def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
+    wrong = "lunch" if field == "payload" else {"lunch": 1}
+    data = msgpack.packb(message._asdict() | {field: wrong})
+    with pytest.raises(WireError, match=rf"^{type(message).__name__}: {field}: expected .*lunch"):
+        wire.unpack(type(message), data)
+
+
+@pytest.mark.parametrize(
+    ("field", "wrong", "match"),
+    [
+        ("k", 7.0, "Act: k: expected an integer, got 7.0"),
+        ("k", "7", "Act: k: expected an integer, got '7'"),
+        ("k", True, "Act: k: expected an integer, got True"),
+        ("psi", None, "Act: psi: expected a number, got None"),
+        ("psi", True, "Act: psi: expected a number, got True"),
+        ("velocity", 1.0, "Act: velocity: expected a list, got 1.0"),
+    ],
+)
+def test_no_type_is_taken_for_another(field, wrong, match):
+    with pytest.raises(WireError, match=match):
+        wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {field: wrong}))
+
+
+def test_an_overlong_value_is_shortened_in_the_message():
+    with pytest.raises(WireError, match="Act: k") as error:
+        wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {"k": "x" * 10_000}))
+    assert len(str(error.value)) < 200
+
+
+@pytest.mark.parametrize("plain", [None, 3, "sense", [1, 2], []])
+def test_what_is_no_map_is_refused(plain):
+    with pytest.raises(WireError, match=r"Act: expected a map \(Act\)"):
+        wire.unpack(wire.Act, msgpack.packb(plain))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xc1",
+        b"\x91" * 5000,
+        b"\x81\x01\x02",
+        b"\xa1\xff",
+        wire.pack(MESSAGES[5])[:-1],
+        wire.pack(MESSAGES[5]) * 2,
+    ],
+    ids=["empty", "reserved byte", "too deep", "number as key", "not UTF-8", "cut short", "two at once"],
+)
+@pytest.mark.parametrize("read", [lambda data: wire.unpack(wire.Act, data), wire.unpack_inbox], ids=["unpack", "inbox"])
+def test_malformed_bytes_are_refused(read, data):
+    with pytest.raises(WireError, match="not MessagePack"):
+        read(data)
+
+
+@pytest.mark.parametrize("phase", [None, "lunch", 3, True, [], {}, ["sense"]], ids=repr)
+def test_an_inbox_of_no_phase_is_refused_with_the_phases_there_are(phase):
+    with pytest.raises(WireError, match="phase among .*sense.*exchange.*end"):
+        wire.unpack_inbox(msgpack.packb({"k": 1, "src": "netem", "seq": 0, "phase": phase}))
+
+
+def test_an_inbox_with_the_fields_of_another_phase_is_refused():
+    with pytest.raises(WireError, match=r"^ExchangeInbox has .*missing \['messages'\]"):
+        wire.unpack_inbox(msgpack.packb(MESSAGES[1]._asdict() | {"phase": "exchange"}))
+
+
+PLAIN = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.floats()
+    | st.text(max_size=5)
+    | st.binary(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=4),
+    max_leaves=8,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.binary(max_size=60) | PLAIN.map(msgpack.packb))
+def test_whatever_comes_is_read_or_refused_as_a_wire_error(data):
+    for kind in map(type, MESSAGES):
+        with pytest.raises(WireError):
+            wire.unpack(kind, data)
+
+
+@settings(max_examples=200, deadline=None)
+@given(message=st.sampled_from(MESSAGES), data=st.data())
+def test_one_wrong_field_is_read_or_refused_by_name(message, data):
+    field = data.draw(st.sampled_from(message._fields))
+    plain = message._asdict() | {field: data.draw(PLAIN)}
+    try:
+        arrived = wire.unpack(type(message), msgpack.packb(plain))
+    except WireError as error:
+        assert str(error).startswith(f"{type(message).__name__}: {field}")
+    else:
+        np.testing.assert_equal(arrived._asdict(), plain)
+
+
+# ---- relaying
+
+
+def test_an_exchange_inbox_holds_the_maps_that_were_broadcast():
+    said = [wire.Broadcast(7, src, "theta", 7, {"local": np.eye(2) * src, "feasible": True}) for src in (1, 2)]
+    inbox = wire.unpack_inbox(wire.pack_exchange(7, 15, [wire.pack(broadcast) for broadcast in said]))
+    assert inbox == wire.ExchangeInbox(
+        k=7,
+        src="netem",
+        seq=15,
+        phase=Phase.EXCHANGE,
+        messages=[
+            {"k": 7, "src": 1, "channel": "theta", "seq": 7, "payload": {"local": [[1, 0], [0, 1]], "feasible": True}},
+            {"k": 7, "src": 2, "channel": "theta", "seq": 7, "payload": {"local": [[2, 0], [0, 2]], "feasible": True}},
+        ],
+    )
+
+
+@pytest.mark.parametrize("number", [0, 1, 15, 16, 70_000])
+def test_an_exchange_inbox_relays_any_number_of_broadcasts_byte_for_byte(number):
+    said = msgpack.packb({"payload": {"x": 1.5}, "seq": 0, "k": 7, "src": 1, "channel": "x"}, use_single_float=True)
+    data = wire.pack_exchange(7, 0, [said] * number)
+    assert data.endswith(said * number)
+    assert wire.unpack_inbox(data).messages == [msgpack.unpackb(said)] * number
+
+
+def test_an_exchange_inbox_equals_one_packed_at_once():
+    said = wire.pack(MESSAGES[2])
+    at_once = wire.ExchangeInbox(7, "netem", 15, Phase.EXCHANGE, [MESSAGES[2]._asdict()])
+    assert wire.pack_exchange(7, 15, [said]) == wire.pack(at_once)
+
+
+# ---- briefs
+
+BRIEF = Brief(
+    dt=0.01,
+    nominal=np.array([1.0, 0.0]),
+    relative=np.array([[1.0, -1.0], [0.5, 0.0], [0.0, 0.0]]),
+    present=np.array([True, True, False]),
+    stress=np.array([0.3, -0.1, 0.0]),
+    covariance=0.01 * np.eye(2),
+    leader=np.array(False),
+    mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),
+)
+LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
+MEDIUM = MediumBrief(
+    run="r1",
+    login=Login("tcp/127.0.0.1:7447", "netem", "secret"),
+    dictionary_file="/tmp/users",
+    seed=2**64 - 1,
+    links=LINKS,
+    channels=("sense", "theta"),
+    profile=Profile(np.full(4, 0.7), np.array([0, 1, 2, 3]), coupled=True, least_delay=1),
+    faults=(
+        Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1))),
+        Fault(Verb.PARTITION, 3, None, groups=((1,), (2, 3))),
+        Fault(Verb.KILL, 9, None, agents=(3,)),
+    ),
+    leaders=np.array([True, False, False]),
+    patience_s=10.0,
+)
+
+
+def plain_of(brief):
+    return msgpack.unpackb(msgpack.packb(brief, default=plainly))
+
+
+@pytest.mark.parametrize(
+    "brief",
+    [BRIEF, replace(BRIEF, mission=None), MEDIUM, MEDIUM.faults[2]],
+    ids=["agent", "no mission", "medium", "fault"],
+)
+def test_a_brief_survives_the_trip(brief):
+    arrived = from_plain(type(brief), plain_of(brief))
+    assert type(arrived) is type(brief)
+    np.testing.assert_equal(asdict(arrived), asdict(brief))
+
+
+def test_arrays_of_a_brief_keep_their_types_and_shapes():
+    arrived, medium = from_plain(Brief, plain_of(BRIEF)), from_plain(MediumBrief, plain_of(MEDIUM))
+    assert arrived.relative.dtype == np.float64
+    assert arrived.present.dtype == np.bool_
+    assert arrived.leader.shape == ()
+    assert medium.links.src.dtype == np.int64
+    assert medium.profile.delay_ticks.dtype == np.int64
+    assert arrived.mission.theta.shape == (4, 2, 2)
+
+
+def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
+    arrived = from_plain(MediumBrief, plain_of(MEDIUM))
+    assert arrived.faults == MEDIUM.faults
+    assert arrived.faults[0].verb is Verb.CUT
+    assert arrived.login == MEDIUM.login
+    assert arrived.channels == ("sense", "theta")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        ({"seed": "1"}, "^seed: expected an integer, got '1'"),
+        ({"login": 3}, r"^login: expected a map \(Login\), got 3"),
+        ({"login": {"endpoint": "tcp/x", "name": "netem"}}, r"^login: Login has .*missing \['password'\]"),
+        ({"channels": ["sense", 3]}, r"^channels\[\]: expected a text, got 3"),
+        (
+            {"links": {"agents": 2, "src": [[1], [2, 3]], "dst": [1]}},
+            r"^links\.src: expected a rectangular list of int64",
+        ),
+        ({"links": {"agents": 2, "src": {}, "dst": [1]}}, r"^links\.src: expected a nested list"),
+        ({"links": {"agents": 2, "src": [1.7], "dst": [1]}}, r"^links\.src: .*int64.*1\.7"),
+        ({"links": {"agents": 2, "src": ["2"], "dst": [1]}}, r"^links\.src: .*int64.*'2'"),
+        ({"links": {"agents": 2, "src": [True], "dst": [1]}}, r"^links\.src: .*int64.*True"),
+        ({"links": {"agents": 2, "src": [2**64 - 1], "dst": [1]}}, r"^links\.src: .*int64.*18446744073709551615"),
+        ({"leaders": [1, 0, 2]}, r"^leaders: .*bool.*2"),
+        ({"leaders": ["no"]}, r"^leaders: .*bool.*'no'"),
+        (
+            {"profile": {"availability": [None], "delay_ticks": [0], "coupled": True, "least_delay": 0}},
+            "availability: .*None",
+        ),
+        (
+            {"profile": {"availability": ["1"], "delay_ticks": [0], "coupled": True, "least_delay": 0}},
+            "availability: .*'1'",
+        ),
+    ],
+)
+def test_what_does_not_fit_a_brief_is_named_by_its_path(wrong, match):
+    with pytest.raises(PlainError, match=match):
+        from_plain(MediumBrief, plain_of(MEDIUM) | wrong)
+
+
+def test_an_unknown_verb_of_a_fault_is_named_with_those_there_are():
+    plain = plain_of(MEDIUM)
+    plain["faults"][1]["verb"] = "explode"
+    with pytest.raises(PlainError, match=r"^faults\[\]\.verb: expected one of .*cut.*depart.* got 'explode'"):
+        from_plain(MediumBrief, plain)
+
+
+def test_what_has_no_plain_form_is_not_packed():
+    with pytest.raises(TypeError, match="object has no plain form"):
+        wire.pack(MESSAGES[2]._replace(payload={"thing": object()}))
