@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -57,13 +57,15 @@ def closed_loop(formation: Formation, L: Array, law: Any, estimator: Any, dt: fl
     ]
     degree = np.diag(L)[followers]
     if isinstance(law, VaryingVelocity):
-        found.append(_one_tick(law, L_ff, degree))
+        found.append(_one_tick(law, L_ff, degree, dt))
     step = stability.step_matrix(law, L_ff, degree, dt)
     if step is None:
         found.append(Finding("step", "note", f"{type(law).__name__} is not a law of Table II; its step is not checked"))
     else:
         found.append(_step(stability.radius(step), law, dt, fast))
-    if isinstance(estimator, ConsensusLocalization | GeometryAwareFilter):
+    if isinstance(estimator, ConsensusLocalization) or (
+        isinstance(estimator, GeometryAwareFilter) and estimator.geometry == "conral"
+    ):
         found.append(_consensus(formation, estimator.epsilon))
     return found
 
@@ -125,24 +127,28 @@ def _leaders(formation: Formation) -> Finding:
     )
 
 
-def _one_tick(law: VaryingVelocity, L_ff: Array, degree: Array) -> Finding:
+def _one_tick(law: VaryingVelocity, L_ff: Array, degree: Array, dt: float) -> Finding:
     name = "one-tick radius"
     if law.source == "feed-forward":
         return Finding(name, "ok", "velocities are fed forward: no loop through the network")
     radius = stability.one_tick_radius(L_ff, degree, law.relaxation)
     if radius < 1.0:
         return Finding(name, "ok", f"{radius:.3f} < 1: velocities heard one tick late settle")
+    remedy = _relaxation_that_settles(law, L_ff, degree, dt)
+    relax = f"relax the law (relaxation = {remedy:.2f} settles), " if remedy else ""
     return Finding(
         name,
         "error",
-        f"{radius:.3f} >= 1: velocities heard one tick late diverge; relax the law "
-        f"(relaxation below {_largest_relaxation(L_ff, degree):.3f}), choose other leaders, or feed velocities forward",
+        f"{radius:.3f} >= 1: velocities heard one tick late diverge; {relax}choose other leaders, or feed velocities forward",
     )
 
 
-def _largest_relaxation(L_ff: Array, degree: Array) -> float:
-    # The eigenvalues of D^-1 L_ff are real and positive, so the radius of I - eta D^-1 L_ff is below 1 for eta < 2 / max.
-    return 2.0 / stability.radius(L_ff / degree[:, None])
+def _relaxation_that_settles(law: VaryingVelocity, L_ff: Array, degree: Array, dt: float) -> float | None:
+    for relaxation in np.arange(0.95, 0.0, -0.05).tolist():
+        step = stability.step_matrix(replace(law, relaxation=relaxation), L_ff, degree, dt)
+        if step is not None and stability.radius(step) < 1.0:
+            return float(relaxation)
+    return None
 
 
 def _step(radius: float, law: Any, dt: float, fast: float) -> Finding:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -78,6 +78,14 @@ def make(given: Scenario) -> Plan:
     PlanError
         When it cannot fly.
     """
+    try:
+        return _make(given)
+    except ScenarioError as error:
+        raise given.locate(error) from error
+
+
+def _make(given: Scenario) -> Plan:
+    registry.check_names("agents.parameters", given.agents.parameters)
     formation = _formation(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
@@ -153,13 +161,12 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
         if dimension != 2:
             raise ScenarioError("manoeuvre.preset: 'corridor' is flown in two dimensions; give keyframes")
         return maneuver.corridor(seconds)
-    theta = [np.array(frame.theta, dtype=np.float64) for frame in section.keyframes]
-    offset = [np.array(frame.offset, dtype=np.float64) for frame in section.keyframes]
-    for number, (map_, shift) in enumerate(zip(theta, offset, strict=True), start=1):
-        if map_.shape != (dimension, dimension) or shift.shape != (dimension,):
-            raise ScenarioError(
-                f"manoeuvre.keyframes.{number}: theta must be {dimension} x {dimension} and offset have {dimension} numbers"
-            )
+    square = (dimension, dimension)
+    theta, offset = [], []
+    for number, frame in enumerate(section.keyframes, start=1):
+        key = f"manoeuvre.keyframes.{number}"
+        theta.append(scenario.array(f"{key}.theta", frame.theta, square))
+        offset.append(scenario.array(f"{key}.offset", frame.offset, (dimension,)))
     return maneuver.keyframes(seconds, [frame.time for frame in section.keyframes], np.array(theta), np.array(offset))
 
 
@@ -218,20 +225,24 @@ def _faults(given: Scenario, links: Links) -> tuple[Fault, ...]:
         else:
             verb = Verb.KILL if isinstance(event, scenario.Kill) else Verb.DEPART
             faults += [Fault(verb, start, until, agents=(agent,)) for agent in event.agents]
+        _exists(links, number, faults)
+    return tuple(faults)
+
+
+def _exists(links: Links, number: int, faults: Sequence[Fault]) -> None:
     try:
         Timeline(links, faults)
     except ValueError as error:
-        raise ScenarioError(f"timeline: {error}") from error
-    return tuple(faults)
+        raise ScenarioError(f"timeline.{number}: {error}") from error
 
 
 def _restart(faults: list[Fault], agents: Sequence[int], tick: int, key: str) -> None:
     for agent in agents:
-        dead = [n for n, f in enumerate(faults) if f.verb is Verb.KILL and f.agents == (agent,) and f.end is None]
-        if not dead or faults[dead[-1]].start >= tick:
+        killed = [n for n, f in enumerate(faults) if f.verb is Verb.KILL and f.agents == (agent,) and f.end is None]
+        if not any(faults[n].start < tick for n in killed):
             raise ScenarioError(f"{key}: agent {agent} is not dead then; name its kill before its restart")
-        killed = faults[dead[-1]]
-        faults[dead[-1]] = Fault(Verb.KILL, killed.start, tick, agents=killed.agents)
+        for n in killed:
+            faults[n] = replace(faults[n], end=tick)
 
 
 def _tick(seconds: float, dt: float) -> int:

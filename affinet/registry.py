@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
@@ -46,7 +47,7 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         raise ScenarioError(f"{key}: {path} is not a dataclass of its parameters")
     hints = get_type_hints(algorithm)
     known: dict[str, Any] = {field.name: (hints[field.name], field.default) for field in fields(algorithm)}
-    model = create_model("Parameters", __config__=ConfigDict(extra="forbid"), **known)
+    model = create_model("Parameters", __config__=ConfigDict(extra="forbid", strict=True), **known)
     try:
         checked = model.model_validate(parameters)
     except ValidationError as error:
@@ -55,6 +56,20 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         wrong = "unknown" if first["type"] == "extra_forbidden" else f"{first['msg']}, got {first['input']!r}"
         raise ScenarioError(f"{where}: {wrong}; {name} has {', '.join(known) or 'no parameters'}") from error
     return Choice(path, checked.model_dump())
+
+
+def check_names(key: str, given: Iterable[str]) -> None:
+    """Refuse parameters of an algorithm that does not exist.
+
+    Raises
+    ------
+    ScenarioError
+        When a name is neither an entry point nor "module:Class".
+    """
+    known = [*names(ESTIMATORS), *names(LAWS)]
+    for name in given:
+        if name not in known and ":" not in name:
+            raise ScenarioError(f"{key}.{name}: no such estimator or law; there are {', '.join(known)}")
 
 
 def _path(group: str, key: str, name: str) -> str:

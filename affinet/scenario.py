@@ -6,13 +6,14 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from world.formation import PRESETS
 
@@ -20,7 +21,8 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Ticks = Annotated[int, Field(ge=0)]
-Matrix = list[list[float]]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Matrix = list[list[Finite]]
 
 _LINK = re.compile(r"(\d+)(->|-)(\d+)")
 
@@ -48,13 +50,20 @@ def _link(link: str) -> str:
     return link
 
 
+def _edge(edge: str) -> str:
+    if "->" in edge:
+        raise ValueError(f"{edge!r}: the edges of a formation have no direction; write {edge.replace('->', '-')!r}")
+    return _link(edge)
+
+
 Link = Annotated[str, AfterValidator(_link)]
+Edge = Annotated[str, AfterValidator(_edge)]
 
 
 class Section(BaseModel):
     """A table of a scenario."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Formation(Section):
@@ -62,7 +71,7 @@ class Formation(Section):
 
     preset: str | None = None
     nodes: Matrix | None = None
-    edges: list[Link] | None = None
+    edges: list[Edge] | None = None
     leaders: list[int] | None = None
     scale: Positive = 1.0
     spread: NotNegative = 1.0
@@ -86,7 +95,7 @@ class Keyframe(Section):
 
     time: NotNegative
     theta: Matrix
-    offset: list[float]
+    offset: list[Finite]
 
 
 class Manoeuvre(Section):
@@ -187,7 +196,7 @@ class Lasting(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Lasting:
         if self.until is not None and self.until <= self.at:
-            raise ValueError(f"ends at {self.until:g} s, before it begins at {self.at:g} s")
+            raise ValueError(f"ends at {self.until:g} s, but begins at {self.at:g} s; until must be later")
         return self
 
 
@@ -231,11 +240,38 @@ class Restart(Section):
 Event = Annotated[Cut | Partition | Depart | Kill | Restart, Field(discriminator="verb")]
 
 
+VERBS: dict[str, type[Section]] = {
+    "cut": Cut,
+    "partition": Partition,
+    "depart": Depart,
+    "kill": Kill,
+    "restart": Restart,
+}
+
+
 class Record(Section):
     """The Rerun recording: one moment every so many ticks."""
 
     enabled: bool = True
     every: Annotated[int, Field(ge=1)] = 5
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scenario came from: the file, its text, and the overrides."""
+
+    file: str
+    text: str
+    overrides: tuple[str, ...]
+
+    def place(self, key: str) -> str:
+        """Where a key was given: --set, or the file with the line of the key."""
+        given = [override.partition("=")[0].strip() for override in self.overrides]
+        if any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given):
+            return "--set"
+        steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
+        line = _line_of(self.text, steps)
+        return f"{self.file}:{line}" if line else self.file
 
 
 class Scenario(Section):
@@ -252,6 +288,12 @@ class Scenario(Section):
     network: Network = Network()
     timeline: list[Event] = []
     record: Record = Record()
+    _source: Source | None = PrivateAttr(default=None)
+
+    def locate(self, error: ScenarioError) -> ScenarioError:
+        """The same error, whose text begins with a key, with the place where that key was given."""
+        key = str(error).partition(":")[0]
+        return ScenarioError(f"{self._source.place(key)}: {error}") if self._source else error
 
 
 def shipped() -> list[str]:
@@ -270,10 +312,13 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     path = Path(name)
     if path.suffix == ".toml" and path.is_file():
-        text = path.read_text()
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise ScenarioError(f"{path.name}: not UTF-8, as TOML must be: {error}") from error
     elif name in shipped():
         path = Path(f"{name}.toml")
-        text = (resources.files("affinet") / "scenarios" / path.name).read_text()
+        text = (resources.files("affinet") / "scenarios" / path.name).read_text(encoding="utf-8")
     else:
         raise ScenarioError(f"{name}: no such file, and no such scenario; shipped are {', '.join(shipped())}")
     try:
@@ -282,12 +327,13 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
         raise ScenarioError(f"{path.name}: not TOML: {error}") from error
     for override in overrides:
         _override(raw, override)
+    source = Source(path.name, text, tuple(overrides))
     try:
-        return Scenario.model_validate(raw)
+        scenario = Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError(
-            "\n".join(_explain(path.name, text, overrides, problem) for problem in error.errors())
-        ) from error
+        raise ScenarioError("\n".join(_explain(source, problem) for problem in error.errors())) from error
+    scenario._source = source
+    return scenario
 
 
 def _override(raw: dict[str, Any], override: str) -> None:
@@ -307,34 +353,37 @@ def _override(raw: dict[str, Any], override: str) -> None:
     table[name] = value
 
 
-def _explain(file: str, text: str, overrides: Sequence[str], problem: Mapping[str, Any]) -> str:
+def _explain(source: Source, problem: Mapping[str, Any]) -> str:
+    loc = problem["loc"]
     # The tag of a timeline entry stands in pydantic's path, but in no key of the file.
-    steps = [step for n, step in enumerate(problem["loc"]) if not (n == 2 and problem["loc"][0] == "timeline")]
+    steps = [step for n, step in enumerate(loc) if not (n == 2 and loc[0] == "timeline")]
     key = ".".join(str(step + 1) if isinstance(step, int) else step for step in steps) or "scenario"
-    where = "--set" if any(override.partition("=")[0].strip() == key for override in overrides) else file
-    if where == file and (line := _line_of(text, steps)):
-        where = f"{file}:{line}"
-    return f"{where}: {key}: {_what_would_be_right(steps, problem)}"
+    return f"{source.place(key)}: {key}: {_what_would_be_right(loc, problem)}"
 
 
-def _what_would_be_right(steps: Sequence[str | int], problem: Mapping[str, Any]) -> str:
+def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -> str:
     message: str = problem["msg"].removeprefix("Value error, ").replace("Input should", "should")
-    if problem["type"] == "extra_forbidden":
-        known = _known_keys(steps[:-1])
-        close = difflib.get_close_matches(str(steps[-1]), known, n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
-        return f"unknown key; {hint}known here: {', '.join(known)}"
-    if problem["type"] == "missing":
-        return "is missing; it has no default"
     given = problem.get("input")
-    return (
-        message if problem["type"] == "value_error" or isinstance(given, dict | list) else f"{message}, got {given!r}"
-    )
+    match problem["type"]:
+        case "extra_forbidden":
+            known = _known_keys(loc[:-1])
+            close = difflib.get_close_matches(str(loc[-1]), known, n=1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            return f"unknown key; {hint}known here: {', '.join(known)}"
+        case "missing":
+            return "is missing; it has no default"
+        case "union_tag_not_found" | "union_tag_invalid":
+            return f"needs a verb among {', '.join(VERBS)}"
+        case "value_error":
+            return message
+    return message if isinstance(given, dict | list) else f"{message}, got {given!r}"
 
 
-def _known_keys(steps: Sequence[str | int]) -> list[str]:
+def _known_keys(loc: Sequence[str | int]) -> list[str]:
+    if loc[:1] == ("timeline",) and len(loc) > 2:
+        return sorted(VERBS[str(loc[2])].model_fields)
     models: list[Any] = [Scenario]
-    for step in steps:
+    for step in loc:
         if isinstance(step, int):
             continue
         annotations = [str(model.model_fields[step].annotation) for model in models if step in model.model_fields]
@@ -383,9 +432,24 @@ def covariance(sensing: Sensing, dimension: int) -> np.ndarray[Any, np.dtype[np.
     """
     if sensing.covariance is None:
         return float(sensing.sigma or 0.0) ** 2 * np.eye(dimension)
-    matrix = np.array(sensing.covariance, dtype=np.float64)
-    if matrix.shape != (dimension, dimension) or (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
-        raise ScenarioError(
-            f"sensing.covariance: must be a symmetric positive definite {dimension} x {dimension} matrix, in m2"
-        )
+    matrix = array("sensing.covariance", sensing.covariance, (dimension, dimension))
+    if (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
+        raise ScenarioError("sensing.covariance: must be symmetric and positive definite, in m2")
     return matrix
+
+
+def array(key: str, rows: Sequence[Any], shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Nested lists as an array of this shape.
+
+    Raises
+    ------
+    ScenarioError
+        When they have another.
+    """
+    try:
+        values = np.array(rows, dtype=np.float64)
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != shape:
+        raise ScenarioError(f"{key}: must be {' x '.join(map(str, shape))} numbers")
+    return values

@@ -22,6 +22,7 @@ _HALF = np.uint64(32)
 _MULTIPLIERS = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _WEYL = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
 _ROUNDS = 10
+_MOST_LANES = 2**17  # two to a block, 16 bits for the block
 
 
 class Purpose(IntEnum):
@@ -97,8 +98,10 @@ def uniform(
     Raises
     ------
     ValueError
-        When an index does not fit its words: two indices would share one draw.
+        When an index does not fit its words, or there are too many lanes: two indices would share one draw.
     """
+    if not 0 < lanes <= _MOST_LANES:
+        raise ValueError(f"lanes must lie in [1, 2**17], got {lanes}")
     if not 0 <= seed < 2**64:
         raise ValueError(f"seed {seed} is outside [0, 2**64)")
     ticks, sources, targets, channels = np.broadcast_arrays(
@@ -117,7 +120,7 @@ def uniform(
     key = np.uint64(seed & 0xFFFFFFFF), np.uint64(seed >> 32)
     x0, x1, x2, x3 = philox(counter, (np.asarray(key[0]), np.asarray(key[1])))
     pairs = np.stack([_unit(x0, x1), _unit(x2, x3)], axis=-1)
-    return np.ascontiguousarray(pairs.reshape(*pairs.shape[:-2], -1)[..., :lanes])
+    return np.ascontiguousarray(pairs.reshape(*pairs.shape[:-2], 2 * len(blocks))[..., :lanes])
 
 
 def _words(name: str, value: ArrayLike, bits: int) -> Words:

@@ -136,15 +136,17 @@ def _optional(hint: Any) -> Reader:
 
 def _array(hint: Any) -> Reader:
     scalar = get_args(get_args(hint)[1])[0]
-    dtype = None if scalar is Any else np.dtype(scalar)
+    dtype = np.dtype(scalar)
+    accepted = {"b": "b", "i": "i", "u": "i", "f": "if"}[dtype.kind]
 
     def read(value: Any) -> Any:
-        if type(value) not in (list, bool, int, float):
-            raise _refuse("a nested list, or a number", value)
         try:
-            return np.array(value, dtype=dtype)
-        except (TypeError, ValueError) as error:
+            array = np.array(value)
+        except (TypeError, ValueError, OverflowError) as error:
             raise _refuse(f"a rectangular list of {dtype}", value) from error
+        if array.dtype.kind not in accepted and array.size:
+            raise _refuse(f"a nested list of {dtype}, or one", value)
+        return array.astype(dtype)
 
     return read
 

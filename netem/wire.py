@@ -166,7 +166,7 @@ def unpack_inbox(data: bytes) -> SenseInbox | ExchangeInbox | EndInbox:
     """
     plain = _load(data)
     phase = plain.get("phase") if isinstance(plain, dict) else None
-    if phase not in INBOXES:
+    if not isinstance(phase, str) or phase not in INBOXES:
         raise WireError(f"an inbox needs a phase among {list(INBOXES)}, got {phase!r} (see docs/protocol.md)")
     return _read(INBOXES[phase], plain)
 

@@ -71,14 +71,14 @@ def test_check_says_why_a_scenario_cannot_fly():
     assert done.returncode == 2
     report = json.loads(done.stdout)
     assert report["flies"] is False
-    assert any(f["level"] == "error" and "1.534 >= 1" in f["says"] for f in report["findings"])
+    assert any(f["level"] == "error" and "1.327 >= 1" in f["says"] for f in report["findings"])
 
 
 def test_check_prints_a_table():
     done = affinet("check", "hexa")
     assert done.returncode == 0
     assert "can fly" in done.stdout
-    assert "0.859 < 1" in done.stdout
+    assert "0.873 < 1" in done.stdout
 
 
 def test_a_diverged_swarm_fails(out):

@@ -68,8 +68,8 @@ def test_keyframes_are_hit():
 
 def test_keyframes_rest_before_the_first_and_after_the_last():
     flown = keyframes(np.array([0.0, 1.0, 2.0, 20.0, 21.0, 99.0]), TIMES, THETA, OFFSET)
-    np.testing.assert_array_equal(flown.theta, np.repeat(THETA[[0, -1]], 3, axis=0))
-    np.testing.assert_array_equal(flown.offset, np.repeat(OFFSET[[0, -1]], 3, axis=0))
+    np.testing.assert_allclose(flown.theta, np.repeat(THETA[[0, -1]], 3, axis=0), atol=1e-14)
+    np.testing.assert_allclose(flown.offset, np.repeat(OFFSET[[0, -1]], 3, axis=0), atol=1e-14)
 
 
 @settings(deadline=None, derandomize=True, database=None, max_examples=50)

@@ -6,7 +6,7 @@ import pytest
 from analysis.metrics import tracking_error
 
 TARGET = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-POSITION = TARGET + [[3.0, 4.0], [0.0, 2.0], [1.0, 0.0]]  # 5 m, 2 m and 1 m off
+POSITION = np.array([[3.0, 4.0], [1.0, 2.0], [1.0, 1.0]])  # 5 m, 2 m and 1 m off
 
 
 def test_tracking_error_is_the_mean_squared_distance_to_the_target():

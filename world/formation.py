@@ -57,8 +57,8 @@ PRESETS: dict[str, Formation] = {
         edges=_edges("1-2 1-3 1-4 1-5 2-4 2-7 3-5 3-6 4-5 4-6 5-7 6-7"),
         leaders=(1, 2, 3),
     ),
-    # Graph 2 of paper 000, the hexagon of paper 004. Of 110 admissible sets of leaders, 8 are stable under undamped
-    # one-tick varying-velocity control; 2, 6, 8 has the smallest radius (4, 5, 7 diverges).
+    # Graph 2 of paper 000, the hexagon of paper 004. With the stress solved here 10 of 110 admissible sets of leaders are
+    # stable under undamped one-tick varying-velocity control; 2, 6, 8 has the smallest radius, .873 (4, 5, 7 diverges, 1.327).
     "hexa10": Formation(
         nominal=np.array(
             [[3, 0], [2, 2], [2, -2], [1, 0], [0, 2], [0, -2], [-1, 0], [-2, 2], [-2, -2], [-3, 0]],

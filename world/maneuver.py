@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import ndtr
 
 from analysis.affine import Array, Manoeuvre
@@ -73,7 +73,13 @@ def keyframes(seconds: Array, times: Sequence[float], theta: Array, offset: Arra
         The maps at these times, shapes (F, D, D) and (F, D).
     """
     within = np.clip(seconds, times[0], times[-1])
-    return Manoeuvre(PchipInterpolator(times, theta)(within), PchipInterpolator(times, offset)(within))
+    return Manoeuvre(_smooth(times, theta)(within), _smooth(times, offset)(within))
+
+
+def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
+    slopes = PchipInterpolator(times, values).derivative()(times)
+    slopes[0], slopes[-1] = 0.0, 0.0  # from rest, and to rest
+    return CubicHermiteSpline(times, values, slopes)
 
 
 def _bell_step(seconds: Array, start: float, duration: float) -> Array:

@@ -52,6 +52,8 @@ def solve(formation: Formation) -> Array:
 
     basis = equilibrium(formation)
     affine = np.column_stack([formation.nominal, np.ones(formation.agents)])
+    if np.linalg.matrix_rank(affine) <= formation.dimension:
+        raise NotRigid(f"the nodes do not span {formation.dimension} dimensions: they lie on a line or plane")
     Q = null_space(affine.T).T
     if not basis.shape[1] or not len(Q):
         raise NotRigid("no stress but zero balances the framework")

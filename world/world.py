@@ -64,8 +64,8 @@ class World:
 
     def step(self, tick: int, position: Array, velocity: Array, absent: NDArray[np.bool_]) -> Array:
         """Positions in the next tick; the body of an agent that is absent holds still."""
-        flown = np.where(absent[:, None], 0.0, velocity)
-        return dynamics.single_integrator(position, flown, self.dt, self._disturbances.at(tick))
+        moved = dynamics.single_integrator(position, velocity, self.dt, self._disturbances.at(tick))
+        return np.where(absent[:, None], position, moved)
 
     @cached_property
     def _sensor_noise(self) -> Tape:

@@ -1,0 +1,191 @@
+"""The tick against its floor, in one run: the same messages through bare Zenoh, with no computing.
+
+    python bench/lockstep.py [--ticks 1500] [--rounds 3]
+
+Prints, for 7 and 10 agents: the floor (as many processes, the same keys, message sizes, logins and access control, nobody
+computes), the tick of GA-RKF with recording on and off, their ratio, the real-time factor, the start, and memory. Machines are
+noisy: look at ratios, and at the spread of the rounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import secrets
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import zenoh
+
+from affinet import plan as planning
+from affinet import scenario
+from affinet.launcher import Launcher
+from affinet.plan import Plan
+from netem import wire
+from netem.keys import Keys
+from netem.session import ENVIRONMENT, HUB, WORLD, Login, agent_name, await_subscribers, client, hub
+
+CHANNELS = ("input", "measurement", "theta")
+FIFO = zenoh.handlers.FifoChannel
+
+
+def sizes(plan: Plan) -> dict[str, int]:
+    """Typical packed sizes of a tick's messages."""
+    number = np.random.default_rng(0).normal
+    dimension, links = plan.world.formation.dimension, len(plan.world.links)
+    agents = plan.world.formation.agents
+    degree = round(links / agents)
+    heard = round(degree * plan.scenario.network.availability)
+    map_ = number(size=(dimension, dimension))
+    said = {
+        "input": {"velocity": number(size=dimension)},
+        "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
+        "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
+    }
+    broadcasts = [wire.pack(wire.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
+    messages = {
+        "sense": wire.pack(
+            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)))
+        ),
+        "seen": wire.pack(
+            wire.SenseInbox(500, HUB, 500, wire.Phase.SENSE, [1] * heard, number(size=(heard, 2)).tolist(), None)
+        ),
+        "heard": wire.pack_exchange(500, 500, broadcasts * heard),
+        "act": wire.pack(wire.Act(500, 1, 500, number(size=2), number(size=(degree, 2)), [True] * degree, 0.1, 500)),
+        "journal": wire.pack(wire.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [9] * agents, 0, [])),
+    }
+    return {name: len(data) for name, data in messages.items()} | {"said": len(broadcasts[-1])}
+
+
+def floor(role: str, agents: int, ticks: int, size: dict[str, int], login: Login, users: str) -> None:
+    """One process of the floor."""
+    keys, numbers = Keys("floor"), range(1, agents + 1)
+    if role == HUB:
+        with zenoh.open(hub(login, users, keys, numbers)) as session:
+            sense = session.declare_subscriber(keys.sense, FIFO(64))
+            said = session.declare_subscriber(keys.broadcast("*", "*"), FIFO(4096))
+            inboxes = [session.declare_publisher(keys.inbox(agent)) for agent in numbers]
+            journal = session.declare_publisher(keys.journal)
+            await_subscribers([*inboxes, journal])
+            print("ready", flush=True)
+            for _ in range(ticks):
+                sense.recv().payload.to_bytes()
+                for inbox in inboxes:
+                    inbox.put(b"." * size["seen"])
+                journal.put(b"." * size["journal"])
+                for _ in range(agents * len(CHANNELS)):
+                    said.recv().payload.to_bytes()
+                for inbox in inboxes:
+                    inbox.put(b"." * size["heard"])
+            sys.stdin.readline()
+    elif role == WORLD:
+        with zenoh.open(client(login)) as session:
+            acts = session.declare_subscriber(keys.act("*"), FIFO(4096))
+            journal = session.declare_subscriber(keys.journal, FIFO(64))
+            sense = session.declare_publisher(keys.sense)
+            await_subscribers([sense])
+            print("ready", flush=True)
+            sys.stdin.readline()
+            began = time.perf_counter()
+            for _ in range(ticks):
+                sense.put(b"." * size["sense"])
+                journal.recv().payload.to_bytes()
+                for _ in range(agents):
+                    acts.recv().payload.to_bytes()
+            print((time.perf_counter() - began) / ticks, flush=True)
+    else:
+        with zenoh.open(client(login)) as session:
+            agent = int(role)
+            inbox = session.declare_subscriber(keys.inbox(agent), FIFO(64))
+            said = [session.declare_publisher(keys.broadcast(agent, name)) for name in CHANNELS]
+            act = session.declare_publisher(keys.act(agent))
+            await_subscribers([*said, act])
+            print("ready", flush=True)
+            for _ in range(ticks):
+                inbox.recv().payload.to_bytes()
+                for broadcast in said:
+                    broadcast.put(b"." * size["said"])
+                inbox.recv().payload.to_bytes()
+                act.put(b"." * size["act"])
+            sys.stdin.readline()
+
+
+def floor_tick(plan: Plan, ticks: int) -> float:
+    """Seconds of a tick in which nobody computes."""
+    agents, size = plan.world.formation.agents, sizes(plan)
+    with tempfile.TemporaryDirectory() as private:
+        names = {WORLD: WORLD, HUB: HUB, **{str(agent): agent_name(agent) for agent in range(1, agents + 1)}}
+        endpoint, users = f"unixsock-stream/{private}/z.sock", Path(private) / "users"
+        passwords = {role: secrets.token_hex(8) for role in names}
+        users.write_text("".join(f"{name}:{passwords[role]}\n" for role, name in names.items()))
+        started = {}
+        for role, name in names.items():
+            told = json.dumps([role, agents, ticks, size, [endpoint, name, passwords[role]], str(users)])
+            started[role] = subprocess.Popen(
+                [sys.executable, __file__, "--floor", told],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                env=os.environ | ENVIRONMENT,
+            )
+        for process in started.values():
+            process.stdout.readline()
+        for process in started.values():
+            process.stdin.write("go\n")
+            process.stdin.flush()
+        tick = float(started[WORLD].stdout.readline())
+        for process in started.values():
+            process.communicate(timeout=20)
+    return tick
+
+
+def fly(plan: Plan) -> tuple[float, float, float]:
+    """Seconds of a tick, seconds to the first tick, and the largest agent's memory in MB."""
+    with tempfile.TemporaryDirectory() as out:
+        flight = Launcher(plan, Path(out), watch=lambda *_: None).fly()
+    if flight.failure or flight.uninstructed:
+        raise SystemExit(f"the run failed: {flight.failure}, {flight.uninstructed} lost")
+    memory = max(process["rss_mb"] for process in flight.processes if process["role"] == "agent")
+    return flight.wall_s / plan.world.ticks, flight.start_s, memory
+
+
+def main() -> None:
+    """Measure, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ticks", type=int, default=1500)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--floor", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.floor:
+        role, agents, ticks, size, login, users = json.loads(options.floor)
+        floor(role, agents, ticks, size, Login(*login), users)
+        return
+    print("| swarm | floor, ms | tick, ms | ratio | x real time | recording | start, s | agent, MB |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name in ("corridor", "hexa"):
+        duration = f"time.duration={options.ticks / 100:g}"
+        on = planning.make(scenario.load(name, [duration]))
+        off = planning.make(scenario.load(name, [duration, "record.enabled=false"]))
+        rounds = [(floor_tick(on, options.ticks), fly(on), fly(off)[0]) for _ in range(options.rounds)]
+        bare = statistics.median(r[0] for r in rounds)
+        tick = statistics.median(r[1][0] for r in rounds)
+        ratio = statistics.median(r[1][0] / r[0] for r in rounds)
+        cost = statistics.median(r[1][0] / r[2] - 1.0 for r in rounds)
+        start = statistics.median(r[1][1] for r in rounds)
+        memory = max(r[1][2] for r in rounds)
+        spread = f"{min(r[1][0] for r in rounds) * 1e3:.2f} to {max(r[1][0] for r in rounds) * 1e3:.2f}"
+        print(
+            f"| {name}, {on.world.formation.agents} agents | {bare * 1e3:.2f} | {tick * 1e3:.2f} ({spread}) | {ratio:.2f} "
+            f"| {on.world.dt / tick:.2f} | {cost:+.0%} | {start:.2f} | {memory:.0f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

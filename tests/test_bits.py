@@ -1,0 +1,185 @@
+"""The property of the house: a batch of agents, or of runs, gives bit for bit what each gives alone."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from affinet import plan, scenario
+from agents.agent import Agent, renew
+from agents.controllers import ConstantVelocity, Static, VaryingVelocity
+from agents.estimators.base import Heard
+from agents.estimators.conral import ConsensusLocalization
+from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.estimators.none import NoEstimator
+from agents.estimators.ral import RelativeAffineLocalization
+from agents.estimators.rkf import RelativeKalmanFilter
+
+TICKS, RUNS = 10, 3
+
+ESTIMATORS = {
+    "none": NoEstimator(),
+    "rkf": RelativeKalmanFilter(),
+    "ral": RelativeAffineLocalization(),
+    "conral": ConsensusLocalization(),
+    "ga-rkf-ral": GeometryAwareFilter(geometry="ral"),
+    "ga-rkf-conral": GeometryAwareFilter(geometry="conral"),
+}
+LAWS = {
+    "static": Static(),
+    "constant-velocity": ConstantVelocity(),
+    "communicated": VaryingVelocity(relaxation=0.7),
+    "estimated": VaryingVelocity(source="estimated"),
+    "feed-forward": VaryingVelocity(source="feed-forward"),
+}
+PAIRS = [
+    (estimator, law)
+    for estimator in ESTIMATORS
+    for law in LAWS
+    if law != "estimated" or estimator not in ("none", "ral", "conral")
+]
+
+# An octahedron with its diagonals, and a seventh agent tied to four of them.
+SPACE = f"""
+[formation]
+nodes = [[2, 0, 0], [0, 2, 0], [0, 0, 2], [-2, 0, 0], [0, -2, 0], [0, 0, -2], [1.5, 2.5, 3.5]]
+edges = {[f"{i}-{j}" for i, j in combinations(range(1, 7), 2)] + ["1-7", "2-7", "3-7", "4-7"]}
+leaders = [1, 2, 3, 4]
+[manoeuvre]
+keyframes = [
+    {{ time = 0.0, theta = [[1, 0, 0], [0, 1, 0], [0, 0, 1]], offset = [0, 0, 0] }},
+    {{ time = 1.0, theta = [[0, 1, 0], [-1, 0, 0.5], [0, 0.2, 1]], offset = [3, 1, -2] }},
+]
+[time]
+dt = 0.01
+duration = 1.0
+[sensing]
+covariance = [[0.01, 0.003, 0.0], [0.003, 0.01, -0.001], [0.0, -0.001, 0.02]]
+[agents]
+estimator = "none"
+law = "static"
+"""
+
+
+@pytest.fixture(scope="module")
+def plans(tmp_path_factory):
+    """A formation in the plane, and one in space; their agents differ in degree, at most 8, so there is padding."""
+    file = tmp_path_factory.mktemp("scenarios") / "space.toml"
+    file.write_text(SPACE)
+    return {
+        2: plan.make(scenario.load("hexa", ["sensing={covariance=[[0.01, 0.003], [0.003, 0.02]]}"])),
+        3: plan.make(scenario.load(str(file))),
+    }
+
+
+def draw(agent, links, seed, lead):
+    """What reaches the agents in every tick: measured, seen, heard from whom, own position."""
+    rng, dimension = np.random.default_rng(seed), agent.brief.dimension
+    slots = (TICKS, *lead, *links.present.shape)
+    seen, fresh = rng.random((2, *slots)) < 0.7
+    seen, fresh = seen & links.present, fresh & links.present
+    measured = agent.brief.relative + 0.1 * rng.normal(size=(*slots, dimension))
+    position = rng.normal(size=(TICKS, *lead, links.agents, dimension))
+    return np.where(seen[..., None], measured, 0.0), seen, fresh, position
+
+
+def leaves(value):
+    """Every array in a state, an action or a broadcast, in order."""
+    if isinstance(value, dict):
+        return [leaf for name in sorted(value) for leaf in leaves(value[name])]
+    if isinstance(value, tuple | list):
+        return [leaf for entry in value for leaf in leaves(entry)]
+    return [] if value is None else [np.asarray(value)]
+
+
+def gather(said, neighbours, fresh):
+    """What everybody hears of what everybody said, (..., agents, n, *field)."""
+    agents = fresh.ndim - 2
+    heard = {}
+    for channel, fields in said.items():
+        spread = {name: np.take(field, neighbours, axis=agents) for name, field in fields.items()}
+        heard[channel] = Heard(spread, fresh)
+    return heard
+
+
+def row_of(heard, index):
+    return {c: Heard({n: f[index] for n, f in h.fields.items()}, h.fresh[index]) for c, h in heard.items()}
+
+
+def cut(brief, row):
+    """The brief of one agent: as the launcher cuts it."""
+    return replace(
+        brief,
+        nominal=brief.nominal[row],
+        relative=brief.relative[row],
+        present=brief.present[row],
+        stress=brief.stress[row],
+        leader=brief.leader[row],
+    )
+
+
+def fly_together(agent, links, measured, seen, fresh, position):
+    """A batch, and what each of its agents heard in every tick."""
+    state, ticks = agent.init(fresh.shape[1:-1]), []
+    for tick in range(TICKS):
+        state, said = agent.sense(state, measured[tick], seen[tick])
+        heard = gather(said, links.neighbours, fresh[tick])
+        state, action = agent.act(state, tick, heard, position[tick])
+        ticks.append((said, heard, action, state))
+    return ticks
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("estimator", "law"), PAIRS)
+def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, dimension, plans):
+    brief, links = plans[dimension].brief, plans[dimension].world.links
+    everybody = Agent(brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0)
+    measured, seen, fresh, position = draw(everybody, links, 1, ())
+    together = fly_together(everybody, links, measured, seen, fresh, position)
+    for row in range(links.agents):
+        alone = replace(everybody, brief=cut(brief, row))
+        state = alone.init(())
+        for tick, (all_said, all_heard, all_action, all_state) in enumerate(together):
+            state, said = alone.sense(state, measured[tick, row], seen[tick, row])
+            state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row])
+            for one, many in zip(leaves((said, action, state)), leaves((all_said, all_action, all_state)), strict=True):
+                assert one.shape == many[row].shape
+                assert one.tobytes() == many[row].tobytes()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("estimator", "law"), PAIRS)
+def test_a_batch_of_runs_gives_the_bits_of_each_run_alone(estimator, law, dimension, plans):
+    brief, links = plans[dimension].brief, plans[dimension].world.links
+    agent = Agent(brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0)
+    drawn = draw(agent, links, 2, (RUNS,))
+    together = fly_together(agent, links, *drawn)
+    for run in range(RUNS):
+        alone = fly_together(agent, links, *(array[:, run] for array in drawn))
+        for one, many in zip(leaves(alone), leaves(together), strict=True):
+            assert one.shape == many[run].shape
+            assert one.tobytes() == many[run].tobytes()
+
+
+def test_what_is_compared_is_no_constant(plans):
+    links = plans[2].world.links
+    agent = Agent(plans[2].brief, ESTIMATORS["ga-rkf-conral"], LAWS["communicated"], leader_gain=1.0)
+    (_, _, _, first), *_, (_, heard, action, last) = fly_together(agent, links, *draw(agent, links, 1, ()))
+    assert all(np.isfinite(leaf).all() for leaf in leaves(last))
+    assert not np.isclose(first.estimator.tracks.mean, last.estimator.tracks.mean)[links.present].all(axis=-1).any()
+    assert np.isfinite(action.estimate.psi).any()
+    assert len(np.unique(action.velocity)) == action.velocity.size
+    assert not heard["theta"].fresh[links.present].all()
+    assert not links.present.all()
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_restarted_agent_is_a_fresh_one_and_the_others_go_on(estimator, plans):
+    links = plans[2].world.links
+    agent = Agent(plans[2].brief, ESTIMATORS[estimator], LAWS["constant-velocity"], leader_gain=1.0)
+    *_, (_, _, _, flown) = fly_together(agent, links, *draw(agent, links, 1, ()))
+    restarted, new = np.arange(10) == 4, agent.init((10,))
+    for now, fresh, before in zip(leaves(renew(flown, new, restarted)), leaves(new), leaves(flown), strict=True):
+        assert now[restarted].tobytes() == fresh[restarted].tobytes()
+        assert now[~restarted].tobytes() == before[~restarted].tobytes()

@@ -1,0 +1,362 @@
+"""The scenario file: what is written flies; what is wrong is one line: where, which key, what would be right."""
+
+import pytest
+
+from affinet import plan, scenario
+from affinet.scenario import ScenarioError
+from netem.timeline import Fault, Verb
+
+GOOD = """\
+description = "a test"
+seed = 1
+
+[formation]
+preset = "zhao7"
+
+[manoeuvre]
+keyframes = [
+    { time = 0.0, theta = [[1.0, 0.0], [0.0, 1.0]], offset = [0.0, 0.0] },
+    { time = 1.0, theta = [[1.0, 0.0], [0.0, 1.0]], offset = [1.0, 0.0] },
+]
+
+[time]
+dt = 0.01
+duration = 1.0
+
+[sensing]
+sigma = 0.1
+
+[agents]
+estimator = "rkf"
+law = "static"
+
+[agents.parameters.rkf]
+sigma_w = 0.5
+
+[network]
+availability = 0.7
+coupled = true
+
+[[network.links]]
+link = "1->2"
+availability = 0.5
+delay_ticks = 3
+
+[[timeline]]
+verb = "cut"
+at = 0.1
+until = 0.3
+links = ["2->4", "1-2"]
+
+[[timeline]]
+verb = "kill"
+at = 0.4
+agents = [5]
+
+[[timeline]]
+verb = "restart"
+at = 0.5
+agents = [5]
+"""
+
+OWN = """\
+nodes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+edges = ["1-2", "1-3", "1-4", "2-3", "2-4", "3-4"]
+leaders = [1, 2, 3]
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "bad.toml"
+
+
+# ---- what is written is what flies
+
+
+@pytest.mark.parametrize("name", scenario.shipped())
+def test_every_shipped_scenario_loads_and_can_fly(name):
+    made = plan.make(scenario.load(name))
+    assert made.scenario.description
+    assert not any(finding.fatal for finding in made.findings)
+
+
+def test_four_scenarios_are_shipped():
+    assert {"corridor", "hexa", "partition", "switching"} <= set(scenario.shipped())
+
+
+def test_a_scenario_flies_as_it_is_written(file):
+    file.write_text(GOOD)
+    made = plan.make(scenario.load(str(file)))
+    links = made.world.links
+    row = links.index[1, 2]
+    assert (made.world.dt, made.world.ticks, made.world.seed) == (0.01, 100, 1)
+    assert made.estimator.build().sigma_w == 0.5
+    assert made.profile.availability[row] == 0.5
+    assert made.profile.delay_ticks[row] == 3
+    assert made.profile.availability[links.index[2, 1]] == 0.7
+    assert made.profile.delay_ticks[links.index[2, 1]] == 0
+    assert made.faults == (
+        Fault(Verb.CUT, 10, 30, pairs=((2, 4), (1, 2), (2, 1))),
+        Fault(Verb.KILL, 40, 50, agents=(5,)),
+    )
+
+
+def test_a_formation_of_ones_own_flies(file):
+    file.write_text(GOOD.replace('preset = "zhao7"\n', OWN).replace("agents = [5]", "agents = [4]"))
+    formation = plan.make(scenario.load(str(file))).world.formation
+    assert formation.nominal.tolist() == [[0, 0], [1, 0], [0, 1], [1, 1]]
+    assert formation.edges == ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
+    assert formation.leaders == (1, 2, 3)
+
+
+@pytest.mark.parametrize(("exchange", "least"), [("same-tick", 0), ("next-tick", 1)])
+def test_next_tick_exchange_delays_every_message_by_a_tick(file, exchange, least):
+    file.write_text(GOOD)
+    assert plan.make(scenario.load(str(file), [f"time.exchange={exchange}"])).profile.least_delay == least
+
+
+def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
+    file.write_text(
+        GOOD.replace(
+            'verb = "cut"\nat = 0.1\nuntil = 0.3\nlinks = ["2->4", "1-2"]', 'verb = "kill"\nat = 0.1\nagents = [5]'
+        )
+    )
+    timeline = plan.make(scenario.load(str(file))).timeline
+    assert timeline.at(45).dead[4]
+    assert not timeline.at(50).dead[4]
+
+
+@pytest.mark.parametrize(
+    ("link", "pairs"),
+    [("2->4", [(2, 4)]), ("2-4", [(2, 4), (4, 2)]), ("10->1", [(10, 1)])],
+)
+def test_a_link_is_written_one_way_or_both_ways(link, pairs):
+    assert scenario.directed(link) == pairs
+
+
+@pytest.mark.parametrize("link", ["2", "2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", ""])
+def test_what_is_no_link_is_refused_with_the_two_ways_to_write_one(link):
+    with pytest.raises(ValueError, match=f"{link!r} is no link; write '2->4' .* or '2-4'"):
+        scenario.directed(link)
+
+
+# ---- --set
+
+
+@pytest.mark.parametrize(
+    ("override", "section", "key", "value"),
+    [
+        ("network.availability=0.5", "network", "availability", 0.5),
+        ("network.availability=1", "network", "availability", 1.0),
+        ("network.coupled=false", "network", "coupled", False),
+        ("network.delay_ticks=2", "network", "delay_ticks", 2),
+        ("agents.estimator=ral", "agents", "estimator", "ral"),
+        ('agents.estimator="ral"', "agents", "estimator", "ral"),
+        ("agents.parameters.static.alpha=5", "agents", "parameters", {"rkf": {"sigma_w": 0.5}, "static": {"alpha": 5}}),
+        ("formation.leaders=[1, 2, 4]", "formation", "leaders", [1, 2, 4]),
+        ("dynamics.disturbance=0.01", "dynamics", "disturbance", 0.01),
+        (" time.duration = 2 ", "time", "duration", 2.0),
+    ],
+)
+def test_set_overrides_a_key_with_a_value_of_its_type(file, override, section, key, value):
+    file.write_text(GOOD)
+    given = getattr(getattr(scenario.load(str(file), [override]), section), key)
+    assert given == value
+    assert type(given) is type(value)
+
+
+def test_set_overrides_a_shipped_scenario_and_leaves_the_rest():
+    before, after = scenario.load("corridor"), scenario.load("corridor", ["seed=7"])
+    assert after.seed == 7
+    assert after.model_dump() == before.model_dump() | {"seed": 7}
+
+
+def test_of_two_overrides_of_one_key_the_last_holds(file):
+    file.write_text(GOOD)
+    assert scenario.load(str(file), ["seed=7", "seed=8"]).seed == 8
+
+
+WRONG_OVERRIDES = [
+    ("network.availability=1.3", "network.availability", "less than or equal to 1, got 1.3"),
+    ("network.availabilty=0.5", "network.availabilty", "did you mean 'availability'?"),
+    ("netwrk.availability=0.5", "netwrk", "did you mean 'network'?"),
+    ("time.dt=fast", "time.dt", "valid number"),
+    ('time.dt="0.01"', "time.dt", "valid number"),
+    ("seed=", "seed", "valid integer"),
+    ("time.dt=0.007", "time", "duration 1 s is not a whole number of ticks of 0.007 s"),
+    ("formation.preset=zhao8", "formation", "there are zhao7, hexa10"),
+    ("agents.estimator=kalman", "agents.estimator", "there are conral, ga-rkf, none, ral, rkf"),
+    ("agents.parameters.rkf.sigma=1", "agents.parameters.rkf.sigma", "rkf has sigma_w"),
+    ("formation.leaders=[1, 2, 9]", "formation.leaders", "agents are 1 to 7"),
+    ("network.availability", "network.availability", "write it as key=value, like network.availability=0.5"),
+    ("=3", "=3", "write it as key=value"),
+    ("network.=3", "network.=3", "write it as key=value"),
+    ("time.dt.x=3", "time.dt.x=3", "dt is not a table"),
+    ("timeline.1.at=3", "timeline.1.at=3", "timeline is not a table"),
+]
+
+
+@pytest.mark.parametrize(("override", "key", "remedy"), WRONG_OVERRIDES, ids=[row[0] for row in WRONG_OVERRIDES])
+def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_right(file, override, key, remedy):
+    file.write_text(GOOD)
+    with pytest.raises(ScenarioError) as error:
+        plan.make(scenario.load(str(file), [override]))
+    (line,) = str(error.value).splitlines()
+    assert line.startswith("--set")
+    assert key in line
+    assert remedy in line
+
+
+# ---- what is wrong in a file
+
+
+WRONG = [
+    # keys
+    ("availability = 0.7", "availabilty = 0.7", "network.availabilty", "did you mean 'availability'? known here: "),
+    ("seed = 1", "sede = 1", "sede", "did you mean 'seed'?"),
+    ("[network]", "[netwrok]", "netwrok", "did you mean 'network'?"),
+    ("until = 0.3", "untill = 0.3", "timeline.1.untill", "did you mean 'until'?"),
+    ("delay_ticks = 3", "delay = 3", "network.links.1.delay", "did you mean 'delay_ticks'?"),
+    ("at = 0.4\n", "at = 0.4\nuntil = 0.5\n", "timeline.2.until", "known here: agents, at, verb"),
+    ("dt = 0.01\n", "", "time.dt", "is missing; it has no default"),
+    # types
+    ("dt = 0.01", 'dt = "fast"', "time.dt", "valid number"),
+    ("dt = 0.01", 'dt = "0.01"', "time.dt", "valid number"),
+    ("duration = 1.0", "duration = true", "time.duration", "valid number"),
+    ("seed = 1", "seed = 1.5", "seed", "valid integer"),
+    ("seed = 1", "seed = true", "seed", "valid integer"),
+    ("coupled = true", 'coupled = "yes"', "network.coupled", "valid boolean"),
+    ("description = ", "description = 3 #", "description", "valid string, got 3"),
+    ("agents = [5]\n\n[", "agents = 5\n\n[", "timeline.2.agents", "valid list"),
+    # values
+    ("availability = 0.7", "availability = 1.3", "network.availability", "less than or equal to 1, got 1.3"),
+    ("availability = 0.7", "availability = -0.1", "network.availability", "greater than or equal to 0, got -0.1"),
+    ("availability = 0.5", "availability = 2", "network.links.1.availability", "less than or equal to 1, got 2"),
+    ("delay_ticks = 3", "delay_ticks = -1", "network.links.1.delay_ticks", "greater than or equal to 0, got -1"),
+    ("seed = 1", "seed = -1", "seed", "greater than or equal to 0, got -1"),
+    # time
+    ("dt = 0.01", "dt = 0", "time.dt", "greater than 0, got 0"),
+    ("dt = 0.01", "dt = inf", "time.dt", "finite number, got inf"),
+    ("duration = 1.0", "duration = 1.005", "time", "1.005 s is not a whole number of ticks of 0.01 s"),
+    # formation
+    ('preset = "zhao7"', 'preset = "zhao8"', "formation", "no preset 'zhao8'; there are zhao7, hexa10"),
+    ('preset = "zhao7"', f'preset = "zhao7"\n{OWN}', "formation", "give a preset, or nodes and edges, not both"),
+    ('preset = "zhao7"', "scale = 2.0", "formation", "give a preset, or nodes, edges and leaders"),
+    ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[nan, 1.0]]"), "formation.nodes.4.1", "finite number"),
+    ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[1.0]]"), "formation", "nodes need two coordinates each"),
+    ('preset = "zhao7"', OWN.replace("3-4", "3=4"), "formation.edges.6", "'3=4' is no link; write '2->4'"),
+    ('preset = "zhao7"', OWN.replace("3-4", "3-9"), "formation.edges", "no agents [9]; agents are 1 to 4"),
+    ('preset = "zhao7"', 'preset = "zhao7"\nleaders = [1, 2, 9]', "formation.leaders", "agents are 1 to 7"),
+    # manoeuvre
+    ("{ time = 1.0,", "{ time = 0.0,", "manoeuvre", "keyframe times must increase, got [0.0, 0.0]"),
+    (
+        "[manoeuvre]",
+        '[manoeuvre]\npreset = "hover"',
+        "manoeuvre",
+        "give a preset ('hover', 'corridor'), or keyframes",
+    ),
+    ("offset = [1.0, 0.0]", "offset = [1.0]", "manoeuvre.keyframes.2.offset", "must be 2 numbers"),
+    ("1.0]], offset = [1", "1.0, 2.0]], offset = [1", "manoeuvre.keyframes.2.theta", "must be 2 x 2 numbers"),
+    # sensing
+    ("sigma = 0.1", "", "sensing", "give sigma (m) or covariance (m2)"),
+    ("sigma = 0.1", "sigma = 0.0", "sensing", "give a small one, like 1e-6 m"),
+    (
+        "sigma = 0.1",
+        "covariance = [[1.0, 2.0], [2.0, 1.0]]",
+        "sensing.covariance",
+        "must be symmetric and positive definite, in m2",
+    ),
+    # agents
+    ('"rkf"', '"kalman"', "agents.estimator", "no 'kalman'; there are conral, ga-rkf, none, ral, rkf, or give"),
+    ('"rkf"', '"no.such:Thing"', "agents.estimator", "cannot load no.such:Thing"),
+    ('"static"', '"statik"', "agents.law", "no 'statik'; there are constant-velocity, static, varying-velocity"),
+    ("sigma_w = 0.5", "sigma = 0.5", "agents.parameters.rkf.sigma", "rkf has sigma_w, prior_position"),
+    ("sigma_w = 0.5", 'sigma_w = "much"', "agents.parameters.rkf.sigma_w", "valid number"),
+    ("[agents.parameters.rkf]", "[agents.parameters.rfk]", "agents.parameters.rfk", "rkf"),
+    # network and timeline
+    ('link = "1->2"', 'link = "1=2"', "network.links.1.link", "'1=2' is no link; write '2->4'"),
+    ('link = "1->2"', 'link = "1->7"', "network.links.1.link", "1->7 is not a link of the formation"),
+    ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' is no link; write '2->4'"),
+    ('"1-2"]', '"1-7"]', "timeline.1.links", "1->7 is not a link of the formation"),
+    ("until = 0.3", "until = 0.05", "timeline.1", "ends at 0.05 s, but begins at 0.1 s; until must be later"),
+    (
+        'verb = "kill"',
+        'verb = "depart"',
+        "timeline.3",
+        "agent 5 is not dead then; name its kill before its restart",
+    ),
+    ("at = 0.5", "at = 0.4", "timeline.3", "agent 5 is not dead then"),
+    ('verb = "kill"', 'verb = "explode"', "timeline.2", "needs a verb among cut, partition, depart, kill, restart"),
+    ('verb = "kill"\n', "", "timeline.2", "needs a verb among cut, partition, depart, kill, restart"),
+    ("agents = [5]", "agents = [9]", "timeline.2", "agent 9 does not exist: agents are 1 to 7"),
+    ('links = ["2->4", "1-2"]', "links = []", "timeline.1.links", "at least 1 item"),
+    (
+        'verb = "kill"\nat = 0.4\nagents = [5]\n\n[[timeline]]\nverb = "restart"\nat = 0.5\nagents = [5]',
+        'verb = "partition"\nat = 0.4\ngroups = [[1, 2], [2, 3]]',
+        "timeline.2",
+        "agent 2 stands in two groups",
+    ),
+]
+
+
+@pytest.mark.parametrize(("good", "bad", "key", "remedy"), WRONG, ids=[f"{key}: {remedy}" for *_, key, remedy in WRONG])
+def test_what_is_wrong_in_a_file_is_one_line_that_says_the_file_the_key_and_what_would_be_right(
+    file, good, bad, key, remedy
+):
+    assert good in GOOD
+    file.write_text(GOOD.replace(good, bad))
+    with pytest.raises(ScenarioError) as error:
+        plan.make(scenario.load(str(file)))
+    (line,) = str(error.value).splitlines()
+    assert line.startswith("bad.toml:")
+    assert f" {key}: " in line
+    assert remedy in line
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "number"),
+    [
+        ("seed = 1", "seed = -1", 2),
+        ("dt = 0.01", "dt = 0", 14),
+        ("duration = 1.0", "duration = 1.005", 13),  # the table, for duration and dt do not fit together
+        ("delay_ticks = 3", "delay_ticks = -1", 34),
+        ("at = 0.1", "at = -0.1", 38),
+        ("at = 0.4", "at = -0.4", 44),
+        ("at = 0.5", "at = -0.5", 49),
+    ],
+)
+def test_what_is_wrong_is_named_by_its_line(file, good, bad, number):
+    file.write_text(GOOD.replace(good, bad))
+    with pytest.raises(ScenarioError, match=rf"^bad\.toml:{number}: "):
+        scenario.load(str(file))
+
+
+def test_each_problem_has_its_line(file):
+    file.write_text(GOOD.replace("seed = 1", "seed = -1").replace("dt = 0.01", "dt = 0"))
+    with pytest.raises(ScenarioError) as error:
+        scenario.load(str(file))
+    assert [line.split(":")[:3] for line in str(error.value).splitlines()] == [
+        ["bad.toml", "2", " seed"],
+        ["bad.toml", "14", " time.dt"],
+    ]
+
+
+def test_a_file_that_is_no_toml_is_named_with_the_place(file):
+    file.write_text("seed = 1\ndt 0.01\n")
+    with pytest.raises(ScenarioError, match=r"^bad\.toml: not TOML: .*line 2"):
+        scenario.load(str(file))
+
+
+def test_a_file_that_is_no_text_is_named(file):
+    file.write_bytes(b'description = "\xff"\n')
+    with pytest.raises(ScenarioError, match=r"^bad\.toml: "):
+        scenario.load(str(file))
+
+
+@pytest.mark.parametrize("name", ["nowhere.toml", "coridor"])
+def test_a_scenario_that_does_not_exist_is_refused_with_those_that_are_shipped(name):
+    with pytest.raises(
+        ScenarioError, match=f"^{name}: no such file, and no such scenario; shipped are corridor, hexa, "
+    ):
+        scenario.load(name)
