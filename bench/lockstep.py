@@ -17,22 +17,16 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
-import zenoh
 
 from affinet import plan as planning
 from affinet import scenario
 from affinet.launcher import Launcher
 from affinet.plan import Plan
 from netem import wire
-from netem.keys import Keys
-from netem.session import ENVIRONMENT, HUB, WORLD, Login, agent_name, await_subscribers, client, hub
-
-CHANNELS = ("input", "measurement", "theta")
-FIFO = zenoh.handlers.FifoChannel
+from netem.session import ENVIRONMENT, HUB, WORLD, agent_name
 
 
 def sizes(plan: Plan) -> dict[str, int]:
@@ -63,59 +57,6 @@ def sizes(plan: Plan) -> dict[str, int]:
     return {name: len(data) for name, data in messages.items()} | {"said": len(broadcasts[-1])}
 
 
-def floor(role: str, agents: int, ticks: int, size: dict[str, int], login: Login, users: str) -> None:
-    """One process of the floor."""
-    keys, numbers = Keys("floor"), range(1, agents + 1)
-    if role == HUB:
-        with zenoh.open(hub(login, users, keys, numbers)) as session:
-            sense = session.declare_subscriber(keys.sense, FIFO(64))
-            said = session.declare_subscriber(keys.broadcast("*", "*"), FIFO(4096))
-            inboxes = [session.declare_publisher(keys.inbox(agent)) for agent in numbers]
-            journal = session.declare_publisher(keys.journal)
-            await_subscribers([*inboxes, journal])
-            print("ready", flush=True)
-            for _ in range(ticks):
-                sense.recv().payload.to_bytes()
-                for inbox in inboxes:
-                    inbox.put(b"." * size["seen"])
-                journal.put(b"." * size["journal"])
-                for _ in range(agents * len(CHANNELS)):
-                    said.recv().payload.to_bytes()
-                for inbox in inboxes:
-                    inbox.put(b"." * size["heard"])
-            sys.stdin.readline()
-    elif role == WORLD:
-        with zenoh.open(client(login)) as session:
-            acts = session.declare_subscriber(keys.act("*"), FIFO(4096))
-            journal = session.declare_subscriber(keys.journal, FIFO(64))
-            sense = session.declare_publisher(keys.sense)
-            await_subscribers([sense])
-            print("ready", flush=True)
-            sys.stdin.readline()
-            began = time.perf_counter()
-            for _ in range(ticks):
-                sense.put(b"." * size["sense"])
-                journal.recv().payload.to_bytes()
-                for _ in range(agents):
-                    acts.recv().payload.to_bytes()
-            print((time.perf_counter() - began) / ticks, flush=True)
-    else:
-        with zenoh.open(client(login)) as session:
-            agent = int(role)
-            inbox = session.declare_subscriber(keys.inbox(agent), FIFO(64))
-            said = [session.declare_publisher(keys.broadcast(agent, name)) for name in CHANNELS]
-            act = session.declare_publisher(keys.act(agent))
-            await_subscribers([*said, act])
-            print("ready", flush=True)
-            for _ in range(ticks):
-                inbox.recv().payload.to_bytes()
-                for broadcast in said:
-                    broadcast.put(b"." * size["said"])
-                inbox.recv().payload.to_bytes()
-                act.put(b"." * size["act"])
-            sys.stdin.readline()
-
-
 def floor_tick(plan: Plan, ticks: int) -> float:
     """Seconds of a tick in which nobody computes."""
     agents, size = plan.world.formation.agents, sizes(plan)
@@ -126,22 +67,24 @@ def floor_tick(plan: Plan, ticks: int) -> float:
         users.write_text("".join(f"{name}:{passwords[role]}\n" for role, name in names.items()))
         started = {}
         for role, name in names.items():
-            told = json.dumps([role, agents, ticks, size, [endpoint, name, passwords[role]], str(users)])
-            started[role] = subprocess.Popen(
-                [sys.executable, __file__, "--floor", told],
+            started[role] = process = subprocess.Popen(
+                [sys.executable, str(Path(__file__).with_name("floor.py"))],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
                 env=os.environ | ENVIRONMENT,
             )
+            told = {"role": role, "agents": agents, "ticks": ticks, "size": size, "users": str(users)}
+            process.stdin.write(json.dumps(told | {"login": [endpoint, name, passwords[role]]}) + "\n")
+            process.stdin.flush()
         for process in started.values():
             process.stdout.readline()
-        for process in started.values():
-            process.stdin.write("go\n")
-            process.stdin.flush()
+        for role in [HUB, *(role for role in names if role not in (HUB, WORLD)), WORLD]:
+            started[role].stdin.write("go\n")
+            started[role].stdin.flush()
         tick = float(started[WORLD].stdout.readline())
         for process in started.values():
-            process.communicate(timeout=20)
+            process.communicate("done\n", timeout=20)
     return tick
 
 
@@ -160,12 +103,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ticks", type=int, default=1500)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--floor", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.floor:
-        role, agents, ticks, size, login, users = json.loads(options.floor)
-        floor(role, agents, ticks, size, Login(*login), users)
-        return
     print("| swarm | floor, ms | tick, ms | ratio | x real time | recording | start, s | agent, MB |")
     print("|---|---|---|---|---|---|---|---|")
     for name in ("corridor", "hexa"):
