@@ -38,7 +38,7 @@ class Running:
             stderr=subprocess.PIPE,
             text=True,
         )
-        await_true(lambda: self.recorded() > 150_000, "the run never got going")
+        await_true(lambda: self.recorded() > 100_000, "the run never got going")
         self.children = psutil.Process(self.launcher.pid).children()
         return self
 
