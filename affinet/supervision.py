@@ -201,6 +201,8 @@ class Crew:
             event = json.loads(line)
             if event["event"] == "failed":
                 raise RunFailed(f"{child.name}: {event['reason']}")
+            if event["event"] == "done":  # it has done its part: agents leave while the world still writes
+                child.expected_to_die = True
             child.events.append(event)
 
     def _end_all(self) -> None:

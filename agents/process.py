@@ -162,3 +162,4 @@ def main() -> None:
         supervisor.tell("ready")
         with supervisor.confessing():
             node.run()
+        supervisor.tell("done")

@@ -42,6 +42,7 @@ def main() -> None:
         for sample in inbox:
             message = msgpack.unpackb(sample.payload.to_bytes())
             if message["phase"] == "end":
+                print('{"event": "done"}', flush=True)
                 return
             if message["phase"] == "sense":
                 said = {

@@ -35,6 +35,7 @@ def main() -> None:
             side.put(key, b"a lie", allowed_destination=zenoh.Locality.REMOTE)
             side.delete(key, allowed_destination=zenoh.Locality.REMOTE)
         node.run()
+        supervisor.tell("done")
         heard = set()
         for subscriber in (overheard, *inboxes):
             while (sample := subscriber.try_recv()) is not None:
