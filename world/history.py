@@ -161,8 +161,10 @@ class History:
         }
 
     def save(self, path: Path) -> None:
-        """Write the arrays to a NumPy archive."""
-        np.savez(path, allow_pickle=False, **self.arrays())
+        """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes."""
+        unfinished = path.with_suffix(".unfinished.npz")
+        np.savez(unfinished, allow_pickle=False, **self.arrays())
+        unfinished.replace(path)
 
 
 def load(path: Path) -> Arrays:
