@@ -87,7 +87,7 @@ class Relay:
         self._links = brief.links
         self._medium = Medium(brief.seed, brief.channels, brief.profile, Timeline(brief.links, brief.faults))
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
-        self._in_flight = InFlight()
+        self._in_flight = self._after = InFlight()
         self._said: dict[tuple[int, int, str], bytes] = {}
         self._from_world = Sequences("world")
         self._from_agents = Sequences("agent")
