@@ -31,7 +31,7 @@ bench: $(READY) ## the tick against the floor
 $(READY): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv
 	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
-	$(UV) sync --locked --quiet
+	$(UV) sync --locked --quiet --compile-bytecode
 	touch $@
 
 clean:

@@ -24,7 +24,7 @@ from affinet.outcome import Outcome
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import fly
-from affinet.scenario import ScenarioError
+from affinet.sections import ScenarioError
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 

@@ -16,7 +16,7 @@ from agents.controllers import needs_mission
 from agents.process import AgentBrief
 from netem.process import MediumBrief
 from netem.session import HUB, WORLD, Login, agent_name
-from world.process import WorldBrief
+from world.brief import WorldBrief
 
 # The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
 _MEDIUM_PATIENCE_S, _WORLD_PATIENCE_S, _LAUNCHER_PATIENCE_S = 3.0, 3.3, 3.6
@@ -201,13 +201,5 @@ class Launcher:
             estimator=plan.estimator,
             law=plan.law,
             leader_gain=plan.scenario.agents.leader_gain,
-            brief=replace(
-                whole,
-                nominal=whole.nominal[row],
-                relative=whole.relative[row],
-                present=whole.present[row],
-                stress=whole.stress[row],
-                leader=whole.leader[row],
-                mission=whole.mission if told else None,
-            ),
+            brief=replace(whole.of(row), mission=whole.mission if told else None),
         )

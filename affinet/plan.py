@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from affinet import checks, registry, scenario
+from affinet import checks, registry, sections
 from affinet.checks import Finding
-from affinet.scenario import Scenario, ScenarioError
+from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
 from agents.brief import Brief
 from agents.process import Choice
@@ -129,7 +129,7 @@ def _formation(given: Scenario) -> Formation:
         nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
     else:
         nodes = np.array(section.nodes, dtype=np.float64)
-        edges = tuple(scenario.directed(edge)[0] for edge in section.edges or [])
+        edges = tuple(sections.directed(edge)[0] for edge in section.edges or [])
         leaders = ()
     leaders = leaders if section.leaders is None else tuple(section.leaders)
     for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
@@ -146,7 +146,7 @@ def _world(given: Scenario, formation: Formation) -> World:
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
-        covariance=scenario.covariance(given.sensing, formation.dimension),
+        covariance=sections.covariance(given.sensing, formation.dimension),
         disturbance=given.dynamics.disturbance,
         spread=given.formation.spread,
     )
@@ -165,8 +165,8 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
     theta, offset = [], []
     for number, frame in enumerate(section.keyframes, start=1):
         key = f"manoeuvre.keyframes.{number}"
-        theta.append(scenario.array(f"{key}.theta", frame.theta, square))
-        offset.append(scenario.array(f"{key}.offset", frame.offset, (dimension,)))
+        theta.append(sections.array(f"{key}.theta", frame.theta, square))
+        offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
     return maneuver.keyframes(seconds, [frame.time for frame in section.keyframes], np.array(theta), np.array(offset))
 
 
@@ -190,7 +190,7 @@ def _profile(given: Scenario, links: Links) -> Profile:
     availability = np.full(len(links), given.network.availability)
     delay_ticks = np.full(len(links), given.network.delay_ticks)
     for number, special in enumerate(given.network.links, start=1):
-        for pair in scenario.directed(special.link):
+        for pair in sections.directed(special.link):
             row = _row(links, pair, f"network.links.{number}.link")
             if special.availability is not None:
                 availability[row] = special.availability
@@ -211,19 +211,19 @@ def _faults(given: Scenario, links: Links) -> tuple[Fault, ...]:
     for number, event in enumerate(given.timeline, start=1):
         key = f"timeline.{number}"
         start = _tick(event.at, given.time.dt)
-        if isinstance(event, scenario.Restart):
+        if isinstance(event, sections.Restart):
             _restart(faults, event.agents, start, key)
             continue
-        until = None if isinstance(event, scenario.Kill) or event.until is None else _tick(event.until, given.time.dt)
-        if isinstance(event, scenario.Cut):
-            pairs = tuple(pair for link in event.links for pair in scenario.directed(link))
+        until = None if isinstance(event, sections.Kill) or event.until is None else _tick(event.until, given.time.dt)
+        if isinstance(event, sections.Cut):
+            pairs = tuple(pair for link in event.links for pair in sections.directed(link))
             for pair in pairs:
                 _row(links, pair, f"{key}.links")
             faults.append(Fault(Verb.CUT, start, until, pairs=pairs))
-        elif isinstance(event, scenario.Partition):
+        elif isinstance(event, sections.Partition):
             faults.append(Fault(Verb.PARTITION, start, until, groups=tuple(map(tuple, event.groups))))
         else:
-            verb = Verb.KILL if isinstance(event, scenario.Kill) else Verb.DEPART
+            verb = Verb.KILL if isinstance(event, sections.Kill) else Verb.DEPART
             faults += [Fault(verb, start, until, agents=(agent,)) for agent in event.agents]
         _exists(links, number, faults)
     return tuple(faults)

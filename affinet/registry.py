@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
-from affinet.scenario import ScenarioError
+from affinet.sections import ScenarioError
 from agents.process import Choice
 
 ESTIMATORS = "affinet.estimators"

@@ -14,9 +14,8 @@ from affinet.outcome import Outcome
 from affinet.plan import Plan
 from affinet.rerun_command import mend
 from world import history
+from world.brief import batch_of
 from world.history import Moments
-from world.process import batch_of
-from world.recorder import Recorder
 
 Runtime = Literal["processes", "inprocess"]
 Watch = Callable[[int, float], None]
@@ -67,6 +66,8 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 
 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+    from world.recorder import Recorder  # takes a second to import; over processes only the world needs it
+
     record = plan.scenario.record
     recorder = None
     if record.enabled:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,17 @@ class Brief:
     covariance: Array
     leader: Mask
     mission: Manoeuvre | None
+
+    def of(self, row: int) -> Brief:
+        """One place among those of a batch; the mission goes with it."""
+        return replace(
+            self,
+            nominal=self.nominal[row],
+            relative=self.relative[row],
+            present=self.present[row],
+            stress=self.stress[row],
+            leader=self.leader[row],
+        )
 
     @cached_property
     def degree(self) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 import zenoh
 
 from agents.agent import Agent, AgentState
-from agents.brief import Brief
+from agents.brief import Array, Brief
 from agents.estimators.base import Heard
 from netem import channels, wire
 from netem.keys import Keys
@@ -73,6 +73,10 @@ class Node:
         keys = Keys(brief.run)
         self._inbox = session.declare_subscriber(keys.inbox(self._number), zenoh.handlers.FifoChannel(64))
         self._channels = self._agent.channels()
+        self._silence = {
+            channel: {name: np.zeros(field.shape, dtype=field.dtype).tolist() for name, field in fields.items()}
+            for channel, fields in self._channels.items()
+        }
         spoken = sorted([channels.MEASUREMENT, *self._channels])
         self._broadcasts = {name: session.declare_publisher(keys.broadcast(self._number, name)) for name in spoken}
         self._act = session.declare_publisher(keys.act(self._number))
@@ -134,22 +138,23 @@ class Node:
         return {name: self._heard_on(name, said[name]) for name in self._channels}
 
     def _heard_on(self, channel: str, said: dict[int, Any]) -> Heard:
-        slots = list(said)
-        fresh = np.zeros(self._width, dtype=bool)
-        fresh[slots] = True
-        gathered = {}
-        for name, field in self._channels[channel].items():
-            gathered[name] = rows = np.zeros((self._width, *field.shape), dtype=field.dtype)
-            if slots:
-                try:
-                    rows[slots] = [payload[name] for payload in said.values()]
-                except (KeyError, TypeError, ValueError) as error:
-                    who = [self._neighbours[slot] for slot in slots]
-                    raise wire.WireError(
-                        f"one of agents {who} broadcast a {channel!r} without a field {name!r} of shape {field.shape}: "
-                        f"{error!r} (see docs/protocol.md)"
-                    ) from error
-        return Heard(gathered, fresh)
+        fields = {name: self._rows(channel, name, said) for name in self._channels[channel]}
+        return Heard(fields, np.array([slot in said for slot in range(self._width)]))
+
+    def _rows(self, channel: str, name: str, said: dict[int, Any]) -> Array:
+        field, silence = self._channels[channel][name], self._silence[channel][name]
+        try:
+            rows = [said[slot][name] if slot in said else silence for slot in range(self._width)]
+            gathered: Array = np.array(rows, dtype=field.dtype)
+            if gathered.shape != (self._width, *field.shape):
+                raise ValueError(f"shapes together {gathered.shape[1:]}")
+        except (KeyError, TypeError, ValueError) as error:
+            who = [self._neighbours[slot] for slot in said]
+            raise wire.WireError(
+                f"one of agents {who} broadcast a {channel!r} without a field {name!r} of shape {field.shape}: "
+                f"{error!r} (see docs/protocol.md)"
+            ) from error
+        return gathered
 
 
 def main() -> None:

@@ -107,18 +107,6 @@ def row_of(heard, index):
     return {c: Heard({n: f[index] for n, f in h.fields.items()}, h.fresh[index]) for c, h in heard.items()}
 
 
-def cut(brief, row):
-    """The brief of one agent: as the launcher cuts it."""
-    return replace(
-        brief,
-        nominal=brief.nominal[row],
-        relative=brief.relative[row],
-        present=brief.present[row],
-        stress=brief.stress[row],
-        leader=brief.leader[row],
-    )
-
-
 def fly_together(agent, links, measured, seen, fresh, position):
     """A batch, and what each of its agents heard in every tick."""
     state, ticks = agent.init(fresh.shape[1:-1]), []
@@ -138,7 +126,7 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, di
     measured, seen, fresh, position = draw(everybody, links, 1, ())
     together = fly_together(everybody, links, measured, seen, fresh, position)
     for row in range(links.agents):
-        alone = replace(everybody, brief=cut(brief, row))
+        alone = replace(everybody, brief=brief.of(row))
         state = alone.init(())
         for tick, (all_said, all_heard, all_action, all_state) in enumerate(together):
             state, said = alone.sense(state, measured[tick, row], seen[tick, row])

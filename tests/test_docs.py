@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from flying import digest_of, plan_of
 
-from affinet import scenario
+from affinet import sections
 from affinet.run import fly
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -28,14 +28,14 @@ SECTIONS = ["formation", "manoeuvre", "time", "sensing", "dynamics", "agents", "
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_key_of_a_scenario_is_documented(section):
     text = (DOCS / "scenario.md").read_text()
-    model = scenario.Scenario.model_fields[section].annotation
+    model = sections.Scenario.model_fields[section].annotation
     for key in model.model_fields:
         assert f"`{section}.{key}`" in text
 
 
 def test_every_verb_of_the_timeline_is_documented():
     text = (DOCS / "scenario.md").read_text()
-    for verb, model in scenario.VERBS.items():
+    for verb, model in sections.VERBS.items():
         assert f"| `{verb}` |" in text
         for key in set(model.model_fields) - {"verb"}:
             assert f"`{key}`" in text

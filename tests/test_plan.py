@@ -8,7 +8,7 @@ import pytest
 
 from affinet import plan, scenario, stability
 from affinet.plan import PlanError
-from affinet.scenario import ScenarioError
+from affinet.sections import ScenarioError
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity
 from agents.estimators.base import Estimate, Heard
 from world.formation import PRESETS

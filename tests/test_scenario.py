@@ -2,8 +2,8 @@
 
 import pytest
 
-from affinet import plan, scenario
-from affinet.scenario import ScenarioError
+from affinet import plan, scenario, sections
+from affinet.sections import ScenarioError
 from netem.timeline import Fault, Verb
 
 GOOD = """\
@@ -132,13 +132,13 @@ def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
     [("2->4", [(2, 4)]), ("2-4", [(2, 4), (4, 2)]), ("10->1", [(10, 1)])],
 )
 def test_a_link_is_written_one_way_or_both_ways(link, pairs):
-    assert scenario.directed(link) == pairs
+    assert sections.directed(link) == pairs
 
 
 @pytest.mark.parametrize("link", ["2", "2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", ""])
 def test_what_is_no_link_is_refused_with_the_two_ways_to_write_one(link):
     with pytest.raises(ValueError, match=f"{link!r} is no link; write '2->4' .* or '2-4'"):
-        scenario.directed(link)
+        sections.directed(link)
 
 
 # ---- --set

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -12,51 +11,13 @@ import zenoh
 from netem import wire
 from netem.keys import Keys
 from netem.sequence import Numbering, Sequences
-from netem.session import WORLD, Login, await_subscribers, client
+from netem.session import WORLD, await_subscribers, client
 from netem.supervised import Supervisor, patience
-from netem.timeline import Fault, Timeline
+from netem.timeline import Timeline
+from world.brief import WorldBrief, batch_of
 from world.formation import Array
 from world.history import History, Moment, gather
 from world.recorder import Recorder
-from world.world import World
-
-_LEAST_BATCH = 50
-
-
-@dataclass(frozen=True)
-class WorldBrief:
-    """All the world process is told.
-
-    Parameters
-    ----------
-    run, login
-        Where it connects, and as whom.
-    out
-        The run directory.
-    world, channels, faults
-        What it simulates and records.
-    record_every
-        Ticks from one recorded moment to the next; None records nothing.
-    viewer
-        URL of a viewer to stream to.
-    patience_s
-        How long to wait for the agents before the run is stalled, in seconds.
-    """
-
-    run: str
-    login: Login
-    out: str
-    world: World
-    channels: tuple[str, ...]
-    faults: tuple[Fault, ...]
-    record_every: int | None
-    viewer: str | None
-    patience_s: float
-
-
-def batch_of(every: int) -> int:
-    """How many ticks are written down at once: a multiple of those from one recorded moment to the next."""
-    return _LEAST_BATCH + -_LEAST_BATCH % every
 
 
 class Theatre:

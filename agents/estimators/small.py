@@ -9,6 +9,8 @@ import numpy as np
 
 from agents.brief import Array
 
+_CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
 
 def determinant(matrix: Array) -> Array:
     """Determinants, shape (...), of matrices (..., D, D)."""
@@ -22,7 +24,6 @@ def inverse(matrix: Array) -> Array:
     """Inverses of regular matrices (..., D, D)."""
     if matrix.shape[-1] != 2:
         return np.linalg.inv(matrix).astype(np.float64, copy=False)
-    adjugate = np.empty_like(matrix)
-    adjugate[..., 0, 0], adjugate[..., 1, 1] = matrix[..., 1, 1], matrix[..., 0, 0]
-    adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrix[..., 0, 1], -matrix[..., 1, 0]
-    return adjugate / determinant(matrix)[..., None, None]
+    adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
+    inverted: Array = adjugate / determinant(matrix)[..., None, None]
+    return inverted

@@ -1,0 +1,307 @@
+"""The tables of a scenario file as typed models: an unknown key, a wrong type or an impossible value is an error."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+from affinet.source import Source
+from world.formation import PRESETS
+
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Ticks = Annotated[int, Field(ge=0)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Matrix = list[list[Finite]]
+
+_LINK = re.compile(r"(\d+)(->|-)(\d+)")
+
+
+class ScenarioError(ValueError):
+    """What is wrong in a scenario, a line for each problem: file, key, and what would be right."""
+
+
+def directed(link: str) -> list[tuple[int, int]]:
+    """The directed links (src, dst) that "2->4" (one way) or "2-4" (both ways) names.
+
+    Raises
+    ------
+    ValueError
+        When it is neither.
+    """
+    if not (match := _LINK.fullmatch(link)):
+        raise ValueError(f"{link!r} is no link; write '2->4' for what 4 hears of 2, or '2-4' for both ways")
+    src, arrow, dst = int(match[1]), match[2], int(match[3])
+    return [(src, dst)] if arrow == "->" else [(src, dst), (dst, src)]
+
+
+def _link(link: str) -> str:
+    directed(link)
+    return link
+
+
+def _edge(edge: str) -> str:
+    if "->" in edge:
+        raise ValueError(f"{edge!r}: the edges of a formation have no direction; write {edge.replace('->', '-')!r}")
+    return _link(edge)
+
+
+Link = Annotated[str, AfterValidator(_link)]
+Edge = Annotated[str, AfterValidator(_edge)]
+
+
+class Section(BaseModel):
+    """A table of a scenario."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Formation(Section):
+    """Who flies: a preset, or nodes, edges and leaders. Positions in metres, agents numbered from 1."""
+
+    preset: str | None = None
+    nodes: Matrix | None = None
+    edges: list[Edge] | None = None
+    leaders: list[int] | None = None
+    scale: Positive = 1.0
+    spread: NotNegative = 1.0
+
+    @model_validator(mode="after")
+    def _whole(self) -> Formation:
+        if self.preset is not None:
+            if self.preset not in PRESETS:
+                raise ValueError(f"no preset {self.preset!r}; there are {', '.join(PRESETS)}")
+            if self.nodes is not None or self.edges is not None:
+                raise ValueError("give a preset, or nodes and edges, not both")
+        elif self.nodes is None or self.edges is None or self.leaders is None:
+            raise ValueError("give a preset, or nodes, edges and leaders")
+        elif len({len(node) for node in self.nodes}) != 1 or len(self.nodes[0]) not in (2, 3):
+            raise ValueError("nodes need two coordinates each, or three each")
+        return self
+
+
+class Keyframe(Section):
+    """An affine map at a time: targets are theta p_i + offset, in metres."""
+
+    time: NotNegative
+    theta: Matrix
+    offset: list[Finite]
+
+
+class Manoeuvre(Section):
+    """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
+
+    preset: Literal["hover", "corridor"] | None = None
+    keyframes: list[Keyframe] = []
+
+    @model_validator(mode="after")
+    def _whole(self) -> Manoeuvre:
+        if (self.preset is None) == (not self.keyframes):
+            raise ValueError("give a preset ('hover', 'corridor'), or keyframes")
+        if self.keyframes and len(self.keyframes) < 2:
+            raise ValueError("give at least two keyframes")
+        times = [frame.time for frame in self.keyframes]
+        if any(later <= earlier for earlier, later in pairwise(times)):
+            raise ValueError(f"keyframe times must increase, got {times}")
+        return self
+
+
+class Time(Section):
+    """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick."""
+
+    dt: Positive
+    duration: Positive
+    mode: Literal["lockstep"] = "lockstep"
+    exchange: Literal["same-tick", "next-tick"] = "same-tick"
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks the run has."""
+        return round(self.duration / self.dt)
+
+    @model_validator(mode="after")
+    def _whole(self) -> Time:
+        if abs(self.ticks * self.dt - self.duration) > 1e-6 * self.dt or not self.ticks:
+            raise ValueError(f"duration {self.duration:g} s is not a whole number of ticks of {self.dt:g} s")
+        return self
+
+
+class Sensing(Section):
+    """The relative position sensor: a standard deviation in metres, or a covariance in square metres."""
+
+    sigma: NotNegative | None = None
+    covariance: Matrix | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Sensing:
+        if (self.sigma is None) == (self.covariance is None):
+            raise ValueError("give sigma (m) or covariance (m2)")
+        if self.sigma == 0.0:
+            raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
+        return self
+
+
+class Dynamics(Section):
+    """Single integrators; `disturbance` is the standard deviation of their displacement in a tick, per axis, in metres."""
+
+    model: Literal["single-integrator"] = "single-integrator"
+    disturbance: NotNegative = 0.0
+
+
+class Agents(Section):
+    """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s."""
+
+    estimator: str
+    law: str
+    leader_gain: NotNegative = 1.0
+    parameters: dict[str, dict[str, Any]] = {}
+
+
+class LinkProfile(Section):
+    """A link that differs from the others."""
+
+    link: Link
+    availability: Probability | None = None
+    delay_ticks: Ticks | None = None
+
+
+class Network(Section):
+    """The air: availability is the probability that a message gets through; delay is one way, in ticks.
+
+    `coupled` is Assumption 1 of paper 000: one verdict per directed link and tick for sensing and communication.
+    """
+
+    availability: Probability = 1.0
+    delay_ticks: Ticks = 0
+    coupled: bool = True
+    links: list[LinkProfile] = []
+
+
+class Lasting(Section):
+    """A fault with a beginning and, unless it lasts, an end; simulated seconds."""
+
+    at: NotNegative
+    until: Positive | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Lasting:
+        if self.until is not None and self.until <= self.at:
+            raise ValueError(f"ends at {self.until:g} s, but begins at {self.at:g} s; until must be later")
+        return self
+
+
+class Cut(Lasting):
+    """Links that carry nothing."""
+
+    verb: Literal["cut"]
+    links: Annotated[list[Link], Field(min_length=1)]
+
+
+class Partition(Lasting):
+    """Groups between which nothing passes."""
+
+    verb: Literal["partition"]
+    groups: Annotated[list[list[int]], Field(min_length=2)]
+
+
+class Depart(Lasting):
+    """Agents that leave the formation, and rejoin at the end; their bodies hold."""
+
+    verb: Literal["depart"]
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+class Kill(Section):
+    """Agents whose processes are killed (SIGKILL)."""
+
+    verb: Literal["kill"]
+    at: NotNegative
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+class Restart(Section):
+    """Killed agents that come back as fresh processes, knowing nothing."""
+
+    verb: Literal["restart"]
+    at: NotNegative
+    agents: Annotated[list[int], Field(min_length=1)]
+
+
+Event = Annotated[Cut | Partition | Depart | Kill | Restart, Field(discriminator="verb")]
+
+
+VERBS: dict[str, type[Section]] = {
+    "cut": Cut,
+    "partition": Partition,
+    "depart": Depart,
+    "kill": Kill,
+    "restart": Restart,
+}
+
+
+class Record(Section):
+    """The Rerun recording: one moment every so many ticks."""
+
+    enabled: bool = True
+    every: Annotated[int, Field(ge=1)] = 5
+
+
+class Scenario(Section):
+    """A whole scenario."""
+
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = 1
+    formation: Formation
+    manoeuvre: Manoeuvre
+    time: Time
+    sensing: Sensing
+    dynamics: Dynamics = Dynamics()
+    agents: Agents
+    network: Network = Network()
+    timeline: list[Event] = []
+    record: Record = Record()
+    _source: Source | None = PrivateAttr(default=None)
+
+    def locate(self, error: ScenarioError) -> ScenarioError:
+        """The same error, whose text begins with a key, with the place where that key was given."""
+        key = str(error).partition(":")[0]
+        return ScenarioError(f"{self._source.place(key)}: {error}") if self._source else error
+
+
+def covariance(sensing: Sensing, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """R of one relative measurement, shape (D, D), in square metres.
+
+    Raises
+    ------
+    ScenarioError
+        When it is no covariance of this dimension.
+    """
+    if sensing.covariance is None:
+        return float(sensing.sigma or 0.0) ** 2 * np.eye(dimension)
+    matrix = array("sensing.covariance", sensing.covariance, (dimension, dimension))
+    if (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
+        raise ScenarioError("sensing.covariance: must be symmetric and positive definite, in m2")
+    return matrix
+
+
+def array(key: str, rows: Sequence[Any], shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Nested lists as an array of this shape.
+
+    Raises
+    ------
+    ScenarioError
+        When they have another.
+    """
+    try:
+        values = np.array(rows, dtype=np.float64)
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != shape:
+        raise ScenarioError(f"{key}: must be {' x '.join(map(str, shape))} numbers")
+    return values

@@ -1,0 +1,45 @@
+"""Where a scenario came from, and where in it a key was given."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scenario came from: the file, its text, and the overrides."""
+
+    file: str
+    text: str
+    overrides: tuple[str, ...]
+
+    def place(self, key: str) -> str:
+        """Where a key was given: --set, or the file with the line of the key."""
+        given = [override.partition("=")[0].strip() for override in self.overrides]
+        if any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given):
+            return "--set"
+        steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
+        line = _line_of(self.text, steps)
+        return f"{self.file}:{line}" if line else self.file
+
+
+def _line_of(text: str, steps: Sequence[str | int]) -> int | None:
+    """The line of a key in the file: a look for its table's header, then for the key below it."""
+    names = [str(step) for step in steps if isinstance(step, str)]
+    number = next((step for step in steps if isinstance(step, int)), 0)
+    lines = text.splitlines()
+    for depth in range(len(names), -1, -1):
+        header = ".".join(names[:depth])
+        heads = [n for n, line in enumerate(lines) if header and line.strip() in (f"[{header}]", f"[[{header}]]")]
+        start = heads[min(number, len(heads) - 1)] if heads else (-1 if not header else None)
+        if start is None:
+            continue
+        for n in range(start + 1, len(lines)):
+            if lines[n].startswith("["):
+                break
+            if depth < len(names) and re.match(rf"\s*{re.escape(names[depth])}\s*=", lines[n]):
+                return n + 1
+        return start + 1 if start >= 0 else None
+    return None
