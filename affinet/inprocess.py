@@ -16,8 +16,12 @@ from agents.agent import Action, AgentState, renew
 from agents.estimators.base import Fields, Heard
 from analysis.affine import Array
 from netem import channels
+from netem.air import Delivery, Verdicts, out_of_the_ordinary
+from netem.corrupt import Mark, Marks, corrupted_fields
+from netem.fate import Fate
 from netem.links import Integers, Mask
-from netem.medium import Delivery, Fate, Fates, InFlight, Medium
+from netem.medium import Medium
+from netem.plain import to_plain
 from world.history import History, Moment, Moments, gather
 
 Broadcasts = Mapping[str, Fields]
@@ -31,10 +35,15 @@ class Swarm:
         self._links = plan.world.links
         self._agents = plan.agents
         self._fields = self._agents.channels()
-        self._medium = Medium(plan.scenario.seed, plan.channels, plan.profile, plan.timeline)
+        self._medium = Medium(plan.scenario.seed, plan.channels, plan.profile, plan.timeline, plan.recorded())
         self._said: dict[int, Broadcasts] = {}
-        self.in_flight = InFlight()
+        self._air = self._medium.begin()
         self.history = History(plan.world, len(plan.channels))
+
+    @property
+    def in_flight(self) -> int:
+        """Messages under way."""
+        return self._air.in_flight
 
     def fly(self, watch: Callable[[Moments], None], batch: int) -> None:
         """All ticks; `watch` sees them, a batch at a time."""
@@ -59,39 +68,55 @@ class Swarm:
     def _tick(self, tick: int, position: Array, state: AgentState) -> tuple[AgentState, Moment]:
         world, links = self._plan.world, self._links
         alive = ~self._medium.timeline.at(tick).dead
-        fates = self._medium.judge(tick, self._offered(alive))
-        seen = (fates[0] == Fate.DELIVERED)[links.slots] & links.present
+        air, verdicts = self._medium.judge(self._air, tick, self._offered(alive), position)
+        seen = (verdicts.fate[0] == Fate.DELIVERED)[links.slots] & links.present
         measured = np.where(seen[..., None], world.measure(tick, position)[links.slots], 0.0)
         state, self._said[tick] = self._agents.sense(state, measured, seen)
-        self.in_flight, delivery = self._medium.deliver(tick, self.in_flight, fates)
-        heard = {name: self._hear(name, delivery.sent[self._plan.channels.index(name)]) for name in self._fields}
+        self._air, delivery = self._medium.deliver(air, tick, verdicts)
+        heard = {name: self._hear(name, delivery) for name in self._fields}
         state, action = self._agents.act(state, tick, heard, position)
         self._forget(tick)
-        return state, self._moment(position, alive, action, fates, delivery)
+        return state, self._moment(tick, position, alive, action, verdicts, delivery)
 
     def _offered(self, alive: Mask) -> Mask:
         speaks = alive[self._links.src - 1]
         return np.stack([speaks | (name == channels.SENSE) for name in self._plan.channels])
 
-    def _hear(self, channel: str, sent: Integers) -> Heard:
-        sent_to_slot = np.where(self._links.present, sent[self._links.slots], -1)
-        fresh = sent_to_slot >= 0
-        gathered = {name: self._gather(channel, name, sent_to_slot, fresh) for name in self._fields[channel]}
-        return Heard(gathered, fresh)
+    def _hear(self, channel: str, delivery: Delivery) -> Heard:
+        row, links = self._plan.channels.index(channel), self._links
+        content = np.where(links.present, delivery.newest[row, links.slots], -1)
+        fresh = content >= 0
+        gathered = {name: self._gather(channel, name, content, fresh) for name in self._fields[channel]}
+        mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
+        return Heard(self._corrupt(gathered, row, content, mark) if mark.any() else gathered, fresh)
 
-    def _gather(self, channel: str, field: str, sent: Integers, fresh: Mask) -> Any:
+    def _gather(self, channel: str, field: str, content: Integers, fresh: Mask) -> Any:
         gathered = np.zeros(0)
-        for number, tick in enumerate(np.unique(sent[fresh]).tolist() or [max(self._said)]):
+        for number, tick in enumerate(np.unique(content[fresh]).tolist() or [max(self._said)]):
             values = self._said[tick][channel][field][self._links.neighbours]
-            chosen = (sent == tick).reshape(sent.shape + (1,) * (values.ndim - sent.ndim))
+            chosen = (content == tick).reshape(content.shape + (1,) * (values.ndim - content.ndim))
             gathered = np.where(chosen, values, np.zeros_like(values) if number == 0 else gathered)
         return gathered
 
+    def _corrupt(self, fields: dict[str, Any], row: int, content: Integers, mark: Marks) -> dict[str, Any]:
+        struck = np.nonzero(mark > Mark.STALE)
+        link = self._links.slots[struck]
+        draw = self._medium.bit_draws(content[struck], np.full(link.shape, row), link)
+        whole = {name: field[struck] for name, field in fields.items()}
+        wrong = corrupted_fields(whole, mark[struck], self._medium.profile.bias[link], draw)
+        arriving = {name: field.copy() for name, field in fields.items()}
+        for name, field in wrong.items():
+            arriving[name][struck] = field
+        return arriving
+
     def _forget(self, tick: int) -> None:
-        oldest = int(self.in_flight.rows[:, 1].min(initial=tick + 1))
+        """Drop what nobody will hear any more; a stale message says what was said the tick before it was sent."""
+        oldest = self._air.oldest_sent(tick) - 1
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
 
-    def _moment(self, position: Array, alive: Mask, action: Action, fates: Fates, delivery: Delivery) -> Moment:
+    def _moment(
+        self, tick: int, position: Array, alive: Mask, action: Action, verdicts: Verdicts, delivery: Delivery
+    ) -> Moment:
         estimate = action.estimate
         real = self._links.present & alive[:, None]
         return Moment(
@@ -100,7 +125,11 @@ class Swarm:
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,
             psi=np.where(alive, estimate.psi, np.nan),
-            fates=fates,
-            late=len(delivery.late),
+            fates=verdicts.fate,
+            odd=out_of_the_ordinary(tick, verdicts),
+            apart=delivery.apart,
+            late=delivery.late,
             dropped=delivery.dropped,
+            released=delivery.released,
+            injected=to_plain(list(self._plan.injected)) if tick == 0 and self._plan.injected else None,
         )

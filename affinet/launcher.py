@@ -10,12 +10,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from affinet.inject import Access
 from affinet.plan import Plan
 from affinet.supervision import Child, Crew, RunFailed, module
 from agents.controllers import needs_mission
 from agents.process import AgentBrief
 from netem.process import MediumBrief
-from netem.session import HUB, WORLD, Login, agent_name
+from netem.session import CONTROL, HUB, WORLD, Login, agent_name
 from world.brief import WorldBrief
 
 # The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
@@ -92,7 +93,8 @@ class Launcher:
             try:
                 with crew:
                     self._start(crew, Path(private))
-                    self._fly(crew, launched)
+                    with Access(self._run, self._logins[CONTROL]).granted(self._out):
+                        self._fly(crew, launched)
             except RunFailed as failure:
                 self.flight.failure = str(failure)
         self.flight.processes = [child.report() for child in crew.children]
@@ -108,7 +110,7 @@ class Launcher:
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
         endpoint = f"unixsock-stream/{private}/z.sock"
-        names = [HUB, WORLD, *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1))]
+        names = [HUB, WORLD, CONTROL, *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1))]
         logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
         users = private / "users"
         users.touch(mode=0o600)
@@ -170,7 +172,9 @@ class Launcher:
             world=self._plan.world,
             channels=self._plan.channels,
             faults=self._plan.faults,
-            record_every=record.every if record.enabled else None,
+            every=record.every,
+            window=self._plan.window,
+            record=record.enabled,
             viewer=self._viewer,
             patience_s=_WORLD_PATIENCE_S,
         )
@@ -185,6 +189,8 @@ class Launcher:
             channels=self._plan.channels,
             profile=self._plan.profile,
             faults=self._plan.faults,
+            injected=self._plan.injected,
+            recorded=None if self._plan.journal is None else str(self._plan.journal),
             leaders=self._plan.world.formation.is_leader,
             patience_s=_MEDIUM_PATIENCE_S,
         )

@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from affinet import scenario
 from affinet.plan import Plan
-from netem.medium import Ledger
+from netem.fate import Ledger
 from world.history import Arrays, bites, digest
 
 Verdict = Literal["pass", "fail", "vacuous"]
@@ -115,24 +116,26 @@ def prepare(plan: Plan, out: Path) -> None:
     FileExistsError
         When it holds a run already.
     """
-    if (out / "scenario.json").exists():
+    if (out / scenario.FILE).exists():
         raise FileExistsError(f"{out} holds a run already; name another directory with --out")
     out.mkdir(parents=True, exist_ok=True)
-    (out / "scenario.json").write_text(plan.scenario.model_dump_json(indent=2) + "\n")
+    (out / scenario.FILE).write_text(plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:
     if arrays is None:
         return {
             "offered": 0,
+            "copies": 0,
             "delivered": 0,
             "dropped": {},
             "in_flight": in_flight,
             "uninstructed": uninstructed,
         }
-    ledger = Ledger.of(arrays["fates"], arrays["late"], arrays["dropped"])
+    ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
     return {
         "offered": ledger.offered,
+        "copies": ledger.copies,
         "delivered": ledger.delivered,
         "dropped": ledger.dropped,
         "in_flight": ledger.outstanding if in_flight is None else in_flight,
@@ -143,7 +146,7 @@ def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | 
 def _faults(plan: Plan, arrays: Arrays | None) -> list[dict[str, Any]]:
     if arrays is None:
         return []
-    counted = zip(plan.faults, bites(plan.timeline, arrays["fates"]), strict=True)
+    counted = zip(plan.timeline.faults, bites(plan.timeline, arrays["fates"]), strict=True)
     return [
         {"fault": fault.describe(), "at": fault.start * plan.world.dt, "messages": messages}
         for fault, messages in counted
@@ -158,8 +161,9 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
     if messages["uninstructed"]:
         wrong.append(f"{messages['uninstructed']} messages were lost that nobody ordered")
     booked = messages["delivered"] + sum(messages["dropped"].values()) + (messages["in_flight"] or 0)
-    if messages["offered"] != booked:
-        wrong.append(f"the accounts do not close: {messages['offered']} messages offered, {booked} accounted for")
+    if messages["offered"] + messages["copies"] != booked:
+        offered = f"{messages['offered']} messages offered and {messages['copies']} doubled"
+        wrong.append(f"the accounts do not close: {offered}, {booked} accounted for")
     return wrong
 
 

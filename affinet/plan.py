@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from affinet import checks, registry, sections
+from affinet import air, checks, registry, scenario, sections, selectors
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
@@ -16,8 +18,9 @@ from agents.process import Choice
 from analysis.affine import Array, Manoeuvre
 from netem import channels
 from netem.links import Links
+from netem.medium import Verdicted
 from netem.profile import Profile
-from netem.timeline import Fault, Timeline, Verb
+from netem.timeline import Fault, Timeline, UnderWay, Verb
 from world import maneuver, stress
 from world.formation import PRESETS, Formation
 from world.world import World
@@ -45,6 +48,10 @@ class Plan:
         What the agents are made of; the brief's arrays begin with the agents.
     findings
         What was checked.
+    journal
+        That of an earlier run, when its verdicts are to be this run's.
+    injected
+        Faults that the scenario does not script: an earlier run was given them while it flew.
     """
 
     scenario: Scenario
@@ -56,11 +63,30 @@ class Plan:
     estimator: Choice
     law: Choice
     findings: tuple[Finding, ...]
+    journal: Path | None = None
+    injected: tuple[Fault, ...] = ()
+
+    def facing(self, injected: Sequence[Fault]) -> Plan:
+        """The plan with faults that an earlier run was given while it flew."""
+        return replace(self, injected=tuple(injected))
+
+    def recorded(self) -> Verdicted | None:
+        """The verdicts of the earlier run that is to be judge of this one."""
+        if self.journal is None:
+            return None
+        from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
+
+        return journal.Recorded(journal.read(self.journal), self.world.links, self.channels)
+
+    @property
+    def window(self) -> int:
+        """Ticks over which links count as working together in the realised graph."""
+        return max(1, _tick(self.scenario.record.window, self.world.dt))
 
     @property
     def timeline(self) -> Timeline:
-        """The scripted faults over the links."""
-        return Timeline(self.world.links, self.faults)
+        """All faults over the links."""
+        return Timeline(self.world.links, (*self.faults, *self.injected))
 
     @property
     def agents(self) -> Agent:
@@ -68,8 +94,17 @@ class Plan:
         return Agent(self.brief, self.estimator.build(), self.law.build(), self.scenario.agents.leader_gain)
 
 
-def make(given: Scenario) -> Plan:
+def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | None = None) -> Plan:
     """The plan of a scenario.
+
+    Parameters
+    ----------
+    given
+        The scenario.
+    injected
+        Faults that an earlier run was given while it flew.
+    journal
+        That of an earlier run, whose verdicts are to be this run's.
 
     Raises
     ------
@@ -79,14 +114,48 @@ def make(given: Scenario) -> Plan:
         When it cannot fly.
     """
     try:
-        return _make(given)
+        return replace(_make(given), journal=journal).facing(injected)
     except ScenarioError as error:
         raise given.locate(error) from error
 
 
+def again(out: Path, overrides: Sequence[str], *, verdicts: bool) -> Plan:
+    """The plan of a run directory, with the faults that were injected while it flew.
+
+    Parameters
+    ----------
+    out
+        The run directory.
+    overrides
+        Changes to its scenario.
+    verdicts
+        Whether its journal is to be judge, in place of the models.
+
+    Raises
+    ------
+    ScenarioError
+        When it holds no run, or no journal.
+    """
+    from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
+
+    file = (out / journal.FILE).resolve()
+    try:
+        table = journal.read(file)
+        plan = make(
+            scenario.resolved(out, overrides),
+            injected=journal.injected(table),
+            journal=file if verdicts else None,
+        )
+        if verdicts:
+            journal.check(table, plan.channels, plan.world.ticks)
+    except journal.JournalError as error:
+        raise ScenarioError(f"{out}: {error}") from error
+    return plan
+
+
 def _make(given: Scenario) -> Plan:
     registry.check_names("agents.parameters", given.agents.parameters)
-    formation = _formation(given)
+    formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
     findings = checks.framework(formation)
@@ -102,19 +171,23 @@ def _make(given: Scenario) -> Plan:
         raise PlanError(findings)
     world = _world(given, formation)
     brief = _brief(world, L)
-    faults = _faults(given, world.links)
+    faults = _faults(given, formation, world.links)
     batch = Agent(brief, estimator.build(), law.build(), given.agents.leader_gain)
-    spoken = sorted(map(channels.check, [channels.MEASUREMENT, *batch.channels()]))
+    spoken = batch.channels()
+    names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
+    profile, aired = air.plan(
+        given, formation, world.links, air.message_bits(names, spoken, world.links, brief.dimension)
+    )
     return Plan(
         scenario=given,
         world=world,
-        profile=_profile(given, world.links),
+        profile=profile,
         faults=faults,
-        channels=(channels.SENSE, *spoken),
+        channels=names,
         brief=brief,
         estimator=estimator,
         law=law,
-        findings=tuple(findings) + tuple(checks.timeline(faults, given.time.ticks, given.time.dt)),
+        findings=(*findings, *aired, *checks.timeline(faults, given.time.ticks, given.time.dt)),
     )
 
 
@@ -122,14 +195,21 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
     return registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
 
 
-def _formation(given: Scenario) -> Formation:
+def formation_of(given: Scenario) -> Formation:
+    """Who flies.
+
+    Raises
+    ------
+    ScenarioError
+        When an edge or a leader is nobody.
+    """
     section = given.formation
     if section.preset:
         preset = PRESETS[section.preset]
         nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
     else:
         nodes = np.array(section.nodes, dtype=np.float64)
-        edges = tuple(sections.directed(edge)[0] for edge in section.edges or [])
+        edges = tuple(selectors.edge(edge) for edge in section.edges or [])
         leaders = ()
     leaders = leaders if section.leaders is None else tuple(section.leaders)
     for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
@@ -186,54 +266,35 @@ def _brief(world: World, L: Array) -> Brief:
     )
 
 
-def _profile(given: Scenario, links: Links) -> Profile:
-    availability = np.full(len(links), given.network.availability)
-    delay_ticks = np.full(len(links), given.network.delay_ticks)
-    for number, special in enumerate(given.network.links, start=1):
-        for pair in sections.directed(special.link):
-            row = _row(links, pair, f"network.links.{number}.link")
-            if special.availability is not None:
-                availability[row] = special.availability
-            if special.delay_ticks is not None:
-                delay_ticks[row] = special.delay_ticks
-    least = 1 if given.time.exchange == "next-tick" else 0
-    return Profile(availability, delay_ticks, given.network.coupled, least)
-
-
-def _row(links: Links, pair: tuple[int, int], key: str) -> int:
-    if pair not in links.index:
-        raise ScenarioError(f"{key}: {pair[0]}->{pair[1]} is not a link of the formation")
-    return links.index[pair]
-
-
-def _faults(given: Scenario, links: Links) -> tuple[Fault, ...]:
+def _faults(given: Scenario, formation: Formation, links: Links) -> tuple[Fault, ...]:
     faults: list[Fault] = []
     for number, event in enumerate(given.timeline, start=1):
-        key = f"timeline.{number}"
         start = _tick(event.at, given.time.dt)
         if isinstance(event, sections.Restart):
-            _restart(faults, event.agents, start, key)
+            _restart(faults, event.agents, start, f"timeline.{number}")
             continue
         until = None if isinstance(event, sections.Kill) or event.until is None else _tick(event.until, given.time.dt)
-        if isinstance(event, sections.Cut):
-            pairs = tuple(pair for link in event.links for pair in sections.directed(link))
-            for pair in pairs:
-                _row(links, pair, f"{key}.links")
-            faults.append(Fault(Verb.CUT, start, until, pairs=pairs))
-        elif isinstance(event, sections.Partition):
-            faults.append(Fault(Verb.PARTITION, start, until, groups=tuple(map(tuple, event.groups))))
-        else:
-            verb = Verb.KILL if isinstance(event, sections.Kill) else Verb.DEPART
-            faults += [Fault(verb, start, until, agents=(agent,)) for agent in event.agents]
-        _exists(links, number, faults)
+        try:
+            faults += _of_event(event, start, until, formation, links)
+            Timeline(links, faults)
+        except ValueError as error:
+            raise ScenarioError(f"timeline.{number}: {error}") from error
     return tuple(faults)
 
 
-def _exists(links: Links, number: int, faults: Sequence[Fault]) -> None:
-    try:
-        Timeline(links, faults)
-    except ValueError as error:
-        raise ScenarioError(f"timeline.{number}: {error}") from error
+def _of_event(event: Any, start: int, until: int | None, formation: Formation, links: Links) -> list[Fault]:
+    match event:
+        case sections.Cut():
+            pairs = selectors.pairs(event.links, formation, links)
+            return [Fault(Verb.CUT, start, until, pairs=pairs, under_way=UnderWay(event.in_flight))]
+        case sections.Lose():
+            pairs = selectors.pairs(event.links, formation, links)
+            return [Fault(Verb.LOSE, start, until, pairs=pairs, loss=event.loss)]
+        case sections.Partition():
+            groups = tuple(map(tuple, event.groups))
+            return [Fault(Verb.PARTITION, start, until, groups=groups, under_way=UnderWay(event.in_flight))]
+    verb = Verb.KILL if isinstance(event, sections.Kill) else Verb.DEPART
+    return [Fault(verb, start, until, agents=(agent,)) for agent in event.agents]
 
 
 def _restart(faults: list[Fault], agents: Sequence[int], tick: int, key: str) -> None:

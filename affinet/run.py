@@ -49,12 +49,14 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
 
 
 def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+    from netem import journal  # pyarrow takes a while to import, and the start should not wait for it
+
     flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
-    path, recording = out / "arrays.npz", out / "run.rrd"
+    path, recording, book = out / "arrays.npz", out / "run.rrd", out / journal.FILE
     if flight.failure and not path.exists() and recording.exists():
         mend(recording)  # the world was killed, or never got far: it could not close its recording
     return outcome.judge(
-        plan,
+        plan.facing(journal.injected(journal.read(book))) if book.exists() else plan,
         history.load(path) if path.exists() else None,
         in_flight=flight.in_flight,
         uninstructed=flight.uninstructed,
@@ -66,39 +68,33 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 
 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
-    from world.recorder import Recorder  # takes a second to import; over processes only the world needs it
+    from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
     record = plan.scenario.record
-    recorder = None
-    if record.enabled:
-        recorder = Recorder(
-            out / "run.rrd",
-            run=out.name,
-            formation=plan.world.formation,
-            timeline=plan.timeline,
-            dt=plan.world.dt,
-            every=record.every,
-            viewer=viewer,
-        )
     swarm = Swarm(plan)
-
-    def see(moments: Moments) -> None:
-        if recorder:
-            recorder.record(moments)
-        watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
-
     started = time.perf_counter()
-    try:
+    with Logbook(
+        out,
+        out.name,
+        plan.world,
+        plan.channels,
+        every=record.every,
+        window=plan.window,
+        record=record.enabled,
+        viewer=viewer,
+    ) as logbook:
+
+        def see(moments: Moments) -> None:
+            logbook.write(moments, plan.timeline)
+            watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+
         swarm.fly(see, batch_of(record.every))
-    finally:
-        if recorder:
-            recorder.close()
     wall_s = time.perf_counter() - started
     swarm.history.save(out / "arrays.npz")
     return outcome.judge(
         plan,
         swarm.history.arrays(),
-        in_flight=len(swarm.in_flight),
+        in_flight=swarm.in_flight,
         uninstructed=0,
         failure=None,
         wall_s=wall_s,

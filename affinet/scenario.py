@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -13,8 +14,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from affinet import sections
-from affinet.sections import Scenario, ScenarioError, Section
+from affinet.impairments import Section
+from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
+
+FILE = "scenario.json"  # in a run directory, as resolved
 
 
 def shipped() -> list[str]:
@@ -46,11 +50,30 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path.name}: not TOML: {error}") from error
-    for override in overrides:
-        _override(raw, override)
-    source = Source(path.name, text, tuple(overrides))
+    return _validated(raw, Source(path.name, text, tuple(overrides)))
+
+
+def resolved(out: Path, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario of a run directory, as it was flown, with overrides applied.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none, or it cannot be read any more.
+    """
+    file = out / FILE
     try:
-        scenario = sections.Scenario.model_validate(raw)
+        raw = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"{out}: no run directory: {error}") from error
+    return _validated(raw, Source(str(file), "", tuple(overrides)))
+
+
+def _validated(raw: dict[str, Any], source: Source) -> Scenario:
+    for override in source.overrides:
+        _override(raw, override)
+    try:
+        scenario = Scenario.model_validate(raw)
     except ValidationError as error:
         raise ScenarioError("\n".join(_explain(source, problem) for problem in error.errors())) from error
     scenario._source = source

@@ -2,64 +2,34 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
+from affinet.impairments import LinkProfile, NotNegative, Positive, Probability, Section
+from affinet.selectors import check, edge
 from affinet.source import Source
 from world.formation import PRESETS
 
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Ticks = Annotated[int, Field(ge=0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = list[list[Finite]]
-
-_LINK = re.compile(r"(\d+)(->|-)(\d+)")
 
 
 class ScenarioError(ValueError):
     """What is wrong in a scenario, a line for each problem: file, key, and what would be right."""
 
 
-def directed(link: str) -> list[tuple[int, int]]:
-    """The directed links (src, dst) that "2->4" (one way) or "2-4" (both ways) names.
-
-    Raises
-    ------
-    ValueError
-        When it is neither.
-    """
-    if not (match := _LINK.fullmatch(link)):
-        raise ValueError(f"{link!r} is no link; write '2->4' for what 4 hears of 2, or '2-4' for both ways")
-    src, arrow, dst = int(match[1]), match[2], int(match[3])
-    return [(src, dst)] if arrow == "->" else [(src, dst), (dst, src)]
+def _edge(text: str) -> str:
+    edge(text)
+    return text
 
 
-def _link(link: str) -> str:
-    directed(link)
-    return link
-
-
-def _edge(edge: str) -> str:
-    if "->" in edge:
-        raise ValueError(f"{edge!r}: the edges of a formation have no direction; write {edge.replace('->', '-')!r}")
-    return _link(edge)
-
-
-Link = Annotated[str, AfterValidator(_link)]
+Links = Annotated[str, AfterValidator(check)]
 Edge = Annotated[str, AfterValidator(_edge)]
-
-
-class Section(BaseModel):
-    """A table of a scenario."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Formation(Section):
@@ -98,7 +68,7 @@ class Manoeuvre(Section):
     """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
 
     preset: Literal["hover", "corridor"] | None = None
-    keyframes: list[Keyframe] = []
+    keyframes: list[Keyframe] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _whole(self) -> Manoeuvre:
@@ -160,19 +130,31 @@ class Agents(Section):
     estimator: str
     law: str
     leader_gain: NotNegative = 1.0
-    parameters: dict[str, dict[str, Any]] = {}
+    parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 
-class LinkProfile(Section):
-    """A link that differs from the others."""
+class LinkSetting(Section):
+    """Links that differ from the others, in all channels or in those of one class."""
 
-    link: Link
+    links: Links
+    channels: Literal["sensing", "comms"] | None = None
+    profile: str | None = None
     availability: Probability | None = None
     delay_ticks: Ticks | None = None
 
 
+class JammedZone(Section):
+    """A disk (ball) in which nobody hears anything in a `share` of all ticks, all at once; metres."""
+
+    centre: list[Finite]
+    radius: Positive
+    share: Probability = 1.0
+    links: Links = "all"
+    channels: Literal["sensing", "comms"] | None = None
+
+
 class Network(Section):
-    """The air: availability is the probability that a message gets through; delay is one way, in ticks.
+    """The air: a named profile, on top of an availability (probability that a message passes) and a delay in ticks, one way.
 
     `coupled` is Assumption 1 of paper 000: one verdict per directed link and tick for sensing and communication.
     """
@@ -180,7 +162,19 @@ class Network(Section):
     availability: Probability = 1.0
     delay_ticks: Ticks = 0
     coupled: bool = True
-    links: list[LinkProfile] = []
+    profile: str = "perfect"
+    profiles: dict[str, LinkProfile] = Field(default_factory=dict)
+    links: list[LinkSetting] = Field(default_factory=list)
+    zones: list[JammedZone] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _apart(self) -> Network:
+        if self.coupled and any(setting.channels for setting in self.links):
+            raise ValueError("links set channels apart, but coupled = true gives sensing and comms one verdict")
+        return self
+
+
+InFlight = Literal["drop", "deliver", "hold"]
 
 
 class Lasting(Section):
@@ -197,10 +191,11 @@ class Lasting(Section):
 
 
 class Cut(Lasting):
-    """Links that carry nothing."""
+    """Links that carry nothing; `in_flight` says what becomes of the messages under way on them."""
 
     verb: Literal["cut"]
-    links: Annotated[list[Link], Field(min_length=1)]
+    links: Annotated[list[Links], Field(min_length=1)]
+    in_flight: InFlight = "drop"
 
 
 class Partition(Lasting):
@@ -208,6 +203,15 @@ class Partition(Lasting):
 
     verb: Literal["partition"]
     groups: Annotated[list[list[int]], Field(min_length=2)]
+    in_flight: InFlight = "drop"
+
+
+class Lose(Lasting):
+    """Links that lose messages with a probability, on top of what else they lose."""
+
+    verb: Literal["lose"]
+    links: Annotated[list[Links], Field(min_length=1)]
+    loss: Probability
 
 
 class Depart(Lasting):
@@ -233,12 +237,13 @@ class Restart(Section):
     agents: Annotated[list[int], Field(min_length=1)]
 
 
-Event = Annotated[Cut | Partition | Depart | Kill | Restart, Field(discriminator="verb")]
+Event = Annotated[Cut | Partition | Lose | Depart | Kill | Restart, Field(discriminator="verb")]
 
 
 VERBS: dict[str, type[Section]] = {
     "cut": Cut,
     "partition": Partition,
+    "lose": Lose,
     "depart": Depart,
     "kill": Kill,
     "restart": Restart,
@@ -246,10 +251,11 @@ VERBS: dict[str, type[Section]] = {
 
 
 class Record(Section):
-    """The Rerun recording: one moment every so many ticks."""
+    """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
     enabled: bool = True
     every: Annotated[int, Field(ge=1)] = 5
+    window: Positive = 1.0
 
 
 class Scenario(Section):
@@ -264,7 +270,7 @@ class Scenario(Section):
     dynamics: Dynamics = Dynamics()
     agents: Agents
     network: Network = Network()
-    timeline: list[Event] = []
+    timeline: list[Event] = Field(default_factory=list)
     record: Record = Record()
     _source: Source | None = PrivateAttr(default=None)
 

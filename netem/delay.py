@@ -1,27 +1,111 @@
-"""Constant delay in whole ticks."""
+"""Delays: how long a message takes, one way, as a quantile function of a uniform draw, with its mean.
+
+Delays are seconds until the tick they end in is computed: a message offered in tick k with delay d arrives in the first
+exchange at or after k dt + d. Correlation is that of an underlying Gaussian sequence (a copula), so the stated distribution
+holds exactly.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import StrEnum
+
 import numpy as np
-from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from netem.draws import Array
+from netem.links import Integers
+
+# A delay of exactly three ticks must not become four by rounding.
+_SLACK = 1e-9
 
 
-def due(tick: int, delay_ticks: NDArray[np.int64], least: int) -> NDArray[np.int64]:
-    """The tick in whose exchange a message offered in `tick` arrives.
+class Law(StrEnum):
+    """Distributions of a delay."""
+
+    CONSTANT = "constant"
+    UNIFORM = "uniform"
+    NORMAL = "normal"
+    EXPONENTIAL = "exponential"
+    PARETO = "pareto"
+    TABLE = "table"
+
+
+@dataclass(frozen=True)
+class Delay:
+    """The delay of some links.
 
     Parameters
     ----------
-    tick
-        When it was offered.
-    delay_ticks
-        One way, shape (L,); 0 arrives in the same exchange.
-    least
-        Ticks that every message takes at least: 0 for the papers' synchronous exchange, 1 for `next-tick`.
-
-    Returns
-    -------
-    NDArray[int]
-        Shape (L,).
+    law
+        Its distribution.
+    rows
+        True on the links it acts on, shape (L,).
+    mean
+        In seconds; of NORMAL and UNIFORM, before delays below zero are counted as zero.
+    jitter
+        In seconds: half-width of UNIFORM, standard deviation of NORMAL and PARETO, not used by the others.
+    table
+        TABLE: measured delays in seconds, sorted; the quantile function is straight between them.
+    correlation
+        Of the underlying Gaussian sequence from tick to tick, in [0, 1).
+    ordered
+        Whether a message waits for those sent before it.
     """
-    arrival: NDArray[np.int64] = tick + np.maximum(delay_ticks, least)
-    return arrival
+
+    law: Law
+    rows: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    mean: float
+    jitter: float
+    table: Array
+    correlation: float
+    ordered: bool
+
+    def quantile(self, u: Array) -> Array:
+        """The delay below which a share u of all messages lies, in seconds, not negative."""
+        match self.law:
+            case Law.CONSTANT:
+                seconds = np.full(u.shape, self.mean)
+            case Law.UNIFORM:
+                seconds = self.mean + self.jitter * (2.0 * u - 1.0)
+            case Law.NORMAL:
+                seconds = self.mean + self.jitter * ndtri(u)
+            case Law.EXPONENTIAL:
+                seconds = -self.mean * np.log1p(-u)
+            case Law.PARETO:
+                shape = self._shape
+                seconds = self.mean * (shape - 1.0) / shape * (1.0 - u) ** (-1.0 / shape)
+            case Law.TABLE:
+                seconds = np.interp(u, np.linspace(0.0, 1.0, len(self.table)), self.table)
+        return np.maximum(seconds, 0.0)
+
+    @property
+    def mean_delay(self) -> float:
+        """In seconds, in closed form, with delays below zero counted as zero."""
+        mean, jitter = self.mean, self.jitter
+        match self.law:
+            case Law.UNIFORM if jitter > mean:
+                return (mean + jitter) ** 2 / (4.0 * jitter)
+            case Law.NORMAL if jitter > 0.0:
+                ratio = mean / jitter
+                density = np.exp(-ratio * ratio / 2.0) / np.sqrt(2.0 * np.pi)
+                return float(mean * ndtr(ratio) + jitter * density)
+            case Law.TABLE:
+                return float(np.trapezoid(self.table, dx=1.0 / (len(self.table) - 1))) if len(self.table) > 1 else mean
+        return mean
+
+    @property
+    def _shape(self) -> float:
+        # Pareto (type I) with this mean and standard deviation: (sd / mean)^2 = 1 / (a (a - 2)).
+        return 1.0 + float(np.sqrt(1.0 + (self.mean / self.jitter) ** 2))
+
+
+def ticks(seconds: Array, dt: float) -> Integers:
+    """Whole ticks until the first exchange at or after the delay."""
+    return np.ceil(seconds / dt - _SLACK).astype(np.int64)
+
+
+def correlated(before: Array, fresh: Array, correlation: float) -> Array:
+    """The next values of Gaussian sequences: standard normal again, with this correlation to the last."""
+    following: Array = correlation * before + (1.0 - correlation**2) ** 0.5 * fresh
+    return following

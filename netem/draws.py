@@ -32,6 +32,18 @@ class Purpose(IntEnum):
     SENSOR_NOISE = 2
     PROCESS_NOISE = 3
     INITIAL_POSITION = 4
+    CHAIN_START = 5
+    PACKET_CHAIN = 6
+    TRACE = 7
+    REACH = 8
+    SHADOWING = 9
+    JAMMING = 10
+    DELAY = 11
+    DELAY_START = 12
+    DUPLICATE = 13
+    CORRUPTION = 14
+    CORRUPTED_BIT = 15
+    SCRIPTED_LOSS = 16
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:

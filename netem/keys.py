@@ -32,3 +32,8 @@ class Keys:
     def journal(self) -> str:
         """The verdicts of a tick (medium to world)."""
         return f"affinet/{self.run}/netem/journal"
+
+    @property
+    def control(self) -> str:
+        """Queryable: read and change the faults of a run while it flies (anybody with the run's control login)."""
+        return f"affinet/{self.run}/netem/control"

@@ -14,6 +14,7 @@ from enum import Enum
 from functools import cache
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import msgpack
 import numpy as np
 
 T = TypeVar("T")
@@ -41,6 +42,11 @@ def plainly(value: Any) -> Any:
         kind: Any = type(value)
         return {name: getattr(value, name) for name in _names(kind)}
     raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def to_plain(record: Any) -> Any:
+    """A record, or a list of them, as plain maps and lists all the way down."""
+    return msgpack.unpackb(msgpack.packb(record, default=plainly))
 
 
 def from_plain(kind: type[T], value: Any) -> T:

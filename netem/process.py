@@ -1,20 +1,26 @@
 """The medium as a process: it is also the run's only Zenoh router (`python -m netem`).
 
-It reads, lets `Medium` decide, and writes; what it relays it does not look into beyond the envelope.
+It reads, lets `Medium` decide, and writes; it does not look into what it relays, beyond the envelope, unless it corrupts it.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import zenoh
 
 from netem import channels, wire
+from netem.air import Delivery, out_of_the_ordinary
+from netem.control import Order, obey
+from netem.corrupt import Mark, corrupted_fields
+from netem.draws import Array
+from netem.fate import Fate
 from netem.keys import Keys
-from netem.links import Links, Mask
-from netem.medium import Delivery, Fate, InFlight, Medium
+from netem.links import Integers, Links, Mask
+from netem.medium import Medium, Verdicted
 from netem.profile import Profile
 from netem.sequence import Numbering, Sequences
 from netem.session import HUB, Login, await_subscribers, hub
@@ -34,6 +40,10 @@ class MediumBrief:
         Where to listen, and the file with everybody's password.
     seed, links, channels, profile, faults
         What the medium is made of.
+    injected
+        Faults that an earlier run was given while it flew.
+    recorded
+        The journal of an earlier run that is to be judge of this one.
     leaders
         Agents that have positioning, shape (N,).
     patience_s
@@ -48,13 +58,26 @@ class MediumBrief:
     channels: tuple[str, ...]
     profile: Profile
     faults: tuple[Fault, ...]
+    injected: tuple[Fault, ...]
+    recorded: str | None
     leaders: Mask
     patience_s: float
 
 
 @dataclass(frozen=True)
+class Arriving:
+    """A broadcast on its way into an inbox: the tick it speaks of, who said it on which link and channel, how corrupted."""
+
+    content: int
+    src: int
+    channel: int
+    link: int
+    mark: int
+
+
+@dataclass(frozen=True)
 class Sentence:
-    """All that is decided of a tick before it begins: verdicts ask who speaks to whom and when, never what is said.
+    """All that is decided of a tick before anybody speaks: verdicts ask who speaks to whom and when, never what is said.
 
     Parameters
     ----------
@@ -65,7 +88,7 @@ class Sentence:
     seen
         For each agent, the neighbours whose measurement reaches it, and the link rows these stand in.
     heard
-        For each agent, the broadcasts that reach it: (tick sent, source, channel), in order.
+        For each agent, the broadcasts that reach it, in order.
     journal
         The verdicts, packed for the world.
     """
@@ -73,7 +96,7 @@ class Sentence:
     tick: int
     alive: tuple[int, ...]
     seen: dict[int, tuple[list[int], list[int]]]
-    heard: dict[int, list[tuple[int, int, str]]]
+    heard: dict[int, list[Arriving]]
     journal: bytes
 
 
@@ -81,13 +104,15 @@ class Relay:
     """The medium of a run over Zenoh: one tick is sense, collect, deliver."""
 
     def __init__(self, session: zenoh.Session, brief: MediumBrief) -> None:
-        keys = Keys(brief.run)
+        keys = self._keys = Keys(brief.run)
         agents = range(1, brief.links.agents + 1)
         self._brief = brief
         self._links = brief.links
-        self._medium = Medium(brief.seed, brief.channels, brief.profile, Timeline(brief.links, brief.faults))
+        self._injected = brief.injected
+        self._timeline = Timeline(brief.links, (*brief.faults, *brief.injected))
+        self._medium = self._make_medium()
+        self._air = self._ahead = self._medium.begin()
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
-        self._in_flight = self._after = InFlight()
         self._said: dict[tuple[int, int, str], bytes] = {}
         self._from_world = Sequences("world")
         self._from_agents = Sequences("agent")
@@ -96,12 +121,13 @@ class Relay:
         self._broadcasts = session.declare_subscriber(keys.broadcast("*", "*"), zenoh.handlers.FifoChannel(4096))
         self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in self._spoken}
         self._journal = session.declare_publisher(keys.journal)
+        self._control = session.declare_queryable(keys.control, zenoh.handlers.FifoChannel(16))
         self._inboxes = {agent: session.declare_publisher(keys.inbox(agent)) for agent in agents}
 
     @property
     def in_flight(self) -> int:
         """Messages under way."""
-        return len(self._in_flight)
+        return self._air.in_flight
 
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
@@ -109,40 +135,76 @@ class Relay:
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
-        sentence = self._judge(0)
+        sentence = self._judge(0, None) if self._medium.ahead else None
         while True:
             sense = wire.unpack(wire.Sense, self._sense.recv().payload.to_bytes())
             self._from_world.check("sense", sense.seq)
             if sense.last:
                 self._end(sense.k)
                 return
+            if sentence is None:
+                sentence = self._judge(sense.k, np.array(sense.position, dtype=np.float64))
             self._welcome_back(sense.k)
             self._hand_out_measurements(sense, sentence)
             self._journal.put(sentence.journal)
             self._collect(sentence)
             self._hand_out_broadcasts(sentence)
-            # The agents now work on what they heard: time to decide the next tick.
-            self._in_flight = self._after
-            self._forget()
-            sentence = self._judge(sense.k + 1)
+            # The agents now work on what they heard: time to decide the next tick, where that needs no positions.
+            self._air = self._ahead
+            self._forget(sense.k)
+            sentence = self._judge(sense.k + 1, None) if self._medium.ahead else None
 
-    def _judge(self, tick: int) -> Sentence:
-        alive = ~self._medium.timeline.at(tick).dead
+    def _make_medium(self) -> Medium:
+        brief = self._brief
+        recorded: Verdicted | None = None
+        if brief.recorded is not None:
+            from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
+
+            recorded = journal.Recorded(journal.read(Path(brief.recorded)), brief.links, brief.channels)
+        return Medium(brief.seed, brief.channels, brief.profile, self._timeline, recorded)
+
+    def _judge(self, tick: int, position: Array | None) -> Sentence:
+        changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
+        alive = ~self._timeline.at(tick).dead
         speaks = alive[self._links.src - 1]
         offered = np.stack([speaks | (name == channels.SENSE) for name in self._brief.channels])
-        fates = self._medium.judge(tick, offered)
-        self._after, delivery = self._medium.deliver(tick, self._in_flight, fates)
-        seen, heard = self._seen(fates[0] == Fate.DELIVERED), self._heard(tick, delivery)
+        air, verdicts = self._medium.judge(self._air, tick, offered, position)
+        self._ahead, delivery = self._medium.deliver(air, tick, verdicts)
+        heard = self._heard(tick, delivery)
         journal = wire.Journal(
             k=tick,
             src=HUB,
             seq=self._numbers.next("journal"),
-            fates=fates,
-            handed=[len(heard[agent]) for agent in self._inboxes],
-            late=len(delivery.late),
+            fates=verdicts.fate,
+            odd=out_of_the_ordinary(tick, verdicts),
+            apart=delivery.apart,
+            late=delivery.late,
             dropped=delivery.dropped,
+            released=delivery.released,
+            handed=[len(heard[agent]) for agent in self._inboxes],
+            injected=list(self._injected) if changed else None,
         )
-        return Sentence(tick, tuple((np.flatnonzero(alive) + 1).tolist()), seen, heard, wire.pack(journal))
+        living = tuple((np.flatnonzero(alive) + 1).tolist())
+        return Sentence(tick, living, self._seen(verdicts.fate[0] == Fate.DELIVERED), heard, wire.pack(journal))
+
+    def _take_orders(self, tick: int) -> bool:
+        """Obey whoever asks to change the air from this tick on; whether anything changed."""
+        before = self._injected
+        while query := self._control.try_recv():
+            with query:
+                try:
+                    order = wire.unpack(Order, query.payload.to_bytes() if query.payload else b"")
+                except wire.WireError as error:
+                    query.reply_err(str(error).encode())
+                    continue
+                obeyed = obey(order, tick, self._brief.faults, self._injected, self._links)
+                self._injected = obeyed.injected
+                query.reply(self._keys.control, wire.pack_record(obeyed.answer))
+        if self._injected == before:
+            return False
+        self._timeline = Timeline(self._links, (*self._brief.faults, *self._injected))
+        self._medium.timeline = self._timeline
+        return True
 
     def _seen(self, arrived: Mask) -> dict[int, tuple[list[int], list[int]]]:
         seen: dict[int, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
@@ -155,23 +217,21 @@ class Relay:
             links.append(row)
         return seen
 
-    def _heard(self, tick: int, delivery: Delivery) -> dict[int, list[tuple[int, int, str]]]:
-        # Late ones first, then those of this tick: sorted by tick, source and channel, as links and channels are.
-        fresh: Mask = np.equal(delivery.sent[1:].T, tick)
-        links, rows = np.nonzero(fresh)
-        on_time = np.stack([np.full_like(links, tick), links, rows + 1], axis=-1)
-        arriving = np.concatenate([delivery.late, on_time])
-        sources, receivers = (
-            self._links.src[arriving[:, 1]].tolist(),
-            self._links.dst[arriving[:, 1]].tolist(),
-        )
-        heard: dict[int, list[tuple[int, int, str]]] = defaultdict(list)
-        for (sent, _, channel), src, dst in zip(arriving.tolist(), sources, receivers, strict=True):
-            heard[dst].append((sent, src, self._brief.channels[channel]))
+    def _heard(self, tick: int, delivery: Delivery) -> dict[int, list[Arriving]]:
+        """Sorted by the tick they speak of, source, channel and corruption, as links and channels are."""
+        links, rows = np.nonzero(delivery.plain[1:].T)
+        plain = np.stack([np.full_like(links, tick), links, rows + 1, np.zeros_like(links)], axis=-1)
+        arriving: Integers = np.concatenate([delivery.apart, plain])
+        if len(delivery.apart):
+            arriving = arriving[np.lexsort(arriving.T[::-1])]
+        sources, receivers = self._links.src[arriving[:, 1]].tolist(), self._links.dst[arriving[:, 1]].tolist()
+        heard: dict[int, list[Arriving]] = defaultdict(list)
+        for (content, link, channel, mark), src, dst in zip(arriving.tolist(), sources, receivers, strict=True):
+            heard[dst].append(Arriving(content, src, channel, link, mark))
         return heard
 
     def _welcome_back(self, tick: int) -> None:
-        for agent in self._medium.timeline.restarted(tick):
+        for agent in self._timeline.restarted(tick):
             self._numbers.restart(f"inbox {agent}")
             for name in self._spoken:
                 self._from_agents.restart(f"{agent} {name}")
@@ -208,15 +268,24 @@ class Relay:
 
     def _hand_out_broadcasts(self, sentence: Sentence) -> None:
         for agent in sentence.alive:
-            arriving = [self._said[said] for said in sentence.heard[agent]]
+            arriving = [self._as_it_arrives(said) for said in sentence.heard[agent]]
             seq = self._numbers.next(f"inbox {agent}")
             self._inboxes[agent].put(wire.pack_exchange(sentence.tick, seq, arriving))
 
-    def _forget(self) -> None:
-        if not len(self._in_flight):
-            self._said.clear()
-            return
-        oldest = self._in_flight.rows[:, 1].min()
+    def _as_it_arrives(self, said: Arriving) -> bytes:
+        data = self._said[said.content, said.src, self._brief.channels[said.channel]]
+        if said.mark in (Mark.NONE, Mark.STALE):
+            return data
+        draw = self._medium.bit_draws(*(np.array([n]) for n in (said.content, said.channel, said.link)))
+        kind, bias = np.array([said.mark], dtype=np.uint8), self._brief.profile.bias[[said.link]]
+        broadcast = wire.unpack(wire.Broadcast, data)
+        fields = {name: np.array([field]) for name, field in broadcast.payload.items()}
+        wrong = {name: field[0] for name, field in corrupted_fields(fields, kind, bias, draw).items()}
+        return wire.pack(broadcast._replace(payload=wrong))
+
+    def _forget(self, tick: int) -> None:
+        """Drop what nobody will hear any more; a stale message says what was said the tick before it was sent."""
+        oldest = self._air.oldest_sent(tick) - 1
         self._said = {said: data for said, data in self._said.items() if said[0] >= oldest}
 
     def _end(self, tick: int) -> None:

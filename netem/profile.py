@@ -4,28 +4,68 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from netem.chain import ChainLayer
+from netem.delay import Delay
 from netem.draws import Array
+from netem.jamming import Zone
 from netem.links import Integers
+from netem.rate import Rate
+from netem.reach import Reach
+from netem.schedule import Schedule
+from netem.trace import Trace
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The impairments of every directed link.
+    """The impairments of every directed link. Only communication is delayed, doubled, overtaken or limited in rate.
 
     Parameters
     ----------
-    availability
-        Probability in [0, 1] that a message gets through, shape (L,).
-    delay_ticks
-        One-way delay of communication in ticks, shape (L,). Sensing is not delayed.
+    dt
+        Tick, in seconds.
     coupled
         Assumption 1 of paper 000: one verdict per directed link and tick serves sensing and all communication. Otherwise
         each channel is decided for itself.
     least_delay
         Ticks every communicated message takes at least: 0 for the synchronous exchange, 1 for `next-tick`.
+    chains, traces
+        Losses that time decides; a message passes when none loses it.
+    schedules
+        Links that take turns.
+    reaches, zones
+        Losses that positions decide.
+    listed
+        Messages that are dropped, by number: rows of (link row, how many were offered before it), shape (m, 2).
+    delays
+        What a message waits, in sum.
+    duplicate, reorder
+        Probabilities that a message arrives twice, and that it is not delayed, shape (L,).
+    corrupt, bias
+        Probabilities of each kind of corruption, shape (L, 4), and what a bias adds, shape (L,).
+    rate
+        Limits of rate and queue, if any.
+    message_bits
+        Size of a message, by channel, shape (C,).
     """
 
-    availability: Array
-    delay_ticks: Integers
+    dt: float
     coupled: bool
     least_delay: int
+    chains: tuple[ChainLayer, ...]
+    traces: tuple[Trace, ...]
+    schedules: tuple[Schedule, ...]
+    reaches: tuple[Reach, ...]
+    zones: tuple[Zone, ...]
+    listed: Integers
+    delays: tuple[Delay, ...]
+    duplicate: Array
+    reorder: Array
+    corrupt: Array
+    bias: Array
+    rate: Rate | None
+    message_bits: Array
+
+    @property
+    def spatial(self) -> bool:
+        """Whether a verdict depends on where the agents are."""
+        return bool(self.reaches or self.zones)

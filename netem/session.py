@@ -17,6 +17,7 @@ from netem.keys import Keys
 
 HUB = "netem"
 WORLD = "world"
+CONTROL = "control"
 
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
 _RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
@@ -116,6 +117,7 @@ def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
             )
             for agent in agents
         ),
+        _controls(keys),
     ]
     return {
         "enabled": True,
@@ -127,19 +129,22 @@ def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
 
 
 def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:
-    def allow(what: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
-        return {
-            "id": f"{name}-{what}",
-            "permission": "allow",
-            "messages": [message],
-            "flows": [flow],
-            "key_exprs": keys,
-        }
-
     return name, [
-        allow("says", "put", "ingress", says),
-        allow("hears", "put", "egress", hears),
-        allow("asks", "declare_subscriber", "ingress", hears),
+        _allow(f"{name}-says", "put", "ingress", says),
+        _allow(f"{name}-hears", "put", "egress", hears),
+        _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
         # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
-        allow("learns", "declare_subscriber", "egress", learns),
+        _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
     ]
+
+
+def _controls(keys: Keys) -> tuple[str, list[dict[str, Any]]]:
+    return CONTROL, [
+        _allow("control-asks", "query", "ingress", [keys.control]),
+        _allow("control-hears", "reply", "egress", [keys.control]),
+        _allow("control-learns", "declare_queryable", "egress", [keys.control]),
+    ]
+
+
+def _allow(name: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": keys}

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from netem import cut
+from netem.draws import Array
 from netem.links import Links, Mask
 
 
@@ -23,8 +24,17 @@ class Verb(StrEnum):
 
     CUT = "cut"
     PARTITION = "partition"
+    LOSE = "lose"
     KILL = "kill"
     DEPART = "depart"
+
+
+class UnderWay(StrEnum):
+    """What a cut or a partition does to the messages under way on its links."""
+
+    DROP = "drop"
+    DELIVER = "deliver"
+    HOLD = "hold"
 
 
 @dataclass(frozen=True)
@@ -34,12 +44,17 @@ class Fault:
     Parameters
     ----------
     verb
-        What happens: the directed links `pairs` carry nothing, nothing crosses between `groups`, the processes of
-        `agents` are dead, or `agents` have left the formation.
+        What happens: the directed links `pairs` carry nothing, nothing crosses between `groups`, `pairs` lose messages, the
+        processes of `agents` are dead, or `agents` have left the formation.
     start, end
         Ticks; `end` is None for a fault that lasts to the end of the run.
     pairs, groups, agents
         What it takes hold of; only those of its verb are filled.
+    under_way
+        What a cut or partition does to messages under way: drop them, deliver them when they are due, or hold them and deliver
+        them when it ends, in order.
+    loss
+        Probability with which LOSE loses a message, on top of what else does.
     """
 
     verb: Verb
@@ -48,6 +63,8 @@ class Fault:
     pairs: tuple[tuple[int, int], ...] = ()
     groups: tuple[tuple[int, ...], ...] = ()
     agents: tuple[int, ...] = ()
+    under_way: UnderWay = UnderWay.DROP
+    loss: float = 0.0
 
     def active(self, tick: int) -> bool:
         """Whether it holds in this tick."""
@@ -57,7 +74,9 @@ class Fault:
         """What it does, for people."""
         match self.verb:
             case Verb.CUT:
-                return "cut " + ", ".join(f"{src}->{dst}" for src, dst in self.pairs)
+                return f"cut {self._links()}"
+            case Verb.LOSE:
+                return f"lose {self.loss:g} on {self._links()}"
             case Verb.PARTITION:
                 return "partition " + " | ".join(",".join(map(str, group)) for group in self.groups)
             case Verb.KILL | Verb.DEPART:
@@ -70,18 +89,38 @@ class Fault:
                 return f"restart {','.join(map(str, self.agents))}"
             case Verb.DEPART:
                 return f"rejoin {','.join(map(str, self.agents))}"
-            case Verb.CUT | Verb.PARTITION:
+            case Verb.CUT | Verb.PARTITION | Verb.LOSE:
                 return f"heal: {self.describe()}"
+
+    def _links(self) -> str:
+        shown = ", ".join(f"{src}->{dst}" for src, dst in self.pairs[:12])
+        return f"{shown} and {len(self.pairs) - 12} more" if len(self.pairs) > 12 else shown
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the timeline imposes in one tick: agents (N,) and links (L,)."""
+    """What the timeline imposes in one tick.
+
+    Parameters
+    ----------
+    dead, departed
+        Agents, shape (N,).
+    cut, partitioned
+        Links that carry nothing, shape (L,).
+    cut_drops, partition_drops, holds
+        Links on which messages under way are dropped by a cut, by a partition, or wait, shape (L,).
+    loss
+        Probability of scripted loss, shape (L,).
+    """
 
     dead: Mask
     departed: Mask
     cut: Mask
     partitioned: Mask
+    cut_drops: Mask
+    partition_drops: Mask
+    holds: Mask
+    loss: Array
 
     @property
     def absent(self) -> Mask:
@@ -139,11 +178,27 @@ class Timeline:
             held = [m for f, m in zip(self.faults, masks, strict=True) if f.verb is verb and f.active(tick)]
             return np.logical_or.reduce([np.zeros(size, dtype=bool), *held])
 
+        def under_way(policy: UnderWay, *verbs: Verb) -> Mask:
+            held = [
+                mask
+                for fault, mask in zip(self.faults, self._link_masks, strict=True)
+                if fault.under_way is policy and fault.verb in verbs and fault.active(tick)
+            ]
+            return np.logical_or.reduce([np.zeros(len(self.links), dtype=bool), *held])
+
+        passing = np.ones(len(self.links))
+        for fault, mask in zip(self.faults, self._link_masks, strict=True):
+            if fault.verb is Verb.LOSE and fault.active(tick):
+                passing = passing * np.where(mask, 1.0 - fault.loss, 1.0)
         return Conditions(
             dead=union(Verb.KILL, self._agent_masks, self.links.agents),
             departed=union(Verb.DEPART, self._agent_masks, self.links.agents),
             cut=union(Verb.CUT, self._link_masks, len(self.links)),
             partitioned=union(Verb.PARTITION, self._link_masks, len(self.links)),
+            cut_drops=under_way(UnderWay.DROP, Verb.CUT),
+            partition_drops=under_way(UnderWay.DROP, Verb.PARTITION),
+            holds=under_way(UnderWay.HOLD, Verb.CUT, Verb.PARTITION),
+            loss=1.0 - passing,
         )
 
     def _links_held(self, fault: Fault) -> Mask:

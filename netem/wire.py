@@ -11,11 +11,11 @@ from enum import StrEnum
 from typing import Any, NamedTuple, TypeVar
 
 import msgpack
-import numpy as np
-from numpy.typing import NDArray
 
+from netem.control import Answer, Order
 from netem.draws import Array
-from netem.links import Mask
+from netem.fate import Fates
+from netem.links import Integers, Mask
 from netem.plain import PlainError, from_plain, plainly
 
 T = TypeVar("T")
@@ -118,18 +118,23 @@ class Act(NamedTuple):
 class Journal(NamedTuple):
     """Medium to world: the verdicts of tick k.
 
-    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `handed` how many
-    broadcasts were put into each agent's inbox, shape (N,); `late` how many of them, of all agents, were sent in earlier
-    ticks; `dropped` the fate of every message whose receiver went while it was under way.
+    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `odd` the messages
+    that passed late, twice or corrupted, rows of `air.out_of_the_ordinary`; `apart`, `late`, `dropped` and `released` say how
+    messages under way arrived or were dropped, as in `air.Delivery`; `handed` how many broadcasts were put into each agent's
+    inbox, shape (N,); `injected` all faults injected so far, in plain form, when one was injected or healed.
     """
 
     k: int
     src: str
     seq: int
-    fates: NDArray[np.uint8] | Rows
-    handed: Rows
+    fates: Fates | Rows
+    odd: Integers | Rows
+    apart: Integers | Rows
     late: int
-    dropped: NDArray[np.uint8] | Rows
+    dropped: Integers | Rows
+    released: Integers | Rows
+    handed: Rows
+    injected: Rows | None
 
 
 # One packer, used again and again: a new one takes and returns a quarter of a megabyte for every message.
@@ -186,6 +191,12 @@ def pack_exchange(k: int, seq: int, broadcasts: Sequence[bytes]) -> bytes:
             *broadcasts,
         ]
     )
+
+
+def pack_record(record: Order | Answer) -> bytes:
+    """An order to the medium, or its answer, as MessagePack."""
+    packed: bytes = _PACKER.pack(record)
+    return packed
 
 
 def _read(kind: type[T], plain: Any) -> T:

@@ -2,11 +2,12 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from flying import digest_of, plan_of
 
-from affinet import sections
+from affinet import impairments, sections
 from affinet.run import fly
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -20,6 +21,35 @@ def test_the_estimator_of_the_docs_flies_in_both_runtimes(tmp_path, out, monkeyp
     outcome = fly(plan_of("corridor", *held), "processes", out, lambda *_: None)
     assert outcome.verdict == "pass", outcome.reasons
     assert outcome.digest == digest_of("corridor", *held)
+
+
+def test_the_realised_graph_of_the_docs_is_computed(tmp_path, monkeypatch):
+    fly(plan_of("corridor", "time.duration=1"), "inprocess", tmp_path / "runs" / "RUN", lambda *_: None)
+    (code,) = re.findall(r"```python\n(# realised\.py.*?)```", (DOCS / "network.md").read_text(), flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(code, names)
+    assert names["graph"].heard.shape == (100, 4, 24)
+    assert not names["graph"].stabilised(plan_of("corridor", "time.duration=1").world.formation)[0].any()
+
+
+PROFILES = re.findall(r"^\| `(\w+)` \| (mean loss .*) \|$", (DOCS / "network.md").read_text(), flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(("name", "says"), PROFILES)
+def test_the_profiles_come_to_what_the_docs_say(name, says):
+    plan = plan_of("corridor", "network.availability=1.0", f"network.profile={name}", "time.duration=1")
+    (air,) = [finding.says for finding in plan.findings if finding.check == "air"]
+    assert air.endswith(f": {says}")
+
+
+def test_every_profile_and_model_is_documented():
+    assert {name for name, _ in PROFILES} == set(impairments.presets())
+    text = (DOCS / "network.md").read_text()
+    for model in get_args(get_args(impairments.Loss)[0]):
+        for key in model.model_fields:
+            assert f"`{key}`" in text, key
+        assert f"`{get_args(model.model_fields['model'].annotation)[0]}`" in text
 
 
 SECTIONS = ["formation", "manoeuvre", "time", "sensing", "dynamics", "agents", "network", "record"]

@@ -46,6 +46,11 @@ def test_neither_0_nor_1_can_be_drawn(monkeypatch, word):
     assert 0.0 < uniform(1, Purpose.LOSS)[0] < 1.0
 
 
+def test_no_two_purposes_share_a_draw():
+    drawn = np.concatenate([uniform(1, purpose, tick=np.arange(50)).ravel() for purpose in Purpose])
+    assert len(np.unique(drawn)) == 50 * len(Purpose)
+
+
 def test_draws_are_uniform():
     u = uniform(7, Purpose.LOSS, tick=np.arange(500)[:, None], src=2, dst=np.arange(100), lanes=2).ravel()
     assert len(u) == 100_000

@@ -6,7 +6,7 @@ from flying import plan_of
 from rerun.chunk import RrdReader
 
 from affinet.run import fly
-from netem.medium import Fate
+from netem.fate import Fate
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +64,8 @@ def test_messages_are_counted_over_all_ticks(chunks, flown):
 def test_faults_are_told_as_text(chunks):
     told = [value[0] for value in column(chunks, "/events", "TextLog:text")]
     assert told == [
-        "cut 4->6, 6->4",
-        "heal: cut 4->6, 6->4",
+        "cut 6->4, 4->6",
+        "heal: cut 6->4, 4->6",
         "kill 7",
         "restart 7",
         "partition 1,2,3 | 4,5,6,7",

@@ -143,3 +143,22 @@ def test_estimation_pays_off_when_half_of_the_messages_are_lost():
 
     bare, aware = (np.mean([mean_error(name, seed) for seed in range(1, 6)]) for name in ("none", "ga-rkf"))
     assert bare > 5 * aware
+
+
+@pytest.mark.slow
+def test_a_million_messages_through_the_real_medium_are_accounted_for(out):
+    wild = (
+        "network.availability=0.95",
+        'network.profile="wild"',
+        'network.profiles.wild={like="wifi_busy",duplicate=0.02,corrupt=[{kind="stale",p=0.01}],rate={rate=3e5,queue=4000}}',
+        'timeline=[{verb="partition",at=20,until=23,groups=[[1,2,3],[4,5,6]],in_flight="hold"}]',
+    )
+    outcome = processes(out, "hexa", *wild)
+    messages = outcome.messages
+    assert outcome.verdict == "pass", outcome.reasons
+    assert messages["offered"] >= 1_000_000
+    assert messages["uninstructed"] == 0
+    assert messages["copies"] > 0
+    booked = messages["delivered"] + sum(messages["dropped"].values()) + messages["in_flight"]
+    assert messages["offered"] + messages["copies"] == booked
+    assert outcome.digest == digest_of("hexa", *wild)

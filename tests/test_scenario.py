@@ -1,10 +1,13 @@
 """The scenario file: what is written flies; what is wrong is one line: where, which key, what would be right."""
 
+import numpy as np
 import pytest
 
-from affinet import plan, scenario, sections
+from affinet import plan, scenario, selectors
 from affinet.sections import ScenarioError
-from netem.timeline import Fault, Verb
+from netem.links import Links
+from netem.timeline import Fault, UnderWay, Verb
+from world.formation import PRESETS
 
 GOOD = """\
 description = "a test"
@@ -38,7 +41,7 @@ availability = 0.7
 coupled = true
 
 [[network.links]]
-link = "1->2"
+links = "1->2"
 availability = 0.5
 delay_ticks = 3
 
@@ -92,13 +95,44 @@ def test_a_scenario_flies_as_it_is_written(file):
     row = links.index[1, 2]
     assert (made.world.dt, made.world.ticks, made.world.seed) == (0.01, 100, 1)
     assert made.estimator.build().sigma_w == 0.5
-    assert made.profile.availability[row] == 0.5
-    assert made.profile.delay_ticks[row] == 3
-    assert made.profile.availability[links.index[2, 1]] == 0.7
-    assert made.profile.delay_ticks[links.index[2, 1]] == 0
+    (layer,), (delay,) = made.profile.chains, made.profile.delays
+    other = np.arange(len(links)) != row
+    assert layer.loss[row, 0] == 0.5
+    assert layer.loss[other, 0] == pytest.approx(0.3)
+    assert (delay.mean, delay.rows.tolist()) == (pytest.approx(0.03), (~other).tolist())
+    assert made.profile.coupled
     assert made.faults == (
-        Fault(Verb.CUT, 10, 30, pairs=((2, 4), (1, 2), (2, 1))),
+        Fault(Verb.CUT, 10, 30, pairs=((2, 4), (2, 1), (1, 2))),
         Fault(Verb.KILL, 40, 50, agents=(5,)),
+    )
+
+
+def test_the_faults_of_the_network_fly_as_they_are_written(file):
+    more = """
+        [[timeline]]
+        verb = "cut"
+        at = 0.6
+        links = ["1->2"]
+        in_flight = "hold"
+
+        [[timeline]]
+        verb = "partition"
+        at = 0.6
+        until = 0.7
+        groups = [[1, 2], [3]]
+        in_flight = "deliver"
+
+        [[timeline]]
+        verb = "lose"
+        at = 0.2
+        links = ["4->2"]
+        loss = 0.25
+    """
+    file.write_text(GOOD + more)
+    assert plan.make(scenario.load(str(file))).faults[2:] == (
+        Fault(Verb.CUT, 60, None, pairs=((1, 2),), under_way=UnderWay.HOLD),
+        Fault(Verb.PARTITION, 60, 70, groups=((1, 2), (3,)), under_way=UnderWay.DELIVER),
+        Fault(Verb.LOSE, 20, None, pairs=((4, 2),), loss=0.25),
     )
 
 
@@ -127,18 +161,65 @@ def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
     assert not timeline.at(50).dead[4]
 
 
+FORMATION = PRESETS["zhao7"]
+LINKS = Links.both_ways(FORMATION.agents, FORMATION.edges)
+LEADERS = (1, 2, 3)
+
+
+def between(sources, receivers):
+    return [(src, dst) for src, dst in LINKS.index if src in sources and dst in receivers]
+
+
+FOLLOWERS = (4, 5, 6, 7)
+
+
 @pytest.mark.parametrize(
-    ("link", "pairs"),
-    [("2->4", [(2, 4)]), ("2-4", [(2, 4), (4, 2)]), ("10->1", [(10, 1)])],
+    ("selector", "pairs"),
+    [
+        ("2->4", [(2, 4)]),
+        ("2-4", [(4, 2), (2, 4)]),
+        ("4-2", [(4, 2), (2, 4)]),
+        ("all", list(LINKS.index)),
+        ("leaders", [pair for pair in LINKS.index if set(pair) & set(LEADERS)]),
+        ("6", [(src, dst) for src, dst in LINKS.index if 6 in (src, dst)]),
+        ("6->all", [(src, dst) for src, dst in LINKS.index if src == 6]),
+        ("leaders->followers", between(LEADERS, FOLLOWERS)),
+        (
+            "leaders-followers",
+            [pair for pair in LINKS.index if pair in between(LEADERS, FOLLOWERS) + between(FOLLOWERS, LEADERS)],
+        ),
+        ("followers->followers", between(FOLLOWERS, FOLLOWERS)),
+    ],
 )
-def test_a_link_is_written_one_way_or_both_ways(link, pairs):
-    assert sections.directed(link) == pairs
+def test_links_are_selected_one_way_or_both_ways_by_agents_or_by_roles(selector, pairs):
+    assert [*selectors.pairs([selector], FORMATION, LINKS)] == pairs
+    assert 0 < len(pairs) <= len(LINKS)
 
 
-@pytest.mark.parametrize("link", ["2", "2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", ""])
-def test_what_is_no_link_is_refused_with_the_two_ways_to_write_one(link):
-    with pytest.raises(ValueError, match=f"{link!r} is no link; write '2->4' .* or '2-4'"):
-        sections.directed(link)
+def test_links_that_are_selected_twice_are_selected_once():
+    assert selectors.pairs(["2-4", "2->4", "1->2"], FORMATION, LINKS) == ((4, 2), (2, 4), (1, 2))
+
+
+@pytest.mark.parametrize("selector", ["2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", "", "2->4->5", "leader"])
+def test_what_selects_no_links_is_refused_with_the_ways_to_write_it(selector):
+    with pytest.raises(
+        ValueError, match=f"{selector!r} selects no links; write '2->4' .*, '2-4' .*'leaders->followers'"
+    ):
+        selectors.check(selector)
+
+
+@pytest.mark.parametrize(
+    ("selector", "match"),
+    [
+        ("1->7", "'1->7' matches no link of the formation"),
+        ("2->2", "'2->2' matches no link of the formation"),
+        ("1->8", "agent 8 does not exist: agents are 1 to 7"),
+        ("0", "agent 0 does not exist: agents are 1 to 7"),
+    ],
+)
+def test_a_selector_that_matches_nothing_is_refused(selector, match):
+    with pytest.raises(ValueError, match=match):
+        selectors.pairs([selector], FORMATION, LINKS)
 
 
 # ---- --set
@@ -245,7 +326,12 @@ WRONG = [
     ('preset = "zhao7"', "scale = 2.0", "formation", "give a preset, or nodes, edges and leaders"),
     ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[nan, 1.0]]"), "formation.nodes.4.1", "finite number"),
     ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[1.0]]"), "formation", "nodes need two coordinates each"),
-    ('preset = "zhao7"', OWN.replace("3-4", "3=4"), "formation.edges.6", "'3=4' is no link; write '2->4'"),
+    (
+        'preset = "zhao7"',
+        OWN.replace("3-4", "3=4"),
+        "formation.edges.6",
+        "'3=4' is no edge; the edges of a formation have no direction",
+    ),
     ('preset = "zhao7"', OWN.replace("3-4", "3-9"), "formation.edges", "no agents [9]; agents are 1 to 4"),
     ('preset = "zhao7"', 'preset = "zhao7"\nleaders = [1, 2, 9]', "formation.leaders", "agents are 1 to 7"),
     # manoeuvre
@@ -275,10 +361,16 @@ WRONG = [
     ("sigma_w = 0.5", 'sigma_w = "much"', "agents.parameters.rkf.sigma_w", "valid number"),
     ("[agents.parameters.rkf]", "[agents.parameters.rfk]", "agents.parameters.rfk", "rkf"),
     # network and timeline
-    ('link = "1->2"', 'link = "1=2"', "network.links.1.link", "'1=2' is no link; write '2->4'"),
-    ('link = "1->2"', 'link = "1->7"', "network.links.1.link", "1->7 is not a link of the formation"),
-    ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' is no link; write '2->4'"),
-    ('"1-2"]', '"1-7"]', "timeline.1.links", "1->7 is not a link of the formation"),
+    ('links = "1->2"', 'links = "1=2"', "network.links.1.links", "'1=2' selects no links; write '2->4'"),
+    ('links = "1->2"', 'links = "1->7"', "network.links.1.links", "'1->7' matches no link of the formation"),
+    ('links = "1->2"', 'links = "1->9"', "network.links.1.links", "agent 9 does not exist: agents are 1 to 7"),
+    ('links = "1->2"', 'links = "1->2"\nchannels = "comms"', "network", "coupled = true gives sensing and comms one"),
+    ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' selects no links; write '2->4'"),
+    ('"1-2"]', '"1-7"]', "timeline.1", "'1-7' matches no link of the formation"),
+    ('"1-2"]', '"1-2"]\nin_flight = "keep"', "timeline.1.in_flight", "'drop', 'deliver' or 'hold', got 'keep'"),
+    ('verb = "cut"', 'verb = "lose"', "timeline.1.loss", "is missing; it has no default"),
+    ('verb = "cut"', 'verb = "lose"\nloss = 1.5', "timeline.1.loss", "less than or equal to 1, got 1.5"),
+    ('verb = "cut"', 'verb = "lose"\nloss = 1.0\nin_flight = "hold"', "timeline.1.in_flight", "known here: at, links"),
     ("until = 0.3", "until = 0.05", "timeline.1", "ends at 0.05 s, but begins at 0.1 s; until must be later"),
     (
         'verb = "kill"',
@@ -287,8 +379,13 @@ WRONG = [
         "agent 5 is not dead then; name its kill before its restart",
     ),
     ("at = 0.5", "at = 0.4", "timeline.3", "agent 5 is not dead then"),
-    ('verb = "kill"', 'verb = "explode"', "timeline.2", "needs a verb among cut, partition, depart, kill, restart"),
-    ('verb = "kill"\n', "", "timeline.2", "needs a verb among cut, partition, depart, kill, restart"),
+    (
+        'verb = "kill"',
+        'verb = "explode"',
+        "timeline.2",
+        "needs a verb among cut, partition, lose, depart, kill, restart",
+    ),
+    ('verb = "kill"\n', "", "timeline.2", "needs a verb among cut, partition, lose, depart, kill, restart"),
     ("agents = [5]", "agents = [9]", "timeline.2", "agent 9 does not exist: agents are 1 to 7"),
     ('links = ["2->4", "1-2"]', "links = []", "timeline.1.links", "at least 1 item"),
     (

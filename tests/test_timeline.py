@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from netem.links import Links
-from netem.timeline import Fault, Timeline, Verb
+from netem.timeline import Fault, Timeline, UnderWay, Verb
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 
@@ -15,9 +15,27 @@ def held(mask):
 
 def test_without_faults_nothing_is_held():
     now = Timeline(LINKS, []).at(1000)
-    assert now.cut.shape == now.partitioned.shape == (8,)
+    assert (
+        now.cut.shape
+        == now.partitioned.shape
+        == now.cut_drops.shape
+        == now.partition_drops.shape
+        == now.holds.shape
+        == now.loss.shape
+        == (8,)
+    )
     assert now.dead.shape == now.departed.shape == (4,)
-    for mask in (now.cut, now.partitioned, now.dead, now.departed, now.absent):
+    for mask in (
+        now.cut,
+        now.partitioned,
+        now.cut_drops,
+        now.partition_drops,
+        now.holds,
+        now.loss,
+        now.dead,
+        now.departed,
+        now.absent,
+    ):
         assert not mask.any()
 
 
@@ -64,6 +82,9 @@ def test_dead_and_departed_agents_are_absent():
     ("verb", "what", "layer"),
     [
         (Verb.CUT, {"pairs": ((1, 2),)}, "cut"),
+        (Verb.CUT, {"pairs": ((1, 2),)}, "cut_drops"),
+        (Verb.PARTITION, {"groups": ((1,), (2,)), "under_way": UnderWay.HOLD}, "holds"),
+        (Verb.LOSE, {"pairs": ((1, 2),), "loss": 0.5}, "loss"),
         (Verb.PARTITION, {"groups": ((1,), (2,))}, "partitioned"),
         (Verb.KILL, {"agents": (1,)}, "dead"),
         (Verb.DEPART, {"agents": (1,)}, "departed"),
@@ -90,6 +111,49 @@ def test_faults_of_different_kinds_do_not_touch_each_other():
     assert held(now.cut) == {(1, 2)}
     assert not now.partitioned.any()
     assert not now.dead.any()
+
+
+@pytest.mark.parametrize(
+    ("under_way", "drops", "holds"),
+    [
+        (UnderWay.DROP, {(1, 2)}, set()),
+        (UnderWay.DELIVER, set(), set()),
+        (UnderWay.HOLD, set(), {(1, 2)}),
+    ],
+)
+def test_a_cut_drops_delivers_or_holds_what_is_under_way(under_way, drops, holds):
+    now = Timeline(LINKS, [Fault(Verb.CUT, 0, None, pairs=((1, 2),), under_way=under_way)]).at(0)
+    assert (held(now.cut), held(now.cut_drops), held(now.holds)) == ({(1, 2)}, drops, holds)
+
+
+def test_what_is_under_way_on_the_links_of_a_partition_is_dropped_unless_it_says_otherwise():
+    now = Timeline(LINKS, [Fault(Verb.PARTITION, 0, None, groups=((1, 2), (3, 4)))]).at(0)
+    assert held(now.partition_drops) == held(now.partitioned) == {(2, 3), (3, 2), (4, 1), (1, 4)}
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault(Verb.KILL, 0, None, agents=(1,)),
+        Fault(Verb.DEPART, 0, None, agents=(1,)),
+        Fault(Verb.LOSE, 0, None, pairs=((1, 2),), loss=1.0),
+    ],
+    ids=lambda fault: fault.verb,
+)
+def test_only_cuts_and_partitions_say_what_becomes_of_what_is_under_way_on_links(fault):
+    now = Timeline(LINKS, [fault]).at(0)
+    assert not (now.cut_drops | now.partition_drops).any()
+    assert not now.holds.any()
+
+
+def test_scripted_losses_of_a_link_are_independent_of_each_other():
+    faults = [
+        Fault(Verb.LOSE, 0, 5, pairs=((1, 2), (2, 3)), loss=0.5),
+        Fault(Verb.LOSE, 3, 9, pairs=((1, 2),), loss=0.2),
+    ]
+    timeline, row = Timeline(LINKS, faults), LINKS.index[1, 2]
+    assert [float(timeline.at(tick).loss[row]) for tick in (2, 3, 5, 9)] == pytest.approx([0.5, 0.6, 0.2, 0.0])
+    assert held(timeline.at(3).loss > 0.0) == {(1, 2), (2, 3)}
 
 
 def test_the_conditions_are_the_union_of_the_faults_that_hold():
@@ -153,6 +217,7 @@ def test_a_fault_holds_its_links_and_all_links_of_its_agents():
     ("fault", "says", "says_at_its_end"),
     [
         (Fault(Verb.CUT, 0, 1, pairs=((1, 2), (2, 1))), "cut 1->2, 2->1", "heal: cut 1->2, 2->1"),
+        (Fault(Verb.LOSE, 0, 1, pairs=((1, 2),), loss=0.25), "lose 0.25 on 1->2", "heal: lose 0.25 on 1->2"),
         (Fault(Verb.PARTITION, 0, 1, groups=((1, 2), (3,))), "partition 1,2 | 3", "heal: partition 1,2 | 3"),
         (Fault(Verb.KILL, 0, 1, agents=(4,)), "kill 4", "restart 4"),
         (Fault(Verb.DEPART, 0, 1, agents=(1, 2)), "depart 1,2", "rejoin 1,2"),
@@ -162,10 +227,16 @@ def test_a_fault_says_what_it_does(fault, says, says_at_its_end):
     assert (fault.describe(), fault.describe_end()) == (says, says_at_its_end)
 
 
+def test_a_fault_of_many_links_names_the_first_and_counts_the_rest():
+    pairs = tuple((1, agent) for agent in range(2, 22))
+    assert Fault(Verb.CUT, 0, 1, pairs=pairs).describe().endswith("1->13 and 8 more")
+
+
 @pytest.mark.parametrize(
     ("fault", "match"),
     [
         (Fault(Verb.CUT, 0, None, pairs=((1, 2), (1, 3))), "link 1->3 is not in the nominal graph"),
+        (Fault(Verb.LOSE, 0, None, pairs=((1, 3),), loss=0.5), "link 1->3 is not in the nominal graph"),
         (Fault(Verb.PARTITION, 0, None, groups=((1,), (5,))), "agent 5 does not exist: agents are 1 to 4"),
         (Fault(Verb.PARTITION, 0, None, groups=((1, 2), (2,))), "agent 2 stands in two groups"),
         (Fault(Verb.KILL, 0, None, agents=(1, 0)), "agent 0 does not exist: agents are 1 to 4"),

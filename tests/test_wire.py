@@ -5,18 +5,19 @@ from dataclasses import asdict, replace
 import msgpack
 import numpy as np
 import pytest
+from airs import IMPAIRMENTS, mixture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.brief import Brief
 from analysis.affine import Manoeuvre
 from netem import wire
+from netem.delay import Law
 from netem.links import Links
 from netem.plain import PlainError, from_plain, plainly
 from netem.process import MediumBrief
-from netem.profile import Profile
 from netem.session import Login
-from netem.timeline import Fault, Verb
+from netem.timeline import Fault, UnderWay, Verb
 from netem.wire import Phase, WireError
 
 
@@ -31,7 +32,19 @@ MESSAGES = [
     wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
     wire.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
     wire.Act(k=7, src=3, seq=7, velocity=[1.0, 2.0], estimate=[[1.0, 0.0]], known=[True], psi=0.25, heard=12),
-    wire.Journal(k=7, src="netem", seq=7, fates=[[0, 1], [2, 7]], handed=[1, 0], late=1, dropped=[3]),
+    wire.Journal(
+        k=7,
+        src="netem",
+        seq=7,
+        fates=[[0, 1], [2, 7]],
+        odd=[[1, 0, 9, 0, 8]],
+        apart=[[4, 1, 1, 0]],
+        late=1,
+        dropped=[[3, 1, 1, 0, 5]],
+        released=[[4, 1, 1, 1]],
+        handed=[1, 0],
+        injected=None,
+    ),
 ]
 FIELDS = [
     pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in message._fields
@@ -246,6 +259,7 @@ BRIEF = Brief(
     mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),
 )
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
+PROFILE = mixture(3, frozenset(IMPAIRMENTS), LINKS, ("sense", "theta"), coupled=False, least_delay=1)
 MEDIUM = MediumBrief(
     run="r1",
     login=Login("tcp/127.0.0.1:7447", "netem", "secret"),
@@ -253,12 +267,15 @@ MEDIUM = MediumBrief(
     seed=2**64 - 1,
     links=LINKS,
     channels=("sense", "theta"),
-    profile=Profile(np.full(4, 0.7), np.array([0, 1, 2, 3]), coupled=True, least_delay=1),
+    profile=PROFILE,
     faults=(
-        Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1))),
+        Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1)), under_way=UnderWay.HOLD),
+        Fault(Verb.LOSE, 3, 6, pairs=((1, 2),), loss=0.25),
         Fault(Verb.PARTITION, 3, None, groups=((1,), (2, 3))),
         Fault(Verb.KILL, 9, None, agents=(3,)),
     ),
+    injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
+    recorded="/tmp/journal.arrows",
     leaders=np.array([True, False, False]),
     patience_s=10.0,
 )
@@ -270,8 +287,8 @@ def plain_of(brief):
 
 @pytest.mark.parametrize(
     "brief",
-    [BRIEF, replace(BRIEF, mission=None), MEDIUM, MEDIUM.faults[2]],
-    ids=["agent", "no mission", "medium", "fault"],
+    [BRIEF, replace(BRIEF, mission=None), MEDIUM, *MEDIUM.faults],
+    ids=["agent", "no mission", "medium", "cut", "lose", "partition", "kill"],
 )
 def test_a_brief_survives_the_trip(brief):
     arrived = from_plain(type(brief), plain_of(brief))
@@ -285,7 +302,9 @@ def test_arrays_of_a_brief_keep_their_types_and_shapes():
     assert arrived.present.dtype == np.bool_
     assert arrived.leader.shape == ()
     assert medium.links.src.dtype == np.int64
-    assert medium.profile.delay_ticks.dtype == np.int64
+    assert medium.profile.listed.dtype == medium.profile.schedules[0].period.dtype == np.int64
+    assert medium.profile.delays[0].rows.dtype == np.bool_
+    assert medium.profile.chains[0].cumulative.shape == PROFILE.chains[0].cumulative.shape
     assert arrived.mission.theta.shape == (4, 2, 2)
 
 
@@ -293,6 +312,11 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
     arrived = from_plain(MediumBrief, plain_of(MEDIUM))
     assert arrived.faults == MEDIUM.faults
     assert arrived.faults[0].verb is Verb.CUT
+    assert arrived.faults[0].under_way is UnderWay.HOLD
+    assert arrived.profile.delays[0].law is Law.CONSTANT
+    assert {len(layers) > 0 for layers in (arrived.profile.traces, arrived.profile.reaches, arrived.profile.zones)} == {
+        True
+    }
     assert arrived.login == MEDIUM.login
     assert arrived.channels == ("sense", "theta")
 
@@ -316,23 +340,23 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
         ({"leaders": [1, 0, 2]}, r"^leaders: .*bool.*2"),
         ({"leaders": ["no"]}, r"^leaders: .*bool.*'no'"),
         (
-            {"profile": {"availability": [None], "delay_ticks": [0], "coupled": True, "least_delay": 0}},
-            "availability: .*None",
+            {"profile": asdict(PROFILE) | {"duplicate": [None]}},
+            r"^profile\.duplicate: .*float64.*None",
         ),
         (
-            {"profile": {"availability": ["1"], "delay_ticks": [0], "coupled": True, "least_delay": 0}},
-            "availability: .*'1'",
+            {"profile": asdict(PROFILE) | {"duplicate": ["1"]}},
+            r"^profile\.duplicate: .*float64.*'1'",
         ),
     ],
 )
 def test_what_does_not_fit_a_brief_is_named_by_its_path(wrong, match):
     with pytest.raises(PlainError, match=match):
-        from_plain(MediumBrief, plain_of(MEDIUM) | wrong)
+        from_plain(MediumBrief, plain_of(MEDIUM) | plain_of(wrong))
 
 
 def test_an_unknown_verb_of_a_fault_is_named_with_those_there_are():
     plain = plain_of(MEDIUM)
-    plain["faults"][1]["verb"] = "explode"
+    plain["faults"][2]["verb"] = "explode"
     with pytest.raises(PlainError, match=r"^faults\[\]\.verb: expected one of .*cut.*depart.* got 'explode'"):
         from_plain(MediumBrief, plain)
 

@@ -23,8 +23,12 @@ class WorldBrief:
         The run directory.
     world, channels, faults
         What it simulates and records.
-    record_every
-        Ticks from one recorded moment to the next; None records nothing.
+    every
+        Ticks from one moment that is recorded, and whose graph is looked at, to the next.
+    window
+        Ticks over which links count as working together.
+    record
+        Whether to make a recording.
     viewer
         URL of a viewer to stream to.
     patience_s
@@ -37,7 +41,9 @@ class WorldBrief:
     world: World
     channels: tuple[str, ...]
     faults: tuple[Fault, ...]
-    record_every: int | None
+    every: int
+    window: int
+    record: bool
     viewer: str | None
     patience_s: float
 

@@ -12,13 +12,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.metrics import tracking_error
-from netem.links import Mask
-from netem.medium import FATE_OF, Fate, Fates
+from netem.air import Entry, newest_of
+from netem.corrupt import Mark
+from netem.fate import FATE_OF, Fate, Fates
+from netem.links import Integers, Mask
 from netem.timeline import Timeline
 from world.formation import Array
 from world.world import World
 
 Arrays = dict[str, NDArray[Any]]
+
+_BY_TICK = (
+    "position",
+    "velocity",
+    "estimate",
+    "known",
+    "psi",
+    "fates",
+    "newest",
+    "copies",
+    "late",
+    "dropped",
+    "target",
+    "error",
+)
+_MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
 
 
 class Moment(NamedTuple):
@@ -34,10 +52,12 @@ class Moment(NamedTuple):
         Convergence indicators, shape (N,), NaN where undefined.
     fates
         Verdicts, shape (C, L).
-    late
-        How many messages of earlier ticks were delivered in this one.
-    dropped
-        Fates of messages whose receiver went while they were under way, shape (d,).
+    odd
+        Messages that passed late, twice or corrupted, rows of `air.out_of_the_ordinary`.
+    apart, late, dropped, released
+        What became of messages under way, as in `air.Delivery`.
+    injected
+        All faults injected so far, in plain form, when one was injected or healed.
     """
 
     position: Any
@@ -46,8 +66,12 @@ class Moment(NamedTuple):
     known: Any
     psi: Any
     fates: Any
+    odd: Any
+    apart: Any
     late: int
     dropped: Any
+    released: Any
+    injected: list[Any] | None
 
 
 @dataclass(frozen=True)
@@ -62,10 +86,14 @@ class Moments:
         Where the manoeuvre wants the agents, shape (T, N, D), in metres.
     error
         Tracking error (15), shape (T,), in square metres.
-    late
-        How many arrived late, shape (T,).
+    newest
+        The tick of which the newest arriving content speaks, -1 where nothing arrives, shape (T, C, L).
+    copies, late
+        How many messages were doubled, and how many arrived late, shape (T,).
     dropped
         How many were dropped under way, by fate, shape (T, fates).
+    entries
+        What the journal is told.
     """
 
     first: int
@@ -75,10 +103,13 @@ class Moments:
     known: Mask
     psi: Array
     fates: Fates
+    newest: NDArray[np.int32]
+    copies: NDArray[np.int64]
     late: NDArray[np.int64]
     dropped: NDArray[np.int64]
     target: Array
     error: Array
+    entries: list[Entry]
 
     @property
     def ticks(self) -> NDArray[np.int64]:
@@ -88,23 +119,46 @@ class Moments:
 
 def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments:
     """Consecutive moments as arrays, with what they are measured against."""
-    position, velocity, estimate, known, psi, fates, late, dropped = zip(*moments, strict=True)
     ticks = np.arange(first, first + len(moments))
-    where, target = np.array(position), world.target(ticks)
+    where, target = np.array([moment.position for moment in moments]), world.target(ticks)
     present = np.array([~timeline.at(tick).absent for tick in ticks.tolist()])
+    fates = np.array([moment.fates for moment in moments], dtype=np.uint8)
+    entries = [
+        Entry(each, _rows(moment.odd), _rows(moment.dropped), _rows(moment.released), moment.injected)
+        for each, moment in zip(fates, moments, strict=True)
+    ]
     return Moments(
         first=first,
         position=where,
-        velocity=np.array(velocity),
-        estimate=np.array(estimate),
-        known=np.array(known, dtype=bool),
-        psi=np.array(psi),
-        fates=np.array(fates, dtype=np.uint8),
-        late=np.array(late),
-        dropped=np.array([np.bincount(np.array(gone, dtype=np.int64), minlength=len(Fate)) for gone in dropped]),
+        velocity=np.array([moment.velocity for moment in moments]),
+        estimate=np.array([moment.estimate for moment in moments]),
+        known=np.array([moment.known for moment in moments], dtype=bool),
+        psi=np.array([moment.psi for moment in moments]),
+        fates=fates,
+        newest=_newest(ticks, fates, entries, moments),
+        copies=np.array([np.count_nonzero(entry.odd[:, _COPY_DUE] >= 0) for entry in entries]),
+        late=np.array([moment.late for moment in moments]),
+        dropped=np.array([np.bincount(entry.dropped[:, _FATE], minlength=len(Fate)) for entry in entries]),
         target=target,
         error=tracking_error(where, target, present),
+        entries=entries,
     )
+
+
+def _rows(given: Any) -> Integers:
+    """Rows that came over the wire, or are arrays already; none have the width of the widest."""
+    rows = np.asarray(given, dtype=np.int64)
+    return rows if rows.ndim == 2 else np.empty((0, 5), dtype=np.int64)
+
+
+def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry], moments: Sequence[Moment]) -> NDArray[np.int32]:
+    newest = np.where(fates == Fate.DELIVERED, ticks[:, None, None], -1)
+    for row, (entry, moment) in enumerate(zip(entries, moments, strict=True)):
+        marked = entry.odd[entry.odd[:, _MARK] != Mark.NONE]
+        newest[row, marked[:, 0], marked[:, 1]] = -1
+        if len(moment.apart):
+            newest[row] = newest_of(newest[row], _rows(moment.apart))
+    return newest.astype(np.int32)
 
 
 class History:
@@ -122,43 +176,23 @@ class History:
         self.known = np.zeros((ticks, agents, width), dtype=bool)
         self.psi = np.full((ticks, agents), np.nan)
         self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
+        self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)
+        self.copies = np.zeros(ticks, dtype=np.int64)
         self.late = np.zeros(ticks, dtype=np.int64)
         self.dropped = np.zeros((ticks, len(Fate)), dtype=np.int64)
 
     def extend(self, moments: Moments, next_position: Array) -> None:
         """Take in the next ticks, and where they led."""
         span = slice(self.ticks, self.ticks + len(moments.error))
-        for name in (
-            "position",
-            "target",
-            "error",
-            "velocity",
-            "estimate",
-            "known",
-            "psi",
-            "fates",
-            "late",
-            "dropped",
-        ):
+        for name in _BY_TICK:
             getattr(self, name)[span] = getattr(moments, name)
         self.position[span.stop] = next_position
         self.ticks = span.stop
 
     def arrays(self) -> Arrays:
         """All arrays by name, up to the last tick."""
-        k = self.ticks
-        return {
-            "position": self.position[: k + 1],
-            "target": self.target[:k],
-            "error": self.error[:k],
-            "velocity": self.velocity[:k],
-            "estimate": self.estimate[:k],
-            "known": self.known[:k],
-            "psi": self.psi[:k],
-            "fates": self.fates[:k],
-            "late": self.late[:k],
-            "dropped": self.dropped[:k],
-        }
+        by_tick = {name: getattr(self, name)[: self.ticks] for name in _BY_TICK}
+        return by_tick | {"position": self.position[: self.ticks + 1]}
 
     def save(self, path: Path) -> None:
         """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes."""

@@ -10,14 +10,15 @@ import zenoh
 
 from netem import wire
 from netem.keys import Keys
+from netem.plain import from_plain
 from netem.sequence import Numbering, Sequences
 from netem.session import WORLD, await_subscribers, client
 from netem.supervised import Supervisor, patience
-from netem.timeline import Timeline
+from netem.timeline import Fault, Timeline
 from world.brief import WorldBrief, batch_of
 from world.formation import Array
 from world.history import History, Moment, gather
-from world.recorder import Recorder
+from world.logbook import Logbook
 
 
 class Theatre:
@@ -38,7 +39,7 @@ class Theatre:
         self._heard = dict.fromkeys(self._acting.values(), 0)
         self._awaited: set[int] = set()
         self._moments: list[Moment] = []
-        self._batch = batch_of(brief.record_every or 1)
+        self._batch = batch_of(brief.every)
         self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
         self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
         self.uninstructed = 0
@@ -48,21 +49,22 @@ class Theatre:
         """Wait until the medium listens."""
         await_subscribers([self._sense])
 
-    def run(self, recorder: Recorder | None) -> None:
-        """Fly all ticks."""
+    def run(self, logbook: Logbook) -> None:
+        """Fly all ticks, and write them down."""
         position = self._world.start()
         for tick in range(self._world.ticks):
             self._kill_and_restart(tick)
             self._publish(tick, position)
             if tick % self._batch == 0:  # while the agents work on this tick
-                self._write_down(tick, position, recorder)
+                self._write_down(tick, position, logbook)
             with patience(self._brief.patience_s, partial(self._missing, tick)):
                 journal = self._read_journal(tick)
                 acts = self._read_acts(tick)
+            self._hear_of_faults(journal)
             moment = self._moment(position, journal, acts)
             self._moments.append(moment)
             position = self._world.step(tick, position, moment.velocity, self._timeline.at(tick).absent)
-        self._write_down(self._world.ticks, position, recorder)
+        self._write_down(self._world.ticks, position, logbook)
         self._sense.put(wire.pack(wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [])))
 
     def _kill_and_restart(self, tick: int) -> None:
@@ -86,6 +88,11 @@ class Theatre:
         if journal.k != tick:
             raise wire.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
         return journal
+
+    def _hear_of_faults(self, journal: wire.Journal) -> None:
+        if journal.injected is not None:
+            injected = [from_plain(Fault, fault) for fault in journal.injected]
+            self._timeline = Timeline(self._world.links, [*self._brief.faults, *injected])
 
     def _read_acts(self, tick: int) -> dict[int, wire.Act]:
         self._awaited = set((np.flatnonzero(~self._timeline.at(tick).dead) + 1).tolist())
@@ -115,18 +122,21 @@ class Theatre:
             known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
             psi=[act.psi for act in everybody],
             fates=journal.fates,
+            odd=journal.odd,
+            apart=journal.apart,
             late=journal.late,
             dropped=journal.dropped,
+            released=journal.released,
+            injected=journal.injected,
         )
 
-    def _write_down(self, tick: int, next_position: Array, recorder: Recorder | None) -> None:
+    def _write_down(self, tick: int, next_position: Array, logbook: Logbook) -> None:
         if not self._moments:
             return
         moments = gather(self._world, self._timeline, tick - len(self._moments), self._moments)
         self._moments = []
         self.history.extend(moments, next_position)
-        if recorder:
-            recorder.record(moments)
+        logbook.write(moments, self._timeline)
         self._supervisor.tell("tick", k=tick, error=float(moments.error[-1]))
 
     def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
@@ -140,29 +150,24 @@ def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
     brief = supervisor.brief(WorldBrief)
-    world, out = brief.world, Path(brief.out)
-    timeline = Timeline(world.links, brief.faults)
-    recorder = None
-    if brief.record_every is not None:
-        recorder = Recorder(
-            out / "run.rrd",
-            run=brief.run,
-            formation=world.formation,
-            timeline=timeline,
-            dt=world.dt,
-            every=brief.record_every,
-            viewer=brief.viewer,
-        )
     with zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
-        theatre.await_everybody()
-        supervisor.tell("ready")
-        supervisor.await_order("go")
-        try:
-            with supervisor.confessing():
-                theatre.run(recorder)
-        finally:
-            if recorder:
-                recorder.close()
-            theatre.history.save(out / "arrays.npz")
+        with Logbook(
+            Path(brief.out),
+            brief.run,
+            brief.world,
+            brief.channels,
+            every=brief.every,
+            window=brief.window,
+            record=brief.record,
+            viewer=brief.viewer,
+        ) as logbook:
+            theatre.await_everybody()
+            supervisor.tell("ready")
+            supervisor.await_order("go")
+            try:
+                with supervisor.confessing():
+                    theatre.run(logbook)
+            finally:
+                theatre.history.save(Path(brief.out) / "arrays.npz")
         supervisor.tell("done", uninstructed=theatre.uninstructed)

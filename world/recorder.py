@@ -5,6 +5,7 @@ Many ticks are logged at once, as columns: that is several times cheaper than ti
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from netem.medium import REASONS, Fate, Fates
-from netem.timeline import Timeline
+from netem.fate import REASONS, Fate, Fates
+from netem.links import Links
+from netem.timeline import Conditions, Timeline
 from world.formation import Array, Formation
 from world.history import Moments
+from world.realised import Realised
 
 _TIMELINE = "sim_time"
 
@@ -28,7 +31,13 @@ _LINK_COLOURS = {
     Fate.DEPARTED: 0x6E6E6EFF,
     Fate.CUT: 0xFF3B30FF,
     Fate.PARTITION: 0xC86BFFFF,
+    Fate.SCRIPTED: 0xFF6B6BFF,
+    Fate.CLOSED: 0x4A4A4AFF,
+    Fate.RANGE: 0x8D6E63FF,
+    Fate.JAMMED: 0xFFEB3BFF,
+    Fate.LISTED: 0xFFCC80FF,
     Fate.LOST: 0xFF9F1CFF,
+    Fate.OVERFLOW: 0x26C6DAFF,
 }
 _COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
 
@@ -42,8 +51,8 @@ class Recorder:
         Of the recording.
     run
         Its name.
-    formation, timeline
-        Who flies, and what is scripted.
+    formation, links, channels
+        Who flies, who is linked to whom, and what they say, sensing first.
     dt
         Tick, in seconds.
     every
@@ -58,13 +67,15 @@ class Recorder:
         *,
         run: str,
         formation: Formation,
-        timeline: Timeline,
+        links: Links,
+        channels: Sequence[str],
         dt: float,
         every: int,
         viewer: str | None = None,
     ) -> None:
         self._formation = formation
-        self._timeline = timeline
+        self._links = links
+        self._channels = list(channels)
         self._dt = dt
         self._every = every
         self._edges = np.array(formation.edges, dtype=np.int64) - 1
@@ -73,17 +84,18 @@ class Recorder:
         self._stream.set_sinks(*sinks, default_blueprint=_blueprint(formation))
         self._log_static()
 
-    def record(self, moments: Moments) -> None:
+    def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
         for tick in moments.ticks.tolist():
-            self._log_events(tick)
+            self._log_events(tick, timeline)
         kept = slice(None, None, self._every)
         time = [rr.TimeColumn(_TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
-        self._log_agents(time, moments.ticks[kept], moments.position[kept])
+        self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], moments.position[kept])
         self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
+        self._log_realised(time, realised)
 
     def close(self) -> None:
         """End the file."""
@@ -104,6 +116,26 @@ class Recorder:
             ("metrics/tracking_error", rr.SeriesLines(names="tracking error (m²)", colors=0xFFFFFFFF)),
             ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),
             (
+                "graph/connectivity",
+                rr.SeriesLines(
+                    names=["sensing", "comms", "sensing, joint", "comms, joint"],
+                    colors=np.array([0x3DDC8480, 0x3FA7F580, 0x3DDC84FF, 0x3FA7F5FF], dtype=np.uint32),
+                ),
+            ),
+            (
+                "graph/age",
+                rr.SeriesLines(
+                    names=["sensing (s)", "comms (s)"], colors=np.array([0x3DDC84FF, 0x3FA7F5FF], dtype=np.uint32)
+                ),
+            ),
+            (
+                "graph/rigidity",
+                rr.SeriesLines(
+                    names=["feasible agents", "stress dimension, joint"],
+                    colors=np.array([0xF2B705FF, 0xC86BFFFF], dtype=np.uint32),
+                ),
+            ),
+            (
                 "metrics/messages",
                 rr.SeriesLines(
                     names=[fate.label for fate in _COUNTED], colors=[_LINK_COLOURS[fate] for fate in _COUNTED]
@@ -113,15 +145,27 @@ class Recorder:
         for path, what in static:
             self._stream.log(path, what, static=True)
 
-    def _log_events(self, tick: int) -> None:
-        started = [fault.describe() for fault in self._timeline.starting(tick)]
-        ended = [fault.describe_end() for fault in self._timeline.ending(tick)]
+    def _log_events(self, tick: int, timeline: Timeline) -> None:
+        started = [fault.describe() for fault in timeline.starting(tick)]
+        ended = [fault.describe_end() for fault in timeline.ending(tick)]
         if started or ended:
             self._stream.set_time(_TIMELINE, duration=tick * self._dt)
             for text in started:
                 self._stream.log("events", rr.TextLog(text, level="WARN"))
             for text in ended:
                 self._stream.log("events", rr.TextLog(text, level="INFO"))
+
+    def _log_realised(self, time: list[rr.TimeColumn], realised: Realised) -> None:
+        # Sensing and the last channel stand for their classes: channels that share their verdicts are alike.
+        classes = [0, -1]
+        age = realised.age_s[:, classes]
+        known = ~np.isnan(age)
+        mean_age = np.where(known, age, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
+        both = np.concatenate([realised.connectivity[:, classes], realised.joint_connectivity[:, classes]], axis=-1)
+        self._scalars("graph/connectivity", time, both)
+        self._scalars("graph/age", time, mean_age)
+        counts = np.stack([realised.feasible.sum(axis=-1), realised.stress_dimension[:, 0]], axis=-1)
+        self._scalars("graph/rigidity", time, counts.astype(np.float64))
 
     def _messages_per_tick(self, moments: Moments) -> Array:
         starts = np.arange(0, len(moments.ticks), self._every)
@@ -130,21 +174,20 @@ class Recorder:
         means: Array = np.add.reduceat(counts, starts, axis=0) / lengths[:, None]
         return means
 
-    def _log_agents(self, time: list[rr.TimeColumn], ticks: NDArray[np.int64], position: Array) -> None:
+    def _log_agents(self, time: list[rr.TimeColumn], conditions: Sequence[Conditions], position: Array) -> None:
         agents = self._formation.agents
-        colours = np.array([self._agent_colours(tick) for tick in ticks.tolist()]).ravel()
+        colours = np.array([self._agent_colours(now) for now in conditions]).ravel()
         columns = rr.Points3D.columns(positions=_spatial(position).reshape(-1, 3), colors=colours)
         for path in ("swarm/agents", "swarm/trail"):
-            self._stream.send_columns(path, time, columns.partition([agents] * len(ticks)))
+            self._stream.send_columns(path, time, columns.partition([agents] * len(conditions)))
 
-    def _agent_colours(self, tick: int) -> NDArray[np.uint32]:
-        now = self._timeline.at(tick)
+    def _agent_colours(self, now: Conditions) -> NDArray[np.uint32]:
         flying = np.where(self._formation.is_leader, _LEADER, _FOLLOWER)
         return np.where(now.dead, _DEAD, np.where(now.departed, _DEPARTED, flying)).astype(np.uint32)
 
     def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
         position, target = _spatial(flown), _spatial(wanted)
-        links = self._timeline.links
+        links = self._links
         receiver, sender = position[:, links.dst - 1], position[:, links.src - 1]
         # Half an edge for each direction: the half at an agent shows whether that agent hears and sees the other.
         halves = np.stack([(receiver + sender) / 2, receiver], axis=-2)
@@ -199,6 +242,11 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
         rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
         rrb.TimeSeriesView(origin="metrics/messages", name="messages per tick, by verdict"),
+        rrb.Tabs(
+            rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),
+            rrb.TimeSeriesView(origin="graph/age", name="age of information"),
+            rrb.TimeSeriesView(origin="graph/rigidity", name="rigidity"),
+        ),
         rrb.TextLogView(origin="events", name="events"),
     )
     return rrb.Blueprint(

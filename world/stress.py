@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from world.formation import Array, Edges, Formation
@@ -70,3 +73,19 @@ def solve(formation: Formation) -> Array:
         )
     weights: Array = basis @ coordinates.value
     return weights
+
+
+def stabilises(formation: Formation, up: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the edges that are up (..., M) carry a stabilising stress, shape (...); solved once for each distinct set."""
+    patterns, place = np.unique(up.reshape(-1, up.shape[-1]), axis=0, return_inverse=True)
+    answers = np.array([_carries_stress(formation, pattern) for pattern in patterns], dtype=bool)
+    return answers[place].reshape(up.shape[:-1])
+
+
+def _carries_stress(formation: Formation, up: NDArray[np.bool_]) -> bool:
+    edges = tuple(edge for edge, works in zip(formation.edges, up.tolist(), strict=True) if works)
+    try:
+        solve(replace(formation, edges=edges))
+    except NotRigid:
+        return False
+    return True

@@ -1,0 +1,195 @@
+"""Network section -> the air: what impairs each link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from affinet import impairments
+from affinet.checks import Finding
+from affinet.echo import echo
+from affinet.impairments import LinkProfile
+from affinet.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
+from affinet.sections import Network, Scenario, ScenarioError, Time
+from agents.estimators.base import Channels
+from analysis.affine import Array
+from netem import channels, reach, trace
+from netem.chain import ChainLayer, steady
+from netem.corrupt import Mark
+from netem.jamming import Zone
+from netem.links import Integers, Links
+from netem.profile import Profile
+from netem.rate import Rate
+from netem.reach import Reach
+from netem.trace import Trace
+from world.formation import Formation
+
+_ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
+
+
+def plan(
+    given: Scenario, formation: Formation, links: Links, message_bits: Array
+) -> tuple[Profile, tuple[Finding, ...]]:
+    """The air of a scenario, and what is to be said of it.
+
+    Raises
+    ------
+    ScenarioError
+        When a profile is not there, cannot ever deliver, or selects nothing.
+    """
+    network, dt = given.network, given.time.dt
+    groups = classes(network, formation, links)
+    heard = [one for one in groups if one.comms]
+    profile = Profile(
+        dt=dt,
+        coupled=network.coupled,
+        least_delay=1 if given.time.exchange == "next-tick" else 0,
+        chains=tuple(layer for group in _by_channels(groups) for layer in _chain_layers(group, links)),
+        traces=tuple(_trace(one, links, given.time) for one in groups if one.losses(impairments.Traced)),
+        schedules=tuple(one.schedule(links) for one in groups if one.losses(SCHEDULES)),
+        reaches=tuple(_reach(one, dt) for one in groups if one.losses(REACHES)),
+        zones=_zones(network, formation, links),
+        listed=_listed(groups),
+        delays=tuple(law for one in heard for law in one.delays(dt)),
+        duplicate=_each(heard, links, lambda profile: profile.duplicate or 0.0),
+        reorder=_each(heard, links, lambda profile: profile.reorder or 0.0),
+        corrupt=np.stack([_each(heard, links, partial(_chance, kind)) for kind in list(Mark)[1:]], axis=-1),
+        bias=_each(heard, links, _bias),
+        rate=_rate(heard, links),
+        message_bits=message_bits,
+    )
+    notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
+    return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)
+
+
+def message_bits(names: Sequence[str], spoken: Channels, links: Links, dimension: int) -> Array:
+    """Size of a message on each channel: its envelope, 8 bytes a number and 1 a truth; what a rate limit counts."""
+
+    def payload(name: str) -> int:
+        if name == channels.MEASUREMENT:
+            return int(links.degree.max(initial=0)) * dimension * _NUMBER_BYTES
+        sizes = [
+            int(np.prod(field.shape)) * (_TRUTH_BYTES if field.dtype is bool else _NUMBER_BYTES)
+            for field in spoken.get(name, {}).values()
+        ]
+        return sum(sizes)
+
+    return np.array([8.0 * (_ENVELOPE_BYTES + payload(name)) for name in names])
+
+
+def _by_channels(classes: Iterable[LinkClass]) -> list[list[LinkClass]]:
+    grouped: dict[tuple[bool, bool], list[LinkClass]] = {}
+    for one in classes:
+        grouped.setdefault((one.sensing, one.comms), []).append(one)
+    return list(grouped.values())
+
+
+def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer]:
+    layers, never = [], steady()
+    depth = max(len(one.chains) for one in classes)
+    for lane in range(depth):
+        chosen, by_packet = [never] * len(links), np.zeros(len(links), dtype=bool)
+        for one in classes:
+            if lane < len(one.chains):
+                chain, by_packet_here = one.chains[lane]
+                for row in np.flatnonzero(one.rows):
+                    chosen[row] = chain
+                by_packet[one.rows] = by_packet_here
+        if any(chain.loss.any() or chain.extra_delay.any() for chain in chosen):
+            first = classes[0]
+            layers.append(ChainLayer.of(lane, chosen, by_packet, sensing=first.sensing, comms=first.comms))
+    return layers
+
+
+def _trace(one: LinkClass, links: Links, time: Time) -> Trace:
+    file = Path(one.losses(impairments.Traced).file)
+    try:
+        ticks, availability = (_flown if file.is_dir() else _measured)(file, links, one, time)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: {error}") from error
+    return Trace(ticks, availability, one.sensing, one.comms)
+
+
+def _measured(file: Path, links: Links, one: LinkClass, time: Time) -> tuple[Integers, Array]:
+    with file.open(encoding="utf-8", newline="") as lines:
+        return trace.read(lines, links, one.rows, time.dt)
+
+
+def _flown(run: Path, links: Links, one: LinkClass, time: Time) -> tuple[Integers, Array]:
+    from netem import journal  # pyarrow takes a while to import
+
+    passed = journal.availability(journal.read(run / journal.FILE), links, channels.SENSE if one.sensing else None)
+    if len(passed) < time.ticks:
+        raise ValueError(f"the run has {len(passed)} ticks, this one {time.ticks}; shorten time.duration")
+    return np.arange(len(passed)), np.where(one.rows, passed, 1.0)
+
+
+def _reach(one: LinkClass, dt: float) -> Reach:
+    model = one.losses(REACHES)
+    match model:
+        case impairments.Disk():
+            shape = (reach.Law.RAMP, one.rows, model.range, model.range, 0.0, 0.0, 1)
+        case impairments.Ramp():
+            shape = (reach.Law.RAMP, one.rows, model.inner, model.outer, 0.0, 0.0, 1)
+        case _:
+            spell = max(1, round(model.coherence / dt))
+            shape = (reach.Law.LOG_DISTANCE, one.rows, 0.0, model.range, model.exponent, model.shadowing, spell)
+    return Reach(*shape, one.sensing, one.comms)
+
+
+def _zones(network: Network, formation: Formation, links: Links) -> tuple[Zone, ...]:
+    zones = []
+    for number, zone in enumerate(network.zones, start=1):
+        key = f"network.zones.{number}"
+        if len(zone.centre) != formation.dimension:
+            raise ScenarioError(f"{key}.centre: needs {formation.dimension} coordinates, in metres")
+        if network.coupled and zone.channels:
+            raise ScenarioError(f"{key}.channels: coupled = true gives sensing and comms one verdict")
+        rows = np.zeros(len(links), dtype=bool)
+        rows[select(zone.links, formation, links, f"{key}.links")] = True
+        sensing, comms = zone.channels != "comms", zone.channels != "sensing"
+        zones.append(Zone(np.array(zone.centre), zone.radius, zone.share, rows, sensing, comms))
+    return tuple(zones)
+
+
+def _listed(classes: Iterable[LinkClass]) -> Integers:
+    rows = [
+        (row, number)
+        for one in classes
+        if (model := one.losses(impairments.Listed))
+        for row in np.flatnonzero(one.rows).tolist()
+        for number in model.messages
+    ]
+    return np.array(sorted(set(rows)), dtype=np.int64).reshape(-1, 2)
+
+
+def _each(classes: Iterable[LinkClass], links: Links, value: Callable[[LinkProfile], float]) -> Array:
+    figures = np.zeros(len(links))
+    for one in classes:
+        figures[one.rows] = value(one.profile)
+    return figures
+
+
+def _chance(kind: Mark, profile: LinkProfile) -> float:
+    return sum(corruption.p for corruption in profile.corrupt or [] if corruption.kind == kind.label)
+
+
+def _bias(profile: LinkProfile) -> float:
+    return sum(corruption.by or 0.0 for corruption in profile.corrupt or [])
+
+
+def _rate(classes: Sequence[LinkClass], links: Links) -> Rate | None:
+    if not any(one.profile.rate for one in classes):
+        return None
+
+    def of(name: str, without: float) -> Array:
+        figures = np.full(len(links), without)
+        for one in classes:
+            if one.profile.rate:
+                figures[one.rows] = getattr(one.profile.rate, name)
+        return figures
+
+    return Rate(of("rate", np.inf), 8.0 * of("burst", 0.0), 8.0 * of("queue", np.inf))

@@ -1,0 +1,130 @@
+"""Changing the air of a run while it flies: who may, and how to ask."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+
+from affinet import selectors
+from affinet.plan import formation_of
+from affinet.sections import Scenario
+from netem import wire
+from netem.control import Action, Answer, Order
+from netem.keys import Keys
+from netem.links import Links
+from netem.session import Login, client
+from netem.timeline import Fault, UnderWay, Verb
+
+_FILE = "control.json"
+_PATIENCE_S = 5.0
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a user wants to happen to the air, in the user's words.
+
+    Parameters
+    ----------
+    verb
+        "cut", "partition", "lose", "heal" or "show".
+    links
+        Selectors of links.
+    groups
+        Of agents, for a partition.
+    loss
+        Probability, for "lose".
+    lasts_s
+        Simulated seconds; None lasts to the end of the run, or until it is healed.
+    in_flight
+        What a cut or partition does to messages under way.
+    """
+
+    verb: str
+    links: tuple[str, ...] = ()
+    groups: tuple[tuple[int, ...], ...] = ()
+    loss: float = 0.0
+    lasts_s: float | None = None
+    in_flight: str = UnderWay.DROP
+
+    def order(self, flown: Scenario) -> Order:
+        """The order that a run of this scenario understands.
+
+        Raises
+        ------
+        ValueError
+            When it selects nothing.
+        """
+        if self.verb in (Action.HEAL, Action.SHOW):
+            return Order(Action(self.verb), None)
+        formation = formation_of(flown)
+        chosen = selectors.pairs(self.links, formation, Links.both_ways(formation.agents, formation.edges))
+        lasts = None if self.lasts_s is None else max(1, round(self.lasts_s / flown.time.dt))
+        fault = Fault(
+            Verb(self.verb), 0, lasts, chosen, self.groups, under_way=UnderWay(self.in_flight), loss=self.loss
+        )
+        return Order(Action.INJECT, fault)
+
+
+class NotFlying(RuntimeError):
+    """There is no such run, or it flies no more."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """The right to change a run: its name, and the login that may."""
+
+    run: str
+    login: Login
+
+    @contextmanager
+    def granted(self, out: Path) -> Iterator[None]:
+        """Leave the access in the run directory, for this user alone, for as long as the run flies."""
+        file = out / _FILE
+        file.touch(mode=0o600)
+        file.write_text(json.dumps({"run": self.run, "login": vars(self.login)}))
+        try:
+            yield
+        finally:
+            file.unlink()
+
+    @classmethod
+    def to(cls, out: Path) -> Access:
+        """The access to the run that flies in this directory.
+
+        Raises
+        ------
+        NotFlying
+            When none does.
+        """
+        try:
+            told = json.loads((out / _FILE).read_text())
+        except FileNotFoundError as error:
+            raise NotFlying(
+                f"no run flies over processes in {out}; name the directory that `affinet run` printed"
+            ) from error
+        return cls(told["run"], Login(**told["login"]))
+
+    def ask(self, order: Order) -> Answer:
+        """Give the medium an order; its answer.
+
+        Raises
+        ------
+        NotFlying
+            When nobody answers, or the medium could not read the order.
+        """
+        try:
+            with zenoh.open(client(self.login)) as session:
+                replies = session.get(Keys(self.run).control, payload=wire.pack_record(order), timeout=_PATIENCE_S)
+                for reply in replies:
+                    if reply.err is not None:
+                        raise NotFlying(f"the medium refused: {reply.err.payload.to_string()}")
+                    if reply.ok is not None:
+                        return wire.unpack(Answer, reply.ok.payload.to_bytes())
+        except zenoh.ZError as error:
+            raise NotFlying(f"the medium cannot be reached: {error}") from error
+        raise NotFlying(f"the medium did not answer within {_PATIENCE_S:g} s: the run ended, or stands still")

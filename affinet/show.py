@@ -1,0 +1,106 @@
+"""What a person at a terminal sees: progress on standard error, tables on standard output."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import progress as bar
+from rich.console import Console
+from rich.table import Table
+
+from affinet.checks import Finding
+from affinet.outcome import Outcome
+from affinet.plan import Plan
+from netem.control import Answer
+
+_LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
+_VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
+
+
+class Progress:
+    """A progress bar with the real-time factor, on standard error."""
+
+    def __init__(self, plan: Plan, name: str, out: Path) -> None:
+        self._name, self._out = name, out
+        self._dt = plan.world.dt
+        self._first: tuple[int, float] | None = None
+        self._bar = bar.Progress(
+            bar.TextColumn("{task.description}"),
+            bar.BarColumn(),
+            bar.TextColumn("{task.fields[says]}"),
+            bar.TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task(name, total=plan.world.ticks, says="starting")
+
+    def __enter__(self) -> Progress:
+        self._bar.console.print(f"{self._name} flies in {self._out}", highlight=False)
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def see(self, tick: int, error: float) -> None:
+        """Show how far it is."""
+        now = time.perf_counter()
+        self._first = self._first or (tick, now)
+        elapsed = now - self._first[1]
+        factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
+        self._bar.update(self._task, completed=tick, says=f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
+
+
+def outcome(outcome: Outcome, plan: Plan) -> None:
+    """What came of a run."""
+    table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
+    error, messages = outcome.tracking_error, outcome.messages
+    rows = [
+        ("flown", f"{outcome.ticks} ticks, {outcome.ticks * plan.world.dt:g} s in {outcome.wall_s:.1f} s"),
+        ("speed", f"{outcome.ticks_per_s:.0f} ticks/s, {outcome.real_time_factor:.2f} x real time"),
+        ("tracking error", "  ".join(f"{name} {_figure(value)} m²" for name, value in error.items())),
+        (
+            "messages",
+            f"{messages['offered']} offered, {messages['copies']} doubled, "
+            f"{messages['delivered']} delivered, {messages['in_flight']} in flight",
+        ),
+        (
+            "dropped",
+            ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
+        ),
+        ("lost by nobody's order", f"{messages['uninstructed']}"),
+        *(
+            ("fault", f"{fault['at']:g} s: {fault['fault']} held {fault['messages']} messages")
+            for fault in outcome.faults
+        ),
+        ("digest", str(outcome.digest)),
+        ("directory", outcome.out),
+    ]
+    for name, value in rows:
+        table.add_row(name, value)
+    console = Console()
+    console.print(table)
+    for reason in outcome.reasons:
+        console.print(reason, markup=False, highlight=False)
+
+
+def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:
+    """What was checked."""
+    table = Table("check", "", "says", title=f"{name}: {'can fly' if flies else 'cannot fly'}")
+    for finding in found:
+        table.add_row(finding.check, _LEVELS[finding.level], finding.says)
+    Console().print(table)
+
+
+def answer(told: Answer, dt: float) -> None:
+    """What the medium says it holds."""
+    console = Console()
+    console.print(f"from tick {told.k} ({told.k * dt:.2f} s) on:", highlight=False)
+    for line in told.holds or ["nothing is imposed"]:
+        console.print(f"  {line}", markup=False, highlight=False)
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

@@ -1,0 +1,130 @@
+"""Requested against achieved: rows of the accuracy table, each tested at a threshold that is fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from netem.draws import Array
+
+SIGMAS = 3.0  # of a mean or a share
+SIGMAS_OF_MANY = 4.0  # of correlations, of which there are many
+UNLIKELY = 0.001  # p of a distribution
+_FEWEST = 5  # expected in a bin of chi-square
+_FEWEST_DEPENDENT = 50  # in a bin whose variance is estimated
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table."""
+
+    model: str
+    parameters: str
+    what: str
+    requested: str
+    achieved: str
+    evidence: str
+    ok: bool
+    chance: float = 0.0  # that a right model is not ok
+
+    def __str__(self) -> str:
+        cells = (self.model, self.parameters, self.what, self.requested, self.achieved, self.evidence)
+        return f"| {' | '.join(cells)} | {'ok' if self.ok else '**NOT OK**'} |"
+
+
+@dataclass(frozen=True)
+class Against:
+    """What one model was asked for, to be held against what it did."""
+
+    model: str
+    parameters: str
+
+    def share(self, what: str, requested: float, achieved: NDArray[np.bool_]) -> Row:
+        """The share of independent events that are true: binomial."""
+        spread = (requested * (1.0 - requested) / achieved.size) ** 0.5
+        return self.normal(what, requested, float(achieved.mean()), spread)
+
+    def shares(self, what: str, requested: Array, hits: Array, trials: Array) -> Row:
+        """Many independent shares at once: the sum of their squared z is chi-square."""
+        squared = (hits - trials * requested) ** 2 / (trials * requested * (1.0 - requested))
+        p = float(stats.chi2.sf(squared.sum(), squared.size))
+        return self._p(what, f"{squared.size} shares", f"mean error {np.mean(hits / trials - requested):+.2g}", p)
+
+    def mean(self, what: str, requested: float, each: Array) -> Row:
+        """The mean of independent values, one per link; their spread is measured."""
+        return self.normal(what, requested, float(each.mean()), float(each.std(ddof=1)) / len(each) ** 0.5)
+
+    def ratio(self, what: str, requested: float, above: Array, below: Array) -> Row:
+        """A mean over a number of things that is itself random, both summed per link."""
+        off = above - requested * below
+        error = float(off.std(ddof=1)) * len(off) ** 0.5 / float(below.sum())
+        return self.normal(what, requested, float(above.sum() / below.sum()), error)
+
+    def counts(self, what: str, chances: Array, counted: Array) -> Row:
+        """How often each kind of independent event came: chi-square; the last bin takes what `chances` leave to 1."""
+        chances, counted = _pooled(chances, counted[None], _FEWEST)
+        total = counted.sum()
+        p = float(stats.chisquare(counted[0], chances * total).pvalue) if len(chances) > 1 else 1.0
+        return self._p(what, f"{len(chances)} bins", f"{total:.0f} counted", p)
+
+    def counts_by_link(self, what: str, chances: Array, counted: Array) -> Row:
+        """The same where the events of a link depend on each other, by link (L, bins): Hotelling's T-squared."""
+        chances, counted = _pooled(chances, counted, _FEWEST_DEPENDENT)
+        links, free = len(counted), len(chances) - 1
+        off = (counted - counted.sum(axis=-1, keepdims=True) * chances)[:, :free]
+        centre, spread = off.mean(axis=0), np.atleast_2d(np.cov(off, rowvar=False))
+        squared = links * centre @ np.linalg.solve(spread, centre)
+        p = float(stats.f.sf(squared * (links - free) / (free * (links - 1)), free, links - free))
+        return self._p(what, f"{free + 1} bins", f"{counted.sum():.0f} counted", p)
+
+    def distribution(self, what: str, cdf: Callable[[Array], Array], sample: Array) -> Row:
+        """The distribution of independent values: Kolmogorov-Smirnov."""
+        test = stats.kstest(sample.ravel(), cdf)
+        return self._p(what, "its distribution", f"D = {test.statistic:.2g} of {sample.size}", float(test.pvalue))
+
+    def uncorrelated(self, what: str, a: Array, b: Array) -> Row:
+        """The correlation of two series of mean 0 and variance 1, each of independent values."""
+        return self.normal(what, 0.0, float((a * b).mean()), a.size**-0.5, SIGMAS_OF_MANY)
+
+    def no_pair(self, what: str, z: Array) -> Row:
+        """No value of very many standard normal ones is out of the ordinary: Bonferroni."""
+        worst = float(np.abs(z).max())
+        p = min(1.0, z.size * 2.0 * float(stats.norm.sf(worst)))
+        return self._p(what, f"{z.size} pairs", f"max \\|z\\| = {worst:.2f}", p)
+
+    def exactly(self, what: str, requested: float, achieved: float) -> Row:
+        """A number that leaves no room for chance."""
+        same = achieved == requested
+        return Row(self.model, self.parameters, what, f"{requested:.6g}", f"{achieved:.6g}", "exact", same)
+
+    def within(self, what: str, requested: float, achieved: float, tolerance: float, unit: str) -> Row:
+        """A number with a bound."""
+        ok = abs(achieved - requested) <= tolerance
+        evidence = f"within {tolerance:.2g} {unit}"
+        return Row(self.model, self.parameters, what, f"{requested:.6g}", f"{achieved:.6g}", evidence, ok)
+
+    def normal(self, what: str, requested: float, achieved: float, spread: float, most: float = SIGMAS) -> Row:
+        """A number of known standard deviation."""
+        z = (achieved - requested) / spread
+        chance = 2.0 * float(stats.norm.sf(most))
+        shown = (f"{requested:.5g}", f"{achieved:.5g}", f"z = {z:+.2f}")
+        return Row(self.model, self.parameters, what, *shown, abs(z) < most, chance)
+
+    def _p(self, what: str, requested: str, achieved: str, p: float) -> Row:
+        return Row(self.model, self.parameters, what, requested, achieved, f"p = {p:.3f}", p > UNLIKELY, UNLIKELY)
+
+
+def _pooled(chances: Array, counted: Array, fewest: int) -> tuple[Array, Array]:
+    """Neighbouring bins in one until enough is expected in each; counts by row (rows, bins), the last bin open."""
+    chances = np.append(chances, max(0.0, 1.0 - chances.sum()))[: counted.shape[-1]]
+    expected, starts, held = chances * counted.sum(), [0], 0.0
+    for n, value in enumerate(expected[:-1]):
+        held += value
+        if held >= fewest and expected[n + 1 :].sum() >= fewest:
+            starts.append(n + 1)
+            held = 0.0
+    return np.add.reduceat(chances, starts), np.add.reduceat(counted, starts, axis=-1).astype(np.float64)

@@ -1,0 +1,46 @@
+"""Jammed zones: whoever is inside hears nothing while the jammer is on, all at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netem.draws import Array
+from netem.links import Integers, Mask
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A ball in which a jammer works.
+
+    Parameters
+    ----------
+    centre
+        Shape (D,), in metres.
+    radius
+        In metres.
+    share
+        Share of ticks in which the jammer is on, independently from tick to tick.
+    rows
+        True on the links it can jam, shape (L,).
+    sensing, comms
+        The channel classes on which it acts.
+    """
+
+    centre: Array
+    radius: float
+    share: float
+    rows: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    sensing: bool
+    comms: bool
+
+    def jammed(self, receivers: Integers, position: Array) -> Mask:
+        """True on the links whose receiver, a row of positions (N, D), is inside, shape (L,), while the jammer is on.
+
+        One draw a tick serves the whole zone: its links share their fate. In the zone, mean loss is `share`.
+        """
+        apart = position - self.centre
+        inside = (apart * apart).sum(axis=-1) <= self.radius**2
+        struck: Mask = inside[receivers] & self.rows
+        return struck

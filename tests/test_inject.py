@@ -1,0 +1,128 @@
+"""Changing the air of a run while it flies, and flying it again."""
+
+import threading
+
+import pytest
+from flying import plan_of
+
+from affinet import cli
+from affinet import plan as planning
+from affinet.inject import Access, NotFlying, Wish
+from affinet.run import fly
+from netem import journal
+from netem.control import Action, Order, obey
+from netem.links import Links
+from netem.timeline import Fault, Verb
+
+LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
+SCRIPTED = (Fault(Verb.CUT, 0, None, pairs=((1, 2),)),)
+
+
+class Flight:
+    """A run over processes in a thread, which tells when it is under way."""
+
+    def __init__(self, plan, out):
+        self._under_way = threading.Event()
+        self._thread = threading.Thread(target=self._fly, args=(plan, out))
+
+    def _fly(self, plan, out):
+        self.outcome = fly(plan, "processes", out, lambda *_: self._under_way.set())
+        self._under_way.set()
+
+    def __enter__(self):
+        self._thread.start()
+        assert self._under_way.wait(60)
+        return self
+
+    def __exit__(self, *_):
+        self._thread.join(100)
+
+
+def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp_path):
+    plan = plan_of("corridor", "time.duration=12", "record.enabled=false")
+    with Flight(plan, out) as flight:
+        access = Access.to(out)
+        cut = access.ask(Wish("cut", links=("1-2",), lasts_s=0.5).order(plan.scenario))
+        lose = access.ask(Wish("lose", links=("leaders->followers",), loss=0.5).order(plan.scenario))
+        shown = access.ask(Wish("show").order(plan.scenario))
+        healed = access.ask(Wish("heal").order(plan.scenario))
+        refused = access.ask(Order(Action.INJECT, Fault(Verb.KILL, 0, None, agents=(1,))))
+    assert cut.holds == ("cut 2->1, 1->2",)
+    assert "lose 0.5" in lose.holds[-1]
+    assert shown.holds[-1] == lose.holds[-1]
+    assert not healed.holds
+    assert "can be injected" in refused.refused
+    assert cut.k < lose.k < shown.k < healed.k
+
+    faults = {fault["fault"].split()[0]: fault for fault in flight.outcome.faults}
+    assert faults["cut"]["messages"] > 0
+    assert faults["lose"]["messages"] > 0
+    assert faults["cut"]["at"] == pytest.approx(cut.k * 0.01)
+    recorded = journal.injected(journal.read(out / journal.FILE))
+    assert [(fault.verb, fault.start) for fault in recorded] == [(Verb.CUT, cut.k), (Verb.LOSE, lose.k)]
+    assert recorded[1].end == healed.k
+
+    for name, verdicts in (("models", False), ("journal", True)):
+        again = fly(planning.again(out, (), verdicts=verdicts), "inprocess", tmp_path / name, lambda *_: None)
+        assert again.digest == flight.outcome.digest
+        tables = [journal.read(run / journal.FILE) for run in (out, tmp_path / name)]
+        assert tables[0].drop_columns("event").equals(tables[1].drop_columns("event"))
+        assert journal.injected(tables[1]) == recorded
+
+
+def test_nobody_injects_into_a_run_that_does_not_fly(out, capsys):
+    fly(plan_of("corridor", "time.duration=0.1"), "inprocess", out, lambda *_: None)
+    with pytest.raises(NotFlying):
+        Access.to(out)
+    assert cli.main(["inject", str(out), "heal"]) == 2
+    assert "no run flies" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["cut", "1-7"], "matches no link"),
+        (["cut", "nobody"], "selects no links"),
+        (["cut", "1-99"], "agent 99 does not exist"),
+    ],
+)
+def test_bad_wishes_are_refused_before_they_are_sent(words, says, out, capsys):
+    fly(plan_of("corridor", "time.duration=0.1"), "inprocess", out, lambda *_: None)
+    assert cli.main(["inject", str(out), *words]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_journal_of_other_agents_is_no_judge(out, tmp_path, capsys):
+    fly(plan_of("corridor", "time.duration=0.2", 'agents.estimator="none"'), "inprocess", out, lambda *_: None)
+    again = ["replay", "--verdicts", str(out), "--runtime", "inprocess", "--out", str(tmp_path / "again")]
+    assert cli.main([*again, "--estimator", "ga-rkf"]) == 2
+    assert "no verdicts on theta" in capsys.readouterr().err
+
+
+def order(verb, **what):
+    return Order(Action.INJECT, Fault(verb, 0, what.pop("end", None), **what))
+
+
+def test_healing_leaves_what_is_scripted():
+    injected = obey(order(Verb.LOSE, pairs=((2, 3),), loss=0.4), 5, SCRIPTED, (), LINKS).injected
+    done = obey(Order(Action.HEAL, None), 9, SCRIPTED, injected, LINKS)
+    assert done.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), loss=0.4),)
+    assert done.answer.holds == ("cut 1->2",)
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        (order(Verb.LOSE, pairs=((1, 2),), loss=1.5), "lies in [0, 1]"),
+        (order(Verb.CUT, pairs=((1, 3),)), "not in the nominal graph"),
+        (order(Verb.CUT, pairs=()), "no link"),
+        (order(Verb.CUT, pairs=((1, 2),), end=0), "at least one tick"),
+        (order(Verb.PARTITION, groups=((1,), (9,))), "does not exist"),
+        (order(Verb.DEPART, agents=(1,)), "can be injected"),
+        (Order(Action.INJECT, None), "can be injected"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_changes_nothing(asked, why):
+    done = obey(asked, 3, SCRIPTED, (), LINKS)
+    assert why in done.answer.refused
+    assert done.injected == ()

@@ -1,0 +1,101 @@
+"""What a run leaves behind while it flies: journal, realised graph and recording, a batch of ticks at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+import pyarrow as pa
+
+from netem.arrow import NAMES, Stream, named
+from netem.journal import FILE, Writer
+from netem.timeline import Timeline
+from world.history import Moments
+from world.realised import Watch, columns
+from world.recorder import Recorder
+from world.world import World
+
+RECORDING, GRAPH = "run.rrd", "graph.arrows"
+GRAPH_SCHEMA = pa.schema(
+    [
+        ("tick", pa.int32()),
+        ("channel", NAMES),
+        ("links", pa.int32()),
+        ("connectivity", pa.float64()),
+        ("joint_connectivity", pa.float64()),
+        ("stress_dimension", pa.int32()),
+        ("mean_age_s", pa.float64()),
+        ("feasible", pa.int32()),
+    ]
+)
+
+
+class Logbook:
+    """Writes the journal, and the recording if one is wanted.
+
+    Parameters
+    ----------
+    out, run
+        The run directory, and the run's name.
+    world, channels
+        What is flown.
+    every
+        Ticks from one moment that is recorded, and whose graph is looked at, to the next.
+    window
+        Ticks over which links count as working together.
+    record
+        Whether to make a recording.
+    viewer
+        URL of a viewer to stream to.
+    """
+
+    def __init__(
+        self,
+        out: Path,
+        run: str,
+        world: World,
+        channels: Sequence[str],
+        *,
+        every: int,
+        window: int,
+        record: bool,
+        viewer: str | None,
+    ) -> None:
+        self._every = every
+        self._channels = list(channels)
+        self._journal = Writer(out / FILE, world.links, channels)
+        self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
+        self._watch = Watch(world.formation, world.links, world.dt, window)
+        self._recorder = None
+        if record:
+            self._recorder = Recorder(
+                out / RECORDING,
+                run=run,
+                formation=world.formation,
+                links=world.links,
+                channels=channels,
+                dt=world.dt,
+                every=every,
+                viewer=viewer,
+            )
+
+    def __enter__(self) -> Logbook:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._journal.close()
+        self._graph.close()
+        if self._recorder:
+            self._recorder.close()
+
+    def write(self, moments: Moments, timeline: Timeline) -> None:
+        """Write down consecutive ticks, flown under this timeline."""
+        self._journal.write(moments.first, moments.entries)
+        realised = self._watch.follow(moments.first, moments.newest, timeline, self._every)
+        table = columns(realised, self._channels)
+        self._graph.write({**table, "channel": named(table["channel"], self._channels)})
+        if self._recorder:
+            self._recorder.record(moments, timeline, realised)
