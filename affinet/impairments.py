@@ -222,7 +222,7 @@ class LinkProfile(Section):
     """What happens to the messages of a link. `like` names a profile to start from, `netem` is an option string of tc netem."""
 
     like: str | None = None
-    netem: str | None = None
+    netem: Annotated[str | None, Field(exclude=True)] = None  # a scenario as resolved has what it means instead
     loss: list[Loss] | None = None
     delay: DelayModel | None = None
     duplicate: Probability | None = None

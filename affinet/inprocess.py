@@ -86,13 +86,14 @@ class Swarm:
         row, links = self._plan.channels.index(channel), self._links
         content = np.where(links.present, delivery.newest[row, links.slots], -1)
         fresh = content >= 0
-        gathered = {name: self._gather(channel, name, content, fresh) for name in self._fields[channel]}
+        spoken = np.unique(content[fresh]).tolist() or [max(self._said)]
+        gathered = {name: self._gather(channel, name, content, spoken) for name in self._fields[channel]}
         mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
         return Heard(self._corrupt(gathered, row, content, mark) if mark.any() else gathered, fresh)
 
-    def _gather(self, channel: str, field: str, content: Integers, fresh: Mask) -> Any:
+    def _gather(self, channel: str, field: str, content: Integers, spoken: list[int]) -> Any:
         gathered = np.zeros(0)
-        for number, tick in enumerate(np.unique(content[fresh]).tolist() or [max(self._said)]):
+        for number, tick in enumerate(spoken):
             values = self._said[tick][channel][field][self._links.neighbours]
             chosen = (content == tick).reshape(content.shape + (1,) * (values.ndim - content.ndim))
             gathered = np.where(chosen, values, np.zeros_like(values) if number == 0 else gathered)

@@ -170,7 +170,7 @@ def _chain(model: Any) -> tuple[Chain, bool] | None:
         case impairments.Bernoulli():
             return loss.bernoulli(model.p), False
         case impairments.Gilbert():
-            begins = model.loss / (model.burst * (1.0 - model.loss))
+            begins = min(1.0, model.loss / (model.burst * (1.0 - model.loss)))
             return loss.gilbert_elliott(begins, 1.0 / model.burst, extra_delay=model.extra_delay), by_packet
         case impairments.GilbertElliott():
             return loss.gilbert_elliott(model.p, model.r, model.bad, model.good, model.extra_delay), by_packet

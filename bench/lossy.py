@@ -16,6 +16,7 @@ from netem.links import Integers, Mask
 from netem.loss import bernoulli, bursts, gilbert_elliott, markov
 from netem.timeline import Fault, Verb
 
+# Bursts longer than one message, or there is nothing to compare; and the share that is cut short.
 _ENOUGH, _HARDLY = 25, 0.002
 
 
@@ -107,12 +108,13 @@ def _bursts(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
     counted = np.zeros((lost.shape[1], horizon))
     np.add.at(counted, (link, length - 1), 1.0)
     chances = chain.burst_lengths(horizon - 1)
+    if counted.sum() * (1.0 - chances[0]) < _ENOUGH:
+        return
     if _renews(chain):
         yield against.counts("burst lengths", chances, counted.sum(axis=0))
     else:
         yield against.counts_by_link("burst lengths", chances, counted)
-    longer = counted.sum() * (1.0 - chances[0])
-    if longer >= _ENOUGH and 1.0 - chances.sum() < _HARDLY:  # else the mean hangs on a few, or is cut short
+    if 1.0 - chances.sum() < _HARDLY:
         yield against.ratio("mean burst", chain.mean_burst, counted @ np.arange(1.0, horizon + 1), counted.sum(axis=1))
 
 

@@ -24,6 +24,7 @@ _DELIVERED, _DELAYED, _STALE = int(Fate.DELIVERED), int(Fate.DELAYED), int(Mark.
 
 _NO_CELLS = np.empty(0, dtype=np.int64)
 _NO_DROPPED = np.empty((0, 5), dtype=np.int64)
+_NOTHING_ODD = np.empty((0, 5), dtype=np.int64)
 _NO_RELEASED = np.empty((0, 4), dtype=np.int64)
 _NOTHING = (np.empty((0, 4), dtype=np.int64), 0, _NO_DROPPED, _NO_RELEASED)
 
@@ -182,7 +183,7 @@ def deliver(air: Air, tick: int, verdicts: Verdicts, doom: Fates, holds: Mask) -
         arriving = np.concatenate([arriving, corrupted], axis=1)
     newest, mark, apart = _sorted_in(np.where(plain, tick, -1), arriving)
     if len(dropped):
-        air = air._replace(last_due=_last_due(air.last_due.shape, waiting))
+        air = air._replace(last_due=_without(air.last_due, dropped))
     return air._replace(under_way=waiting), Delivery(newest, mark, plain, apart, late, dropped, released)
 
 
@@ -205,6 +206,8 @@ def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
     passed = (verdicts.fate == _DELIVERED) | (verdicts.fate == _DELAYED)
     odd = passed & ((verdicts.due != tick) | (verdicts.mark != 0) | (verdicts.copy_due >= 0))
+    if not odd.any():
+        return _NOTHING_ODD
     channel, link = np.nonzero(odd)
     details = [field[channel, link] for field in (verdicts.due, verdicts.mark, verdicts.copy_due)]
     return np.stack([channel, link, *details], axis=-1).astype(np.int64)
@@ -232,11 +235,11 @@ def _drop(rows: Integers, doom: Fates) -> tuple[Integers, Integers]:
     return np.column_stack([_messages(rows[:, lost], len(doom)), why[lost]]), rows[:, ~lost]
 
 
-def _last_due(shape: tuple[int, ...], under_way: Integers) -> Integers:
-    """When the last message arrives of those still under way, shape (C, L): nobody waits for one that was dropped."""
-    last = np.full(shape, -1)
-    np.maximum.at(last.reshape(-1), under_way[_CELL], under_way[_DUE])
-    return last
+def _without(last_due: Integers, dropped: Integers) -> Integers:
+    """When the last message arrives, where nobody waits for one that was dropped: with it went all others of its link."""
+    after = last_due.copy()
+    after[dropped[:, 1], dropped[:, 2]] = -1
+    return after
 
 
 def _messages(columns: Integers, links: int) -> Integers:

@@ -18,7 +18,9 @@ from netem.draws import Array
 from netem.links import Integers
 
 # Probabilities that a user writes add up to 1 within this.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
+# Up to so many, all steps are computed from all states at once; beyond, from the state that is.
+_FEW_STATES = 4
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Chain:
     def __post_init__(self) -> None:
         """Refuse what is no chain."""
         rows = self.transition.sum(axis=-1)
-        if (self.transition < 0.0).any() or (np.abs(rows - 1.0) > _ROUNDING).any():
+        if (self.transition < 0.0).any() or (np.abs(rows - 1.0) > ROUNDING).any():
             raise ValueError(
                 f"transition probabilities must be positive and add up to 1, got rows that add up to {rows}"
             )
@@ -75,7 +77,9 @@ class Chain:
         return self.mean_loss / begins if begins > 0.0 else float("inf")
 
     def burst_lengths(self, longest: int) -> Array:
-        """Probability that a burst of losses has length 1, 2, ..., `longest`, shape (longest,)."""
+        """Probability that a burst of losses has length 1, 2, ..., `longest`, shape (longest,); NaN where none ever begins."""
+        if not self._burst_begins.any():
+            return np.full(longest, np.nan)
         going_on = self._burst_begins / self._burst_begins.sum()
         ends = self.transition @ (1.0 - self.loss)
         lengths = np.empty(longest)
@@ -192,6 +196,12 @@ class ChainLayer:
         states = np.empty(draws.shape, dtype=np.int64)
         if self.cumulative.shape[-1] == 1:
             states[:] = state
+            return states, state
+        links = np.arange(state.shape[-1])
+        if self.cumulative.shape[-1] > _FEW_STATES:
+            for row, draw in enumerate(draws):
+                states[row] = state
+                state = _pick(self.cumulative[links, state], draw)
             return states, state
         following = _pick(self.cumulative, draws[..., None])  # from whichever state it is in, (T, ..., L, S)
         for row, leads_to in enumerate(following):

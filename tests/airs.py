@@ -158,11 +158,11 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
     if "delays" in has:
         changes["delays"] = _delays(mix, links)
     if "ordered" in has:
-        queued = Delay(Law.UNIFORM, _on(mix, "ordered", links), 0.2, 0.2, np.empty(0), 0.0, ordered=True)
+        queued = Delay(Law.UNIFORM, _on(mix, "ordered", links), 0.4, 0.4, np.empty(0), 0.0, ordered=True)
         changes["delays"] = (*changes.get("delays", ()), queued)
     for name in ("duplicate", "reorder"):
         if name in has:
-            changes[name] = each(mix, name, links, lambda rng: rng.choice([0.0, 0.3]))
+            changes[name] = each(mix, name, links, lambda rng: rng.choice([0.0, 0.5]))
     if "corrupt" in has:
         changes["corrupt"] = each(mix, "corrupt", links, lambda rng: rng.dirichlet(np.ones(5))[1:] * rng.integers(2))
     if "rate" in has:

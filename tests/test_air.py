@@ -221,15 +221,24 @@ def test_a_message_that_is_lost_has_no_copy():
     assert (verdicts.copy_due[INPUT, :] == np.where(np.arange(SIZE) == ROW, -1, 0)).all()
 
 
+def long_spread():
+    """Each of 1 to 20 ticks as likely as the others."""
+    return Delay(Law.UNIFORM, ALL_ROWS, 1.0, 1.0, np.empty(0), 0.0, ordered=False)
+
+
+def assert_spread(waits):
+    assert set(np.unique(waits)) == set(range(1, 21))
+    assert abs(waits.mean() - 10.5) < 3 * np.sqrt((20**2 - 1) / 12 / waits.size)
+
+
 def test_a_copy_waits_for_itself():
-    spread = Delay(Law.UNIFORM, ALL_ROWS, 1.0, 1.0, np.empty(0), 0.0, ordered=False)
-    flown = fly(medium(quiet(duplicate=np.ones(SIZE), delays=(spread,))), always(300))
+    flown = fly(medium(quiet(duplicate=np.full(SIZE, 0.5), delays=(long_spread(),))), always(600))
     due = np.array([tick.verdicts.due[INPUT] - k for k, tick in enumerate(flown)])
     copy_due = np.array([tick.verdicts.copy_due[INPUT] - k for k, tick in enumerate(flown)])
-    for waits in (due, copy_due):
-        assert set(np.unique(waits)) == set(range(1, 21))
-        assert abs(waits.mean() - 10.5) < 3 * np.sqrt(20**2 / 12 / waits.size)
-    assert abs(np.corrcoef(due.ravel(), copy_due.ravel())[0, 1]) < 3 / np.sqrt(due.size)
+    doubled = np.array([tick.verdicts.copy_due[INPUT] >= 0 for tick in flown])
+    for waits in (due, due[doubled], copy_due[doubled]):
+        assert_spread(waits)
+    assert abs(np.corrcoef(due[doubled], copy_due[doubled])[0, 1]) < 3 / np.sqrt(doubled.sum())
 
 
 def test_messages_are_doubled_at_the_rate_of_their_link():
@@ -292,11 +301,11 @@ def test_only_the_links_of_an_ordered_delay_keep_their_order():
     assert (overtakes == ~half).all()
 
 
-def test_a_message_that_overtakes_is_not_delayed():
-    late = quiet(delays=taking([4] * SIZE), reorder=np.full(SIZE, 0.25), coupled=False)
+def test_a_message_that_overtakes_is_not_delayed_and_the_others_are_as_ever():
+    late = quiet(delays=(long_spread(),), reorder=np.full(SIZE, 0.25), coupled=False)
     takes = np.array([tick.verdicts.due[INPUT:] - k for k, tick in enumerate(fly(medium(late), always(500)))])
-    assert set(np.unique(takes)) == {0, 4}
     assert abs((takes == 0).sum() - takes.size / 4) < 3 * np.sqrt(takes.size * 3 / 16)
+    assert_spread(takes[takes > 0])
 
 
 def test_no_copy_overtakes_on_an_ordered_link():
@@ -476,7 +485,7 @@ def test_newest_of_is_the_newest_of_each_channel_and_link():
 TICKS = 30
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(case=cases(TICKS))
 def test_offered_and_copies_are_delivered_dropped_or_in_flight(case):
     _, offered, flown = fly_case(case, CHANNELS, TICKS)
@@ -514,7 +523,7 @@ def under_way_of(tick, verdicts, number):
     return rows
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(case=cases(TICKS))
 def test_every_message_under_way_arrives_once_when_it_is_due_or_meets_a_fault_that_drops_or_holds_it(case):
     timeline, offered, flown = fly_case(case, CHANNELS, TICKS)

@@ -190,6 +190,27 @@ def test_what_positions_decide_needs_them(impair):
         judged(standing)
 
 
+def test_a_zone_jams_the_links_it_can_toward_agents_inside_in_its_share_of_ticks_all_at_once():
+    rows = LINKS.src != 3
+    zone = Zone(np.array([0.0, 1.0]), 3.0, 0.4, rows, sensing=False, comms=True)
+    inside = rows & np.isin(LINKS.dst, [1, 2])  # agents 1 and 2 are 0 m and 2.8 m from its centre, agent 3 is 5.7 m
+    flown = fly(medium(profile(zones=(zone,), coupled=False)), always(500), np.broadcast_to(STANDING, (500, 5, 2)))
+    jammed = np.array([tick.verdicts.fate == Fate.JAMMED for tick in flown])
+    on = jammed.any(axis=(1, 2))
+    assert (jammed[on][:, 1:] == inside).all()
+    assert not jammed[:, 0].any()
+    assert abs(on.sum() - 500 * 0.4) < 3 * np.sqrt(500 * 0.4 * 0.6)
+
+
+def test_a_disk_holds_the_links_it_can_that_are_too_long():
+    rows = LINKS.src != 3
+    disk = Reach(Law.RAMP, rows, 3.0, 3.0, 0.0, 0.0, 1, sensing=True, comms=False)
+    fates = judged(profile(reaches=(disk,), coupled=False), position=STANDING)
+    neighbours = abs(LINKS.src - LINKS.dst) == 1  # 2.8 m apart, the others more
+    assert (fates[0] == np.where(rows & ~neighbours, Fate.RANGE, Fate.DELIVERED)).all()
+    assert (fates[1:] == Fate.DELIVERED).all()
+
+
 # ---- loss
 
 

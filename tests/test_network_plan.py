@@ -1,0 +1,180 @@
+"""From the network section to the air: selectors, profiles, traces, and what is said when they are wrong."""
+
+import json
+
+import numpy as np
+import pytest
+from flying import plan_of
+
+from affinet import impairments, scenario, selectors
+from affinet import plan as planning
+from affinet.inprocess import Swarm
+from affinet.run import fly
+from affinet.sections import ScenarioError
+from netem.fate import Fate
+
+CALM = ("network.availability=1.0", "time.duration=1")
+
+
+def planned(*overrides):
+    return planning.make(scenario.load("corridor", (*CALM, *overrides)))
+
+
+def says(*overrides):
+    return [finding.says for finding in planned(*overrides).findings if finding.check == "air"]
+
+
+def complaint(*overrides):
+    with pytest.raises(ScenarioError) as caught:
+        planned(*overrides)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("selector", "pairs"),
+    [
+        ("2->4", {(2, 4)}),
+        ("4-2", {(2, 4), (4, 2)}),
+        ("leaders->leaders", {(1, 2), (1, 3), (2, 1), (3, 1)}),
+        ("6->leaders", {(6, 3)}),
+        ("6", {(3, 6), (4, 6), (7, 6), (6, 3), (6, 4), (6, 7)}),
+    ],
+)
+def test_selectors_name_links(selector, pairs):
+    world = plan_of("corridor").world
+    assert set(selectors.pairs([selector], world.formation, world.links)) == pairs
+
+
+def test_all_names_every_link_once():
+    world = plan_of("corridor").world
+    assert len(selectors.pairs(["all", "leaders", "1-2"], world.formation, world.links)) == 24
+
+
+def test_later_settings_of_a_link_win_and_are_said_class_by_class():
+    said = says(
+        'network.links=[{links="leaders",profile="wifi_busy"},{links="1-2",profile="perfect",availability=0.5}]'
+    )
+    assert [text.split(":")[0] for text in said] == [
+        "2 links, profile 'perfect'",
+        "14 links, profile 'wifi_busy'",
+        "8 links, profile 'perfect'",
+    ]
+    assert "mean loss 0.5, mean burst 2 ticks" in said[0]
+
+
+def test_sensing_and_communication_are_said_apart_when_they_are_decided_apart():
+    sensing, comms = says("network.coupled=false", 'network.links=[{links="all",channels="sensing",availability=0.8}]')
+    assert sensing == "24 links, profile 'perfect', sensing: mean loss 0.2, mean burst 1.25 ticks"
+    assert comms.startswith("24 links, profile 'perfect', comms: mean loss 0, mean delay 0 s (0 ticks)")
+
+
+def test_a_profile_takes_from_another_what_it_does_not_say():
+    own = {"mine": impairments.LinkProfile.model_validate({"like": "acoustic", "loss": []})}
+    found = impairments.resolve("mine", own)
+    assert found.loss == []
+    assert found.delay == impairments.presets()["acoustic"].delay
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (('network.links=[{links="1-7"}]',), "network.links.1.links: '1-7' matches no link"),
+        (('network.links=[{links="1-9"}]',), "agent 9 does not exist"),
+        (('network.links=[{links="them"}]',), "selects no links"),
+        (('network.profile="nix"',), "no profile 'nix'; there are acoustic"),
+        (('network.profiles.a.like="b"', 'network.profiles.b.like="a"', 'network.profile="a"'), "a -> b -> a"),
+        (("network.availability=0.0",), "can never deliver"),
+        (('network.profiles.x.loss=[{model="bernoulli",p=1.0}]', 'network.profile="x"'), "can never deliver"),
+        (('network.profiles.x.loss=[{model="bernoulli",p=1.1}]',), "p: should be less than or equal to 1"),
+        (('network.profiles.x.loss=[{model="gauss",p=0.1}]',), "loss.1"),
+        (('network.profiles.x.loss=[{model="gilbert",loss=0.8,burst=2.0}]',), "lose at most 0.6667"),
+        (
+            ('network.profiles.x.loss=[{model="gilbert-elliott",p=0.0,r=0.0}]', 'network.profile="x"'),
+            "network.profiles.x: p and r are both 0",
+        ),
+        (('network.profiles.x.loss=[{model="ramp",inner=3.0,outer=1.0}]',), "beyond outer"),
+        (('network.profiles.x.loss=[{model="disk",range=1.0},{model="ramp",inner=1.0,outer=2.0}]',), "at most one of"),
+        (('network.profiles.x.delay={model="normal",mean=0.1}',), "is given by jitter and mean"),
+        (('network.profiles.x.delay={model="table",table=[0.2,0.1]}',), "ascending"),
+        (('network.profiles.x.delay={model="constant",mean=-1.0}',), "greater than or equal to 0"),
+        (('network.profiles.x.corrupt=[{kind="bias",p=0.1}]',), "give `by`"),
+        (('network.profiles.x.corrupt=[{kind="nan",p=0.7},{kind="stale",p=0.7}]',), "add up to at most 1"),
+        (("network.profiles.x.rate={rate=0.0}",), "greater than 0"),
+        (('network.profiles.x.netem="loss 10% 25%"',), "loss gemodel"),
+        (('network.profiles.x={netem="loss 10%",loss=[]}',), "given by netem and beside it"),
+        (("network.zones=[{centre=[0.0,0.0,0.0],radius=1.0}]",), "network.zones.1.centre: needs 2 coordinates"),
+        (('network.zones=[{centre=[0.0,0.0],radius=1.0,links="1-7"}]',), "network.zones.1.links"),
+        (('network.zones=[{centre=[0.0,0.0],radius=1.0,channels="comms"}]',), "coupled = true"),
+        (('network.links=[{links="all",channels="comms"}]',), "coupled = true gives sensing and comms one verdict"),
+        (('timeline=[{verb="lose",at=0.1,links=["1-7"],loss=0.5}]',), "timeline.1: '1-7' matches no link"),
+        (('timeline=[{verb="lose",at=0.1,links=["1-2"],loss=1.5}]',), "loss: should be less than or equal to 1"),
+        (('timeline=[{verb="cut",at=0.1,links=["1-2"],in_flight="keep"}]',), "'drop', 'deliver' or 'hold'"),
+    ],
+)
+def test_what_is_wrong_is_said(overrides, expected):
+    assert expected in complaint(*overrides)
+
+
+TRACED = ('network.profiles.t.loss=[{{model="trace",file="{}"}}]', 'network.profile="t"')
+
+
+def traced(file):
+    return (TRACED[0].format(file), TRACED[1])
+
+
+HEADER = "time,src,dst,availability\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("time,src\n", "line 1: the columns must be"),
+        (HEADER, "must begin at time 0"),
+        (HEADER + "0,1,2,0.5\n", "no availability at time 0 for"),
+        (HEADER + "0,1,7,0.5\n", "1->7 is not a link"),
+        (HEADER + "0,1,2,1.5\n", "line 2: time must be at least 0 s, and availability lie in [0, 1]"),
+        (HEADER + "0,1,2,much\n", "four numbers are due"),
+    ],
+)
+def test_what_is_wrong_in_a_trace_is_said(text, expected, tmp_path):
+    (tmp_path / "trace.csv").write_text(text)
+    assert expected in complaint(*traced(tmp_path / "trace.csv"))
+
+
+def test_a_trace_is_flown(tmp_path):
+    links = plan_of("corridor").world.links
+    rows = [
+        f"{at},{src},{dst},{share}" for src, dst in links.index for at, share in ((0, 1), (0.5, 0 if src == 4 else 1))
+    ]
+    (tmp_path / "trace.csv").write_text(HEADER + "\n".join(rows) + "\n")
+    swarm = Swarm(planned(*traced(tmp_path / "trace.csv")))
+    swarm.fly(lambda _: None, batch=50)
+    expected = np.full((100, 4, 24), int(Fate.DELIVERED))
+    expected[50:, :, links.src == 4] = Fate.LOST
+    assert np.array_equal(swarm.history.fates, expected)
+
+
+def test_the_losses_of_an_earlier_run_are_a_trace(tmp_path):
+    lossy = planned("network.availability=0.6", 'timeline=[{verb="cut",at=0.2,until=0.4,links=["1-2"]}]')
+    fly(lossy, "inprocess", tmp_path / "before", lambda *_: None)
+    swarm = Swarm(planned(*traced(tmp_path / "before"), "seed=9"))
+    swarm.fly(lambda _: None, batch=50)
+    first = Swarm(lossy)
+    first.fly(lambda _: None, batch=50)
+    lost = first.history.fates == Fate.LOST
+    assert 0.3 < lost.mean() < 0.5
+    assert np.array_equal(swarm.history.fates == Fate.LOST, lost)
+
+
+def test_a_run_shorter_than_this_one_is_no_trace(tmp_path):
+    fly(planned("time.duration=0.5"), "inprocess", tmp_path / "before", lambda *_: None)
+    assert "the run has 50 ticks, this one 100" in complaint(*traced(tmp_path / "before"))
+
+
+def test_a_resolved_scenario_flies_the_same_air(tmp_path):
+    plan = planned('network.profiles.x={like="wifi_busy",netem="duplicate 1%"}', 'network.profile="x"')
+    first = fly(plan, "inprocess", tmp_path / "first", lambda *_: None)
+    again = planning.make(scenario.resolved(tmp_path / "first"))
+    assert fly(again, "inprocess", tmp_path / "again", lambda *_: None).digest == first.digest
+    told = json.loads((tmp_path / "first" / scenario.FILE).read_text())
+    assert told["network"]["profile"] == "x"
