@@ -58,7 +58,7 @@ def plan(
         reorder=_each(heard, links, lambda profile: profile.reorder or 0.0),
         corrupt=np.stack([_each(heard, links, partial(_chance, kind)) for kind in list(Mark)[1:]], axis=-1),
         bias=_each(heard, links, _bias),
-        rate=_rate(heard, links),
+        rate=_rate(heard, links, message_bits),
         message_bits=message_bits,
     )
     notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
@@ -155,15 +155,15 @@ def _zones(network: Network, formation: Formation, links: Links) -> tuple[Zone, 
     return tuple(zones)
 
 
-def _listed(classes: Iterable[LinkClass]) -> Integers:
+def _listed(groups: Iterable[LinkClass]) -> Integers:
     rows = [
-        (row, number)
-        for one in classes
+        (row, number, one.sensing, one.comms)
+        for one in groups
         if (model := one.losses(impairments.Listed))
         for row in np.flatnonzero(one.rows).tolist()
         for number in model.messages
     ]
-    return np.array(sorted(set(rows)), dtype=np.int64).reshape(-1, 2)
+    return np.array(sorted(set(rows)), dtype=np.int64).reshape(-1, 4)
 
 
 def _each(classes: Iterable[LinkClass], links: Links, value: Callable[[LinkProfile], float]) -> Array:
@@ -181,7 +181,14 @@ def _bias(profile: LinkProfile) -> float:
     return sum(corruption.by or 0.0 for corruption in profile.corrupt or [])
 
 
-def _rate(classes: Sequence[LinkClass], links: Links) -> Rate | None:
+def _rate(classes: Sequence[LinkClass], links: Links, message_bits: Array) -> Rate | None:
+    largest = float(message_bits[1:].max())
+    for one in classes:
+        if (limit := one.profile.rate) and 8 * (limit.queue + limit.burst) < largest:
+            raise ScenarioError(
+                f"network.profiles.{one.name}.rate: queue and burst hold {limit.queue + limit.burst} bytes, "
+                f"and a message has up to {largest / 8:g}: some can never be delivered"
+            )
     if not any(one.profile.rate for one in classes):
         return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -171,6 +171,10 @@ Loss = Annotated[
     | DutyCycle,
     Field(discriminator="model"),
 ]
+
+LOSSES: dict[str, type[Section]] = {
+    get_args(model.model_fields["model"].annotation)[0]: model for model in get_args(get_args(Loss)[0])
+}
 
 
 class DelayModel(Section):

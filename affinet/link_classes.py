@@ -114,6 +114,8 @@ def classes(network: Network, formation: Formation, links: Links) -> list[LinkCl
         for number, special in enumerate(network.links, start=1):
             if special.channels is not None and special.channels not in group:
                 continue
+            if special.profile is not None:
+                _resolve(special.profile, network, f"network.links.{number}.profile")
             for row in select(special.links, formation, links, f"network.links.{number}.links"):
                 name, availability, ticks = settings[row]
                 settings[row] = (
@@ -123,7 +125,7 @@ def classes(network: Network, formation: Formation, links: Links) -> list[LinkCl
                 )
         for name, availability, ticks in dict.fromkeys(settings):
             rows = np.array([setting == (name, availability, ticks) for setting in settings])
-            profile = _resolve(name, network)
+            profile = _resolve(name, network, "network.profile")
             one = LinkClass(name, profile, availability, ticks, rows, "sensing" in group, "comms" in group)
             found.append(_possible(one))
     return found
@@ -156,11 +158,11 @@ def select(selector: str, formation: Formation, links: Links, key: str) -> list[
         raise ScenarioError(f"{key}: {error}") from error
 
 
-def _resolve(name: str, network: Network) -> LinkProfile:
+def _resolve(name: str, network: Network, key: str) -> LinkProfile:
     try:
         return impairments.resolve(name, network.profiles)
     except ValueError as error:
-        raise ScenarioError(f"network.profile: {error}") from error
+        raise ScenarioError(f"{key}: {error}") from error
 
 
 def _chain(model: Any) -> tuple[Chain, bool] | None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from affinet import sections
+from affinet import impairments, sections
 from affinet.impairments import Section
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
@@ -99,10 +99,14 @@ def _override(raw: dict[str, Any], override: str) -> None:
 
 def _explain(source: Source, problem: Mapping[str, Any]) -> str:
     loc = problem["loc"]
-    # The tag of a timeline entry stands in pydantic's path, but in no key of the file.
-    steps = [step for n, step in enumerate(loc) if not (n == 2 and loc[0] == "timeline")]
+    steps = [step for n, step in enumerate(loc) if not _is_tag(loc, n)]
     key = ".".join(str(step + 1) if isinstance(step, int) else step for step in steps) or "scenario"
     return f"{source.place(key)}: {key}: {_what_would_be_right(loc, problem)}"
+
+
+def _is_tag(loc: Sequence[str | int], place: int) -> bool:
+    """Whether a step is the tag of a timeline entry or loss: it stands in pydantic's path, but in no key of the file."""
+    return place >= 2 and loc[place - 2] in ("timeline", "loss") and isinstance(loc[place - 1], int)
 
 
 def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -> str:
@@ -117,23 +121,26 @@ def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -
         case "missing":
             return "is missing; it has no default"
         case "union_tag_not_found" | "union_tag_invalid":
-            return f"needs a verb among {', '.join(sections.VERBS)}"
+            tag, among = ("verb", sections.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
+            return f"needs a {tag} among {', '.join(among)}"
         case "value_error":
             return message
     return message if isinstance(given, dict | list) else f"{message}, got {given!r}"
 
 
 def _known_keys(loc: Sequence[str | int]) -> list[str]:
-    if loc[:1] == ("timeline",) and len(loc) > 2:
-        return sorted(sections.VERBS[str(loc[2])].model_fields)
+    if loc and _is_tag(loc, len(loc) - 1):
+        tagged = sections.VERBS if loc[0] == "timeline" else impairments.LOSSES
+        return sorted(tagged[str(loc[-1])].model_fields)
     models: list[Any] = [sections.Scenario]
     for step in loc:
         if isinstance(step, int):
             continue
         annotations = [str(model.model_fields[step].annotation) for model in models if step in model.model_fields]
-        models = [
-            model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)
-        ]
+        if annotations:  # else it is a name that the user gave
+            models = [
+                model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)
+            ]
     return sorted({field for model in models for field in model.model_fields})
 
 

@@ -149,7 +149,8 @@ def _listed(verdicts: int, seed: int) -> Iterator[Row]:
     drawn = np.stack([rng.integers(len(links), size=5000), rng.integers(ticks // 2, size=5000)], axis=-1)
     listed = np.unique(drawn, axis=0)
     offered = rng.random((ticks, 2, len(links))) < 0.5
-    air = flown.medium(seed, links, ("input", "theta"), listed=listed)
+    everywhere = np.column_stack([listed, np.ones_like(listed)])
+    air = flown.medium(seed, links, ("input", "theta"), listed=everywhere)
     fate = flown.fly(air, ticks, offered).fate
     number, wanted = np.cumsum(offered, axis=0) - 1, set(map(tuple, listed.tolist()))
     due = np.zeros_like(offered)

@@ -61,7 +61,7 @@ def everything(links: Links, ticks: int) -> Medium:
         reaches=(Reach(Law.LOG_DISTANCE, all_, 0.0, 40.0, 3.0, 4.0, 10, True, True),),
         zones=(Zone(np.array([1.0, 0.0]) * links.agents, links.agents / 3.0, 0.5, all_, True, True),),
         schedules=(Schedule(*schedule.slotted(links, 1)[:2], np.full(size, links.agents - 2), True, True),),
-        listed=np.array([[0, 1000]]),
+        listed=np.array([[0, 1000, 1, 1]]),
         rate=Rate(np.full(size, 1.2e5), np.full(size, 1e3), np.full(size, 2e3)),
     )
 

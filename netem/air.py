@@ -253,12 +253,10 @@ def _sorted_in(plain: Integers, arriving: Integers) -> tuple[Integers, Marks, In
     channels, links = plain.shape
     content, cell, how = arriving[_CONTENT], arriving[_CELL], arriving[_MARK]
     channel, link = np.divmod(cell, links)
-    # One number each, in the order of content, link, channel and mark: sorted, the last for a cell is its newest.
+    # One number each, in the order of content, link, channel and mark.
     order = np.argsort(((content * links + link) * channels + channel) << _MARK_BITS | how)
-    content, cell, how = content.take(order), cell.take(order), how.take(order)
-    newest, mark = plain.copy(), np.zeros(plain.shape, dtype=np.uint8)
-    before = newest.take(cell)
-    wins = (content > before) | ((content == before) & (how > 0))
-    newest.put(cell[wins], content[wins])
-    mark.put(cell[wins], how[wins])
-    return newest, mark, np.stack([content, link.take(order), channel.take(order), how], axis=-1)
+    newest = np.where(plain >= 0, plain << _MARK_BITS, -1)
+    np.maximum.at(newest.reshape(-1), cell, content << _MARK_BITS | how)
+    mark = np.where(newest >= 0, newest & (1 << _MARK_BITS) - 1, 0).astype(np.uint8)
+    apart = np.stack([content, link, channel, how], axis=-1)[order]
+    return newest >> _MARK_BITS, mark, apart

@@ -56,6 +56,8 @@ def markov(p13: float, p31: float, p32: float, p23: float, p14: float) -> Chain:
     for name, leaving in (("p13 + p14", p13 + p14), ("p31 + p32", p31 + p32)):
         if leaving > 1.0 + ROUNDING:
             raise ValueError(f"{name} is {leaving:g}; the probabilities out of one state add up to at most 1")
+    if p13 + p14 == 0.0:
+        raise ValueError("p13 and p14 are both 0: no message would ever be lost")
     stays_good, stays_lost = (max(0.0, 1.0 - leaving) for leaving in (p13 + p14, p31 + p32))
     transition = [
         [stays_good, 0.0, p13, p14],

@@ -139,17 +139,16 @@ class Medium:
             np.copyto(reason, fate, where=held)
         reason = np.minimum(reason, self._under(now).standing)
         passed = offered & (reason == PASSED)
-        debt, overflow, due = self._due(air, tick, weather, packets.extra_s, passed)
+        debt, overflow, due, waited_s = self._due(air, tick, weather, packets.extra_s, passed)
         if overflow is not None:
             np.copyto(reason, _OVERFLOW, where=overflow)
             passed &= ~overflow
         np.copyto(reason, _DELIVERED, where=passed)
         np.copyto(reason, _DELAYED, where=passed & (due > tick))
         np.copyto(reason, _SILENT, where=~offered)
-        verdicts = Verdicts(
-            reason, due, self._marks(air, weather, passed), self._copies(tick, weather, packets, passed, due)
-        )
-        last_due = np.where(passed, due, air.last_due) if self._keeps_order else air.last_due
+        copy_due = self._copies(tick, weather, passed, due, waited_s)
+        verdicts = Verdicts(reason, due, self._marks(air, weather, passed), copy_due)
+        last_due = np.where(passed, np.maximum(due, copy_due), air.last_due) if self._keeps_order else air.last_due
         return Air(air.under_way, air.offered + offered, offered, last_due, debt, packets.states), verdicts
 
     def deliver(self, air: Air, tick: int, verdicts: Verdicts) -> tuple[Air, Delivery]:
@@ -200,11 +199,13 @@ class Medium:
         if self._under(self.timeline.at(tick)).scripted:
             yield _SCRIPTED, self._scripted.at(tick) < self.timeline.at(tick).loss
 
-    def _listed(self, number: Integers) -> Mask:
-        listed = self.profile.listed
+    def _listed(self, offered: Integers) -> Mask:
+        link, listed, sensing, comms = self.profile.listed.T
+        number = offered[:1] if self.profile.coupled else offered  # one verdict for all: that on the sensing
+        hit = (number[:, link] == listed) & np.where(self._sensing[:, None], sensing, comms).astype(bool)
         held = np.zeros(self._shape, dtype=bool)
-        channel, row = np.nonzero(number[:, listed[:, 0]] == listed[:, 1])
-        held[channel, listed[row, 0]] = True
+        channel, row = np.nonzero(hit)
+        held[channel, link[row]] = True
         return held
 
     def _packet_chains(self, air: Air, tick: int, offered: Mask) -> _Packets:
@@ -226,28 +227,29 @@ class Medium:
 
     def _due(
         self, air: Air, tick: int, weather: Weather, extra_s: Array, passed: Mask
-    ) -> tuple[Array, Mask | None, Integers]:
-        """The queues' debt, the messages they refuse, and when the others arrive."""
+    ) -> tuple[Array, Mask | None, Integers, Array]:
+        """The queues' debt, what they refuse, when the others arrive, and what queues and packet chains let them wait."""
         rate, overflow, debt, wait = self.profile.rate, None, air.debt, weather.delay_ticks
         if self._packet_layers or rate:
-            seconds = weather.delay_s + extra_s
             if rate:
-                debt = rate.rest(debt, self.profile.dt) if tick else debt
-                debt, overflow, queued = rate.admit(debt, self._bits, passed)
-                seconds = seconds + queued
-            wait = np.where(self._comms, np.maximum(delay.ticks(seconds, self.profile.dt), self.profile.least_delay), 0)
+                debt, overflow, queued = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passed)
+                extra_s = extra_s + queued
+            wait = delay.ticks(weather.delay_s + extra_s, self.profile.dt)
+            wait = np.where(self._comms, np.maximum(wait, self.profile.least_delay), 0)
         due = tick + wait
-        return debt, overflow, np.where(self._ordered, np.maximum(due, air.last_due), due) if self._keeps_order else due
+        if self._keeps_order:
+            due = np.where(self._ordered, np.maximum(due, air.last_due), due)
+        return debt, overflow, due, extra_s
 
     def _marks(self, air: Air, weather: Weather, passed: Mask) -> Marks:
         if not self._corrupts:
             return self._unmarked
         return weather.mark * (passed & ((weather.mark != _STALE) | air.spoke))
 
-    def _copies(self, tick: int, weather: Weather, packets: _Packets, passed: Mask, due: Integers) -> Integers:
+    def _copies(self, tick: int, weather: Weather, passed: Mask, due: Integers, waited_s: Array) -> Integers:
         if not self._doubles:
             return self._single
-        wait = delay.ticks(weather.copy_delay_s + packets.extra_s, self.profile.dt)
+        wait = delay.ticks(weather.copy_delay_s + waited_s, self.profile.dt)
         arrival = tick + np.maximum(wait, self.profile.least_delay)
         if self._keeps_order:
             arrival = np.where(self._ordered, np.maximum(arrival, due), arrival)

@@ -35,7 +35,8 @@ class Profile:
     reaches, zones
         Losses that positions decide.
     listed
-        Messages that are dropped, by number: rows of (link row, how many were offered before it), shape (m, 2).
+        Messages that are dropped, by number: rows of (link row, how many were offered before it, whether on sensing, whether
+        on communication), shape (m, 4).
     delays
         What a message waits, in sum.
     duplicate, reorder

@@ -39,7 +39,7 @@ def quiet_profile(links, channels, **changes):
         schedules=(),
         reaches=(),
         zones=(),
-        listed=np.empty((0, 2), dtype=np.int64),
+        listed=np.empty((0, 4), dtype=np.int64),
         delays=(),
         duplicate=np.zeros(size),
         reorder=np.zeros(size),
@@ -152,9 +152,11 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
         )
     if "listed" in has:
         drops = [
-            (row, n) for row, pair in enumerate(links.index) for n in rng_of(mix, "listed", pair).permutation(20)[:3]
+            (row, n, 1, 1)
+            for row, pair in enumerate(links.index)
+            for n in rng_of(mix, "listed", pair).permutation(20)[:3]
         ]
-        changes["listed"] = np.array(drops, dtype=np.int64).reshape(-1, 2)
+        changes["listed"] = np.array(drops, dtype=np.int64).reshape(-1, 4)
     if "delays" in has:
         changes["delays"] = _delays(mix, links)
     if "ordered" in has:

@@ -606,3 +606,18 @@ def test_the_mixtures_have_everything_in_them():
     assert released > 0
     assert copies > 0
     assert set(REASONS) <= set(fates)
+
+
+def test_a_copy_waits_in_the_queue_as_its_message_does():
+    limited = quiet(duplicate=np.ones(SIZE), rate=Rate(np.full(SIZE, BITS), np.zeros(SIZE), np.full(SIZE, 9e9)))
+    verdicts = fly(medium(limited), always(1))[0].verdicts
+    assert (verdicts.copy_due[1:] == verdicts.due[1:]).all()
+    assert (verdicts.due[1:] > 0).all()
+
+
+def test_no_message_overtakes_a_copy_sent_before_it_on_an_ordered_link():
+    standing = quiet(delays=(spread(ordered=True),), duplicate=np.full(SIZE, 0.5))
+    latest = -1
+    for verdicts, _, _ in fly(medium(standing), always(60)):
+        assert (verdicts.due[1:] >= latest).all()
+        latest = np.maximum(verdicts.due, verdicts.copy_due)[1:]

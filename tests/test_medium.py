@@ -91,7 +91,7 @@ def with_all_jammed(standing):
 
 
 def with_all_listed(standing):
-    return replace(standing, listed=np.array([[ROW, 0]]))
+    return replace(standing, listed=np.array([[ROW, 0, 1, 1]]))
 
 
 def with_all_lost(standing):
@@ -161,7 +161,7 @@ def test_layers_are_independent():
         "chains": (losing(np.full(SIZE, 0.6)),),
         "traces": (trace,),
         "schedules": (duty,),
-        "listed": np.array([[0, 3], [4, 17], [4, 18]]),
+        "listed": np.array([[0, 3, 1, 1], [4, 17, 1, 1], [4, 18, 1, 1]]),
     }
     quiet = quiet_profile(LINKS, CHANNELS)
     alone = [verdicts(quiet, TICKS, [fault]) for fault in faults]
