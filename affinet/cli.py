@@ -9,18 +9,20 @@ import argparse
 import json
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from affinet import compare, scenario, show
 from affinet import plan as planning
-from affinet import scenario, show
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
-from affinet.run import fly
+from affinet.run import Runtime, fly
 from affinet.sections import ScenarioError
+from world import history
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -47,8 +49,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
     check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")
-    replay = commands.add_parser("replay", help="fly again what was flown, under the verdicts of its journal")
-    for command in (run, check):
+    replay = commands.add_parser("replay", help="fly again what was flown, and compare")
+    determinism = commands.add_parser(
+        "check-determinism", help="fly a scenario twice in process and once over processes, and compare every bit"
+    )
+    for command in (run, check, determinism):
         command.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(scenario.shipped())}")
     replay.add_argument("directory", type=Path, metavar="DIR", help="the run directory")
     replay.add_argument(
@@ -56,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="take every verdict from its journal, whatever the seed; without it the models decide again",
     )
-    for command in (run, check, replay):
+    for command in (run, check, determinism, replay):
         _add_overrides(command)
     for command in (run, replay):
         command.add_argument(
@@ -67,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
     check.set_defaults(command=_check)
     replay.set_defaults(command=_replay)
+    determinism.set_defaults(command=_check_determinism)
     _add_inject(commands)
     return parser
 
@@ -145,14 +151,43 @@ def _run(parsed: argparse.Namespace) -> int:
 
 
 def _replay(parsed: argparse.Namespace) -> int:
-    return _fly(planning.again(parsed.directory, _overrides(parsed), verdicts=parsed.verdicts), "replay", parsed)
+    overrides = _overrides(parsed)
+    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts)
+    status = _fly(plan, "replay", parsed)
+    flown, again = parsed.directory / history.FILE, parsed.out / history.FILE
+    if overrides or not flown.exists() or not again.exists():
+        return status  # it was to be another run, or one of the two left nothing to compare
+    links, channels = plan.world.links, plan.channels
+    difference = compare.first_difference(history.load(flown), history.load(again), links, channels)
+    print(difference or f"the same bits as {parsed.directory}", file=sys.stderr)  # noqa: T201
+    return status if difference is None else FAIL
+
+
+def _check_determinism(parsed: argparse.Namespace) -> int:
+    plan = planning.make(scenario.load(parsed.scenario, _overrides(parsed)))
+    runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
+    with tempfile.TemporaryDirectory(prefix="affinet-") as folder:
+        flown = []
+        for number, runtime in enumerate(runs):
+            with show.Progress(plan, runtime, Path(folder) / str(number)) as watch:
+                done = fly(plan, runtime, Path(folder) / str(number), watch.see)
+            if done.digest is None:
+                print(f"{runtime}: {'; '.join(done.reasons)}", file=sys.stderr)  # noqa: T201
+                return FAIL
+            flown.append(history.load(Path(folder) / str(number) / history.FILE))
+    for runtime, arrays in zip(runs[1:], flown[1:], strict=True):
+        if difference := compare.first_difference(flown[0], arrays, plan.world.links, plan.channels):
+            print(f"inprocess, then {runtime}: {difference}")  # noqa: T201
+            return FAIL
+    print(f"twice in process and once over processes: {len(flown[0]['error'])} ticks, the same bits")  # noqa: T201
+    return PASS
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
-    out = parsed.out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    parsed.out = parsed.out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
     viewer = open_viewer() if parsed.view else None
-    with show.Progress(plan, name, out) as watch:
-        outcome = fly(plan, parsed.runtime, out, watch.see, viewer)
+    with show.Progress(plan, name, parsed.out) as watch:
+        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
     if parsed.json:
         print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
     else:

@@ -52,7 +52,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
     from netem import journal  # pyarrow takes a while to import, and the start should not wait for it
 
     flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
-    path, recording, book = out / "arrays.npz", out / "run.rrd", out / journal.FILE
+    path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
     if flight.failure and not path.exists() and recording.exists():
         mend(recording)  # the world was killed, or never got far: it could not close its recording
     return outcome.judge(
@@ -90,7 +90,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
 
         swarm.fly(see, batch_of(record.every))
     wall_s = time.perf_counter() - started
-    swarm.history.save(out / "arrays.npz")
+    swarm.history.save(out / history.FILE)
     return outcome.judge(
         plan,
         swarm.history.arrays(),

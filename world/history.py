@@ -22,6 +22,8 @@ from world.world import World
 
 Arrays = dict[str, NDArray[Any]]
 
+FILE = "arrays.npz"  # in a run directory
+
 _BY_TICK = (
     "position",
     "velocity",

@@ -17,6 +17,7 @@ from netem.supervised import Supervisor, patience
 from netem.timeline import Fault, Timeline
 from world.brief import WorldBrief, batch_of
 from world.formation import Array
+from world.history import FILE as ARRAYS
 from world.history import History, Moment, gather
 from world.logbook import Logbook
 
@@ -169,5 +170,5 @@ def main() -> None:
                 with supervisor.confessing():
                     theatre.run(logbook)
             finally:
-                theatre.history.save(Path(brief.out) / "arrays.npz")
+                theatre.history.save(Path(brief.out) / ARRAYS)
         supervisor.tell("done", uninstructed=theatre.uninstructed)

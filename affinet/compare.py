@@ -1,0 +1,100 @@
+"""Two runs compared bit by bit: the first thing in which they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from netem.links import Links
+from world.history import Arrays
+
+# In the order in which a tick makes them, so that a cause is named before what follows from it.
+_OF_AGENTS = ("target", "position", "known", "estimate", "psi", "velocity")
+_OF_LINKS = ("fates", "newest")
+_ORDER = (
+    "target",
+    "position",
+    "error",
+    "fates",
+    "newest",
+    "copies",
+    "late",
+    "dropped",
+    "known",
+    "estimate",
+    "psi",
+    "velocity",
+)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where two runs part.
+
+    Parameters
+    ----------
+    tick
+        The first in which they differ.
+    quantity
+        The first array in which they do.
+    where
+        The agent, or the link and channel.
+    one, other
+        The two values.
+    """
+
+    tick: int
+    quantity: str
+    where: str
+    one: str
+    other: str
+
+    def __str__(self) -> str:
+        at = f" of {self.where}" if self.where else ""
+        return f"tick {self.tick}: {self.quantity}{at} is {self.one} in one run and {self.other} in the other"
+
+
+def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequence[str]) -> Difference | None:
+    """The first difference of two runs over the same links and channels; None when every bit is the same."""
+    parted = [
+        (tick, place, name)
+        for place, name in enumerate(_ORDER)
+        if (tick := _first_tick(one[name], other[name])) is not None
+    ]
+    if not parted:
+        return None
+    tick, _, name = min(parted)
+    if tick >= min(len(one[name]), len(other[name])):
+        lengths = [f"{len(arrays['error'])} ticks long" for arrays in (one, other)]
+        return Difference(tick, "the run", "", *lengths)
+    here, there = one[name][tick : tick + 1], other[name][tick : tick + 1]
+    place = tuple(np.argwhere(_unlike(here, there))[0].tolist())
+    return Difference(
+        tick, name, _where(name, place[1:], links, channels), repr(here[place].item()), repr(there[place].item())
+    )
+
+
+def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:
+    common = min(len(one), len(other))
+    unlike = _unlike(one[:common], other[:common]).reshape(common, -1).any(axis=-1)
+    if unlike.any():
+        return int(np.argmax(unlike))
+    return None if len(one) == len(other) else common
+
+
+def _unlike(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.bool_]:
+    """Where two arrays differ in any bit: a NaN is like itself, and 0.0 is not -0.0."""
+    if one.dtype.kind == "f":
+        one, other = (np.ascontiguousarray(array).view(np.uint64) for array in (one, other))
+    unlike: NDArray[np.bool_] = np.not_equal(one, other)
+    return unlike
+
+
+def _where(name: str, row: tuple[int, ...], links: Links, channels: Sequence[str]) -> str:
+    if name in _OF_LINKS:
+        return f"{channels[row[0]]} on {links.src[row[1]]}->{links.dst[row[1]]}"
+    return f"agent {row[0] + 1}" if name in _OF_AGENTS else ""

@@ -1,0 +1,77 @@
+"""Two runs are compared bit by bit, and the first difference is named."""
+
+import json
+
+import numpy as np
+import pytest
+from flying import plan_of
+
+from affinet import cli
+from affinet.compare import first_difference
+from affinet.inprocess import Swarm
+from affinet.run import fly
+from netem.fate import Fate
+from world import history
+
+PLAN = plan_of("corridor", "time.duration=0.5")
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    swarm = Swarm(PLAN)
+    swarm.fly(lambda _: None, batch=50)
+    return swarm.history.arrays()
+
+
+def compared(arrays, **changes):
+    other = {name: array.copy() for name, array in arrays.items()}
+    for name, (index, value) in changes.items():
+        other[name][index] = value
+    return first_difference(arrays, other, PLAN.world.links, PLAN.channels)
+
+
+def test_a_run_is_like_itself(arrays):
+    assert compared(arrays) is None
+    assert np.isnan(arrays["psi"]).any()
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"velocity": ((7, 3, 1), 0.25)}, "tick 7: velocity of agent 4 is "),
+        ({"psi": ((0, 6), np.nan), "position": ((9, 0, 0), 0.0)}, "tick 0: psi of agent 7 is "),
+        ({"newest": ((5, 2, 1), 77), "estimate": ((5, 0, 0, 0), 9.0)}, "tick 5: newest of measurement on 3->1 is "),
+        ({"fates": ((3, 0, 0), Fate.DEAD), "newest": ((3, 0, 0), 9)}, "tick 3: fates of sense on 2->1 is "),
+        ({"error": (12, 8.0)}, "tick 12: error is "),
+    ],
+)
+def test_the_first_difference_is_named(changes, named, arrays):
+    assert str(compared(arrays, **changes)).startswith(named)
+
+
+def test_zero_is_not_negative_zero(arrays):
+    zero = {name: array.copy() for name, array in arrays.items()} | {"error": np.zeros(50)}
+    assert compared(zero, error=(20, -0.0)).tick == 20
+
+
+def test_a_shorter_run_differs_where_it_ends(arrays):
+    shorter = {name: array[:30] for name, array in arrays.items()}
+    difference = first_difference(arrays, shorter, PLAN.world.links, PLAN.channels)
+    assert (difference.tick, difference.quantity) == (30, "the run")
+
+
+def test_a_replay_is_compared_with_what_was_flown(out, tmp_path, capsys):
+    fly(PLAN, "inprocess", out, lambda *_: None)
+    again = ["replay", str(out), "--runtime", "inprocess", "--json", "--out"]
+    assert cli.main([*again, str(tmp_path / "same")]) == 0
+    assert "the same bits as" in capsys.readouterr().err
+    told = json.loads((out / "scenario.json").read_text())
+    (out / "scenario.json").write_text(json.dumps(told | {"seed": 5}))
+    assert cli.main([*again, str(tmp_path / "other")]) == 1
+    assert "tick 0: position of agent 4 is" in capsys.readouterr().err
+    assert history.load(tmp_path / "other" / history.FILE)["error"].shape == (50,)
+
+
+def test_determinism_is_checked_in_both_runtimes(capsys):
+    assert cli.main(["check-determinism", "corridor", "--duration", "0.5"]) == 0
+    assert "50 ticks, the same bits" in capsys.readouterr().out
