@@ -52,7 +52,9 @@ def sizes(plan: Plan) -> dict[str, int]:
         ),
         "heard": wire.pack_exchange(500, 500, broadcasts * heard),
         "act": wire.pack(wire.Act(500, 1, 500, number(size=2), number(size=(degree, 2)), [True] * degree, 0.1, 500)),
-        "journal": wire.pack(wire.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [9] * agents, 0, [])),
+        "journal": wire.pack(
+            wire.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [], [], 0, [], [], [9] * agents, None)
+        ),
     }
     return {name: len(data) for name, data in messages.items()} | {"said": len(broadcasts[-1])}
 
