@@ -150,7 +150,7 @@ def _listed(verdicts: int, seed: int) -> Iterator[Row]:
     listed = np.unique(drawn, axis=0)
     offered = rng.random((ticks, 2, len(links))) < 0.5
     everywhere = np.column_stack([listed, np.ones_like(listed)])
-    air = flown.medium(seed, links, ("input", "theta"), listed=everywhere)
+    air = flown.medium(seed, links, ("input", "theta"), listed=everywhere, coupled=False)
     fate = flown.fly(air, ticks, offered).fate
     number, wanted = np.cumsum(offered, axis=0) - 1, set(map(tuple, listed.tolist()))
     due = np.zeros_like(offered)
