@@ -164,7 +164,6 @@ class Launcher:
                 return
 
     def _world_brief(self, login: Login) -> WorldBrief:
-        record = self._plan.scenario.record
         return WorldBrief(
             run=self._run,
             login=login,
@@ -172,10 +171,7 @@ class Launcher:
             world=self._plan.world,
             channels=self._plan.channels,
             faults=self._plan.faults,
-            every=record.every,
-            window=self._plan.window,
-            record=record.enabled,
-            viewer=self._viewer,
+            books=self._plan.books(self._viewer),
             patience_s=_WORLD_PATIENCE_S,
         )
 

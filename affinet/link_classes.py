@@ -10,7 +10,7 @@ import numpy as np
 
 from affinet import impairments, selectors
 from affinet.impairments import LinkProfile
-from affinet.sections import Network, ScenarioError
+from affinet.sections import Network, ScenarioError, said_at
 from netem import delay, loss
 from netem import schedule as turns
 from netem.chain import Chain
@@ -133,10 +133,8 @@ def classes(network: Network, formation: Formation, links: Links) -> list[LinkCl
 
 def _possible(one: LinkClass) -> LinkClass:
     """The class itself, if its losses are chains at all, and let anything pass."""
-    try:
+    with said_at(f"network.profiles.{one.name}"):
         passing = np.prod([1.0 - chain.mean_loss for chain, _ in one.chains])
-    except ValueError as error:
-        raise ScenarioError(f"network.profiles.{one.name}: {error}") from error
     if passing < _NEVER:
         raise ScenarioError(
             f"network: {one.title}: can never deliver a message; raise its availability, or cut the links in the timeline"
@@ -152,17 +150,13 @@ def select(selector: str, formation: Formation, links: Links, key: str) -> list[
     ScenarioError
         Naming the key, when it names none.
     """
-    try:
+    with said_at(key):
         return selectors.rows(selector, formation, links)
-    except ValueError as error:
-        raise ScenarioError(f"{key}: {error}") from error
 
 
 def _resolve(name: str, network: Network, key: str) -> LinkProfile:
-    try:
+    with said_at(key):
         return impairments.resolve(name, network.profiles)
-    except ValueError as error:
-        raise ScenarioError(f"{key}: {error}") from error
 
 
 def _chain(model: Any) -> tuple[Chain, bool] | None:

@@ -11,17 +11,18 @@ import numpy as np
 
 from affinet import air, checks, registry, scenario, sections, selectors
 from affinet.checks import Finding
-from affinet.sections import Scenario, ScenarioError
+from affinet.sections import Scenario, ScenarioError, said_at
 from agents.agent import Agent
 from agents.brief import Brief
 from agents.process import Choice
 from analysis.affine import Array, Manoeuvre
 from netem import channels
 from netem.links import Links
-from netem.medium import Verdicted
+from netem.medium import Verdicted, recorded
 from netem.profile import Profile
 from netem.timeline import Fault, Timeline, UnderWay, Verb
 from world import maneuver, stress
+from world.brief import Books
 from world.formation import PRESETS, Formation
 from world.world import World
 
@@ -72,11 +73,12 @@ class Plan:
 
     def recorded(self) -> Verdicted | None:
         """The verdicts of the earlier run that is to be judge of this one."""
-        if self.journal is None:
-            return None
-        from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
+        return recorded(self.journal, self.world.links, self.channels)
 
-        return journal.Recorded(journal.read(self.journal), self.world.links, self.channels)
+    def books(self, viewer: str | None) -> Books:
+        """How a run of it is written down, and streamed to a viewer that listens at this URL."""
+        record = self.scenario.record
+        return Books(record.every, self.window, record.enabled, viewer)
 
     @property
     def window(self) -> int:
@@ -274,21 +276,21 @@ def _faults(given: Scenario, formation: Formation, links: Links) -> tuple[Fault,
             _restart(faults, event.agents, start, f"timeline.{number}")
             continue
         until = None if isinstance(event, sections.Kill) or event.until is None else _tick(event.until, given.time.dt)
-        try:
-            faults += _of_event(event, start, until, formation, links)
+        pairs: tuple[tuple[int, int], ...] = ()
+        if isinstance(event, sections.Cut | sections.Lose):
+            with said_at(f"timeline.{number}.links"):
+                pairs = selectors.pairs(event.links, formation, links)
+        faults += _of_event(event, start, until, pairs)
+        with said_at(f"timeline.{number}"):
             Timeline(links, faults)
-        except ValueError as error:
-            raise ScenarioError(f"timeline.{number}: {error}") from error
     return tuple(faults)
 
 
-def _of_event(event: Any, start: int, until: int | None, formation: Formation, links: Links) -> list[Fault]:
+def _of_event(event: Any, start: int, until: int | None, pairs: tuple[tuple[int, int], ...]) -> list[Fault]:
     match event:
         case sections.Cut():
-            pairs = selectors.pairs(event.links, formation, links)
             return [Fault(Verb.CUT, start, until, pairs=pairs, under_way=UnderWay(event.in_flight))]
         case sections.Lose():
-            pairs = selectors.pairs(event.links, formation, links)
             return [Fault(Verb.LOSE, start, until, pairs=pairs, loss=event.loss)]
         case sections.Partition():
             groups = tuple(map(tuple, event.groups))

@@ -14,7 +14,6 @@ from affinet.outcome import Outcome
 from affinet.plan import Plan
 from affinet.rerun_command import mend
 from world import history
-from world.brief import batch_of
 from world.history import Moments
 
 Runtime = Literal["processes", "inprocess"]
@@ -70,25 +69,15 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
-    record = plan.scenario.record
-    swarm = Swarm(plan)
+    swarm, books = Swarm(plan), plan.books(viewer)
     started = time.perf_counter()
-    with Logbook(
-        out,
-        out.name,
-        plan.world,
-        plan.channels,
-        every=record.every,
-        window=plan.window,
-        record=record.enabled,
-        viewer=viewer,
-    ) as logbook:
+    with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
 
         def see(moments: Moments) -> None:
             logbook.write(moments, plan.timeline)
             watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
 
-        swarm.fly(see, batch_of(record.every))
+        swarm.fly(see, books.batch)
     wall_s = time.perf_counter() - started
     swarm.history.save(out / history.FILE)
     return outcome.judge(

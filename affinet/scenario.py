@@ -109,6 +109,11 @@ def _is_tag(loc: Sequence[str | int], place: int) -> bool:
     return place >= 2 and loc[place - 2] in ("timeline", "loss") and isinstance(loc[place - 1], int)
 
 
+def _tagged(loc: Sequence[str | int]) -> tuple[str, Mapping[str, type[Section]]]:
+    """The key that says which entry of the timeline, or which loss, it is; and all there are."""
+    return ("verb", sections.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
+
+
 def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -> str:
     message: str = problem["msg"].removeprefix("Value error, ").replace("Input should", "should")
     given = problem.get("input")
@@ -121,7 +126,7 @@ def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -
         case "missing":
             return "is missing; it has no default"
         case "union_tag_not_found" | "union_tag_invalid":
-            tag, among = ("verb", sections.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
+            tag, among = _tagged(loc)
             return f"needs a {tag} among {', '.join(among)}"
         case "value_error":
             return message
@@ -130,8 +135,7 @@ def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -
 
 def _known_keys(loc: Sequence[str | int]) -> list[str]:
     if loc and _is_tag(loc, len(loc) - 1):
-        tagged = sections.VERBS if loc[0] == "timeline" else impairments.LOSSES
-        return sorted(tagged[str(loc[-1])].model_fields)
+        return sorted(_tagged(loc)[1][str(loc[-1])].model_fields)
     models: list[Any] = [sections.Scenario]
     for step in loc:
         if isinstance(step, int):

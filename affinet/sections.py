@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -26,6 +27,17 @@ class ScenarioError(ValueError):
 def _edge(text: str) -> str:
     edge(text)
     return text
+
+
+@contextmanager
+def said_at(key: str) -> Iterator[None]:
+    """What is wrong in the block is said as a problem of this key."""
+    try:
+        yield
+    except ScenarioError:
+        raise
+    except ValueError as error:
+        raise ScenarioError(f"{key}: {error}") from error
 
 
 Links = Annotated[str, AfterValidator(check)]

@@ -46,7 +46,7 @@ class Chain:
         rows = self.transition.sum(axis=-1)
         if (self.transition < 0.0).any() or (np.abs(rows - 1.0) > ROUNDING).any():
             raise ValueError(
-                f"transition probabilities must be positive and add up to 1, got rows that add up to {rows}"
+                f"transition probabilities must not be negative, and add up to 1 from each state, got {self.transition}"
             )
         if ((self.loss < 0.0) | (self.loss > 1.0)).any():
             raise ValueError(f"loss probabilities must lie in [0, 1], got {self.loss}")

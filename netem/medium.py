@@ -11,6 +11,7 @@ Nothing here knows what a message says: the medium works on who offered what, ov
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from netem.air import Air, Delivery, Verdicts, deliver
 from netem.corrupt import Mark, Marks
 from netem.draws import Array, Purpose, Tape, uniform
 from netem.fate import PASSED, Fate, Fates, doom, standing
-from netem.links import Integers, Mask
+from netem.links import Integers, Links, Mask
 from netem.profile import Profile
 from netem.reach import squared_distances
 from netem.timeline import Conditions, Timeline
@@ -42,6 +43,15 @@ class Verdicted(Protocol):
 
     def verdicts(self, tick: int, offered: Mask) -> Verdicts:
         """On the messages of a tick."""
+
+
+def recorded(path: Path | None, links: Links, channels: Sequence[str]) -> Verdicted | None:
+    """The verdicts in a journal, if there is one, for a run over these links and channels."""
+    if path is None:
+        return None
+    from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
+
+    return journal.Recorded(journal.read(path), links, channels)
 
 
 class _Under(NamedTuple):
@@ -191,7 +201,7 @@ class Medium:
                 raise ValueError("loss by distance and jammed zones need the positions of the tick")
             for zone, on in zip(self.profile.zones, weather.jams.tolist(), strict=True):
                 if on:
-                    yield _JAMMED, zone.jammed(self._receiver, position) & self._on(zone.sensing, zone.comms)
+                    yield _JAMMED, zone.jammed(self._receiver, position) & self._forecast.on(zone.sensing, zone.comms)
             if self.profile.reaches:
                 yield _RANGE, squared_distances(self._sender, self._receiver, position) > weather.squared_limit
         if self.profile.schedules:
@@ -218,7 +228,7 @@ class Medium:
         states = []
         for n, state in zip(self._packet_layers, air.packet_states, strict=True):
             layer = self.profile.chains[n]
-            on = np.where(self._sensing, layer.sensing, layer.comms)[:, None]
+            on = self._forecast.on(layer.sensing, layer.comms)
             lost |= layer.lost(state, draws[..., 2 * layer.lane]) & layer.by_packet & on
             extra += layer.adds(state) * (layer.by_packet & self._forecast.acts(layer))
             _, following = layer.walk(state, draws[None, ..., 2 * layer.lane + 1])
@@ -254,6 +264,3 @@ class Medium:
         if self._keeps_order:
             arrival = np.where(self._ordered, np.maximum(arrival, due), arrival)
         return np.where(passed & weather.copied, arrival, -1)
-
-    def _on(self, sensing: bool, comms: bool) -> Mask:
-        return np.where(self._sensing, sensing, comms)[:, None]

@@ -20,7 +20,7 @@ from netem.draws import Array
 from netem.fate import Fate
 from netem.keys import Keys
 from netem.links import Integers, Links, Mask
-from netem.medium import Medium, Verdicted
+from netem.medium import Medium, recorded
 from netem.profile import Profile
 from netem.sequence import Numbering, Sequences
 from netem.session import HUB, Login, await_subscribers, hub
@@ -110,7 +110,9 @@ class Relay:
         self._links = brief.links
         self._injected = brief.injected
         self._timeline = Timeline(brief.links, (*brief.faults, *brief.injected))
-        self._medium = self._make_medium()
+        path = None if brief.recorded is None else Path(brief.recorded)
+        verdicts = recorded(path, brief.links, brief.channels)
+        self._medium = Medium(brief.seed, brief.channels, brief.profile, self._timeline, verdicts)
         self._air = self._ahead = self._medium.begin()
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
         self._said: dict[tuple[int, int, str], bytes] = {}
@@ -153,15 +155,6 @@ class Relay:
             self._air = self._ahead
             self._forget(sense.k)
             sentence = self._judge(sense.k + 1, None) if self._medium.ahead else None
-
-    def _make_medium(self) -> Medium:
-        brief = self._brief
-        recorded: Verdicted | None = None
-        if brief.recorded is not None:
-            from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
-
-            recorded = journal.Recorded(journal.read(Path(brief.recorded)), brief.links, brief.channels)
-        return Medium(brief.seed, brief.channels, brief.profile, self._timeline, recorded)
 
     def _judge(self, tick: int, position: Array | None) -> Sentence:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)

@@ -29,7 +29,7 @@ class Weather(NamedTuple):
     Parameters
     ----------
     closed, lost
-        Links whose turn it is not, and losses, shape (C, L).
+        Links whose turn it is not, and losses, shape (C, L), or (1, L) where all channels are alike.
     delay_s, delay_ticks
         What a message waits in the air, shape (C, L), in seconds and, no less than the least delay, in ticks.
     copied, copy_delay_s
@@ -37,7 +37,7 @@ class Weather(NamedTuple):
     mark
         Corruption, shape (C, L).
     squared_limit
-        Square of the distance up to which a message passes, in square metres, shape (C, L); infinite without a limit.
+        Square of the distance up to which a message passes, in square metres, shape (C, L) or (1, L); infinite without.
     jams
         Whether each jammer is on, shape (zones,).
     """
@@ -100,7 +100,7 @@ class Forecast:
         profile, shape = self._profile, (len(ticks), len(self._codes), len(self._links))
         lost, extra_s = self._chains(ticks)
         for trace_lost, on in self._traces(ticks):
-            lost = lost | (trace_lost & on[:, None])
+            lost = lost | (trace_lost & on)
         delay_s = extra_s + self._delays(ticks)
         copied, copy_s = self._copies(ticks, shape)
         mark = np.zeros(shape, dtype=np.uint8)
@@ -121,13 +121,13 @@ class Forecast:
 
     def _chains(self, ticks: Integers) -> tuple[Mask, Array]:
         layers = self._profile.chains
-        lost = np.zeros((len(ticks), len(self._sensing), len(self._links)), dtype=bool)
+        lost = np.zeros((len(ticks), 1, len(self._links)), dtype=bool)
         extra = np.zeros((len(ticks), len(self._codes), len(self._links)))
         draws = self.draw(Purpose.LOSS, ticks, 2 * self._lanes)
         for n, layer in enumerate(layers):
-            by_time, on = ~layer.by_packet, self._on(layer.sensing, layer.comms)[:, None]
+            by_time, on = ~layer.by_packet, self.on(layer.sensing, layer.comms)
             states, self._states[n] = layer.walk(self._states[n], draws[..., 2 * layer.lane + 1])
-            lost |= layer.lost(states, draws[..., 2 * layer.lane]) & by_time & on
+            lost = lost | (layer.lost(states, draws[..., 2 * layer.lane]) & by_time & on)
             extra += layer.adds(states) * (by_time & self.acts(layer))
         return lost, extra
 
@@ -136,12 +136,12 @@ class Forecast:
         if not traces:
             return []
         draw = self.draw(Purpose.TRACE, ticks, 1)[..., 0]
-        return [(trace.lost(ticks, draw), self._on(trace.sensing, trace.comms)) for trace in traces]
+        return [(trace.lost(ticks, draw), self.on(trace.sensing, trace.comms)) for trace in traces]
 
     def _closed(self, ticks: Integers) -> Mask:
-        closed = np.zeros((len(ticks), len(self._sensing), len(self._links)), dtype=bool)
+        closed = np.zeros((len(ticks), 1, len(self._links)), dtype=bool)
         for schedule in self._profile.schedules:
-            closed |= schedule.closed(ticks)[:, None] & self._on(schedule.sensing, schedule.comms)[:, None]
+            closed = closed | (schedule.closed(ticks)[:, None] & self.on(schedule.sensing, schedule.comms))
         return closed
 
     def _delays(self, ticks: Integers) -> Array:
@@ -173,12 +173,11 @@ class Forecast:
         return draws[..., 0] < self._profile.duplicate, seconds
 
     def _squared_limits(self, ticks: Integers) -> Array:
-        limit = np.full((len(ticks), len(self._sensing), len(self._links)), np.inf)
+        limit = np.full((len(ticks), 1, len(self._links)), np.inf)
         for reach in self._profile.reaches:
             draw = self.draw(Purpose.REACH, ticks, 1)[..., 0] if reach.law is Law.RAMP else np.zeros(1)
             shadow = self._shadows(ticks, reach) if reach.law is Law.LOG_DISTANCE else np.zeros(1)
-            on = self._on(reach.sensing, reach.comms)[:, None]
-            limit = np.where(on, np.minimum(limit, reach.limit(draw, shadow)), limit)
+            limit = np.where(self.on(reach.sensing, reach.comms), np.minimum(limit, reach.limit(draw, shadow)), limit)
         return limit * limit
 
     def _shadows(self, ticks: Integers, reach: Reach) -> Array:
@@ -195,10 +194,11 @@ class Forecast:
     def acts(self, layer: ChainLayer) -> Mask:
         """On which rows of what is drawn a chain delays messages, shape (C', 1): one row for all stands for communication."""
         shared = len(self._codes) < len(self._sensing)
-        return np.array([[layer.comms]]) if shared else self._on(layer.sensing, layer.comms)[:, None]
+        return np.array([[layer.comms]]) if shared else self.on(layer.sensing, layer.comms)
 
-    def _on(self, sensing: bool, comms: bool) -> Mask:
-        return np.where(self._sensing, sensing, comms)
+    def on(self, sensing: bool, comms: bool) -> Mask:
+        """The channels on which something acts, shape (C, 1), or (1, 1) where all channels are alike."""
+        return np.array([[sensing]]) if sensing == comms else np.where(self._comms, comms, sensing)
 
     def draw(self, purpose: Purpose, ticks: Integers, lanes: int) -> Array:
         """Uniform draws for every message of ticks (T,), shape (T, C', L, lanes); C' is 1 where channels share them."""

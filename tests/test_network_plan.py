@@ -117,7 +117,7 @@ def test_a_profile_takes_from_another_what_it_does_not_say():
         (('network.zones=[{centre=[0.0,0.0],radius=1.0,links="1-7"}]',), "network.zones.1.links"),
         (('network.zones=[{centre=[0.0,0.0],radius=1.0,channels="comms"}]',), "coupled = true"),
         (('network.links=[{links="all",channels="comms"}]',), "coupled = true gives sensing and comms one verdict"),
-        (('timeline=[{verb="lose",at=0.1,links=["1-7"],loss=0.5}]',), "timeline.1: '1-7' matches no link"),
+        (('timeline=[{verb="lose",at=0.1,links=["1-7"],loss=0.5}]',), "timeline.1.links: '1-7' matches no link"),
         (('timeline=[{verb="lose",at=0.1,links=["1-2"],loss=1.5}]',), "loss: should be less than or equal to 1"),
         (('timeline=[{verb="cut",at=0.1,links=["1-2"],in_flight="keep"}]',), "'drop', 'deliver' or 'hold'"),
     ],

@@ -366,7 +366,7 @@ WRONG = [
     ('links = "1->2"', 'links = "1->9"', "network.links.1.links", "agent 9 does not exist: agents are 1 to 7"),
     ('links = "1->2"', 'links = "1->2"\nchannels = "comms"', "network", "coupled = true gives sensing and comms one"),
     ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' selects no links; write '2->4'"),
-    ('"1-2"]', '"1-7"]', "timeline.1", "'1-7' matches no link of the formation"),
+    ('"1-2"]', '"1-7"]', "timeline.1.links", "'1-7' matches no link of the formation"),
     ('"1-2"]', '"1-2"]\nin_flight = "keep"', "timeline.1.in_flight", "'drop', 'deliver' or 'hold', got 'keep'"),
     ('verb = "cut"', 'verb = "lose"', "timeline.1.loss", "is missing; it has no default"),
     ('verb = "cut"', 'verb = "lose"\nloss = 1.5', "timeline.1.loss", "less than or equal to 1, got 1.5"),

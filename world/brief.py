@@ -12,6 +12,33 @@ _LEAST_BATCH = 50
 
 
 @dataclass(frozen=True)
+class Books:
+    """How a run is written down.
+
+    Parameters
+    ----------
+    every
+        Ticks from one moment that is recorded, and whose graph is looked at, to the next.
+    window
+        Ticks over which links count as working together.
+    record
+        Whether to make a recording.
+    viewer
+        URL of a viewer to stream to.
+    """
+
+    every: int
+    window: int
+    record: bool
+    viewer: str | None
+
+    @property
+    def batch(self) -> int:
+        """How many ticks are written down at once: a multiple of those from one recorded moment to the next."""
+        return _LEAST_BATCH + -_LEAST_BATCH % self.every
+
+
+@dataclass(frozen=True)
 class WorldBrief:
     """All the world process is told.
 
@@ -22,15 +49,9 @@ class WorldBrief:
     out
         The run directory.
     world, channels, faults
-        What it simulates and records.
-    every
-        Ticks from one moment that is recorded, and whose graph is looked at, to the next.
-    window
-        Ticks over which links count as working together.
-    record
-        Whether to make a recording.
-    viewer
-        URL of a viewer to stream to.
+        What it simulates.
+    books
+        How it writes that down.
     patience_s
         How long to wait for the agents before the run is stalled, in seconds.
     """
@@ -41,13 +62,5 @@ class WorldBrief:
     world: World
     channels: tuple[str, ...]
     faults: tuple[Fault, ...]
-    every: int
-    window: int
-    record: bool
-    viewer: str | None
+    books: Books
     patience_s: float
-
-
-def batch_of(every: int) -> int:
-    """How many ticks are written down at once: a multiple of those from one recorded moment to the next."""
-    return _LEAST_BATCH + -_LEAST_BATCH % every

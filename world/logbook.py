@@ -11,6 +11,7 @@ import pyarrow as pa
 from netem.arrow import NAMES, Stream, named
 from netem.journal import FILE, Writer
 from netem.timeline import Timeline
+from world.brief import Books
 from world.history import Moments
 from world.realised import Watch, columns
 from world.recorder import Recorder
@@ -40,44 +41,26 @@ class Logbook:
         The run directory, and the run's name.
     world, channels
         What is flown.
-    every
-        Ticks from one moment that is recorded, and whose graph is looked at, to the next.
-    window
-        Ticks over which links count as working together.
-    record
-        Whether to make a recording.
-    viewer
-        URL of a viewer to stream to.
+    books
+        How to write it down.
     """
 
-    def __init__(
-        self,
-        out: Path,
-        run: str,
-        world: World,
-        channels: Sequence[str],
-        *,
-        every: int,
-        window: int,
-        record: bool,
-        viewer: str | None,
-    ) -> None:
-        self._every = every
+    def __init__(self, out: Path, run: str, world: World, channels: Sequence[str], books: Books) -> None:
+        self._every = books.every
         self._channels = list(channels)
         self._journal = Writer(out / FILE, world.links, channels)
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
-        self._watch = Watch(world.formation, world.links, world.dt, window)
+        self._watch = Watch(world.formation, world.links, world.dt, books.window)
         self._recorder = None
-        if record:
+        if books.record:
             self._recorder = Recorder(
                 out / RECORDING,
                 run=run,
                 formation=world.formation,
                 links=world.links,
-                channels=channels,
                 dt=world.dt,
-                every=every,
-                viewer=viewer,
+                every=books.every,
+                viewer=books.viewer,
             )
 
     def __enter__(self) -> Logbook:

@@ -15,7 +15,7 @@ from netem.sequence import Numbering, Sequences
 from netem.session import WORLD, await_subscribers, client
 from netem.supervised import Supervisor, patience
 from netem.timeline import Fault, Timeline
-from world.brief import WorldBrief, batch_of
+from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
 from world.history import History, Moment, gather
@@ -40,7 +40,7 @@ class Theatre:
         self._heard = dict.fromkeys(self._acting.values(), 0)
         self._awaited: set[int] = set()
         self._moments: list[Moment] = []
-        self._batch = batch_of(brief.every)
+        self._batch = brief.books.batch
         self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
         self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
         self.uninstructed = 0
@@ -153,16 +153,7 @@ def main() -> None:
     brief = supervisor.brief(WorldBrief)
     with zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
-        with Logbook(
-            Path(brief.out),
-            brief.run,
-            brief.world,
-            brief.channels,
-            every=brief.every,
-            window=brief.window,
-            record=brief.record,
-            viewer=brief.viewer,
-        ) as logbook:
+        with Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook:
             theatre.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")

@@ -51,8 +51,8 @@ class Recorder:
         Of the recording.
     run
         Its name.
-    formation, links, channels
-        Who flies, who is linked to whom, and what they say, sensing first.
+    formation, links
+        Who flies, and who is linked to whom.
     dt
         Tick, in seconds.
     every
@@ -68,14 +68,12 @@ class Recorder:
         run: str,
         formation: Formation,
         links: Links,
-        channels: Sequence[str],
         dt: float,
         every: int,
         viewer: str | None = None,
     ) -> None:
         self._formation = formation
         self._links = links
-        self._channels = list(channels)
         self._dt = dt
         self._every = every
         self._edges = np.array(formation.edges, dtype=np.int64) - 1
