@@ -13,7 +13,7 @@ from affinet.checks import Finding
 from affinet.echo import echo
 from affinet.impairments import LinkProfile
 from affinet.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
-from affinet.sections import Network, Scenario, ScenarioError, Time
+from affinet.sections import Network, Scenario, ScenarioError, Time, said_at
 from agents.estimators.base import Channels
 from analysis.affine import Array
 from netem import channels, reach, trace
@@ -63,6 +63,20 @@ def plan(
     )
     notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
     return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)
+
+
+def degraded(given: Scenario, formation: Formation, links: Links, message_bits: Array, name: str, key: str) -> Profile:
+    """The air of a scenario where all links have the profile of this name, which stands at this key.
+
+    Raises
+    ------
+    ScenarioError
+        As `plan` does.
+    """
+    with said_at(key):
+        impairments.resolve(name, given.network.profiles)
+    network = given.network.model_copy(update={"profile": name, "links": []})
+    return plan(given.model_copy(update={"network": network}), formation, links, message_bits)[0]
 
 
 def message_bits(names: Sequence[str], spoken: Channels, links: Links, dimension: int) -> Array:

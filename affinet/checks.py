@@ -13,7 +13,7 @@ from agents.controllers import VaryingVelocity
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from analysis.affine import Array
-from netem.timeline import Fault
+from netem.fault import Fault
 from world import stress
 from world.formation import Formation
 

@@ -15,10 +15,10 @@ from affinet.plan import formation_of
 from affinet.sections import Scenario
 from netem import wire
 from netem.control import Action, Answer, Order
+from netem.fault import Fault, UnderWay, Verb
 from netem.keys import Keys
 from netem.links import Links
 from netem.session import Login, client
-from netem.timeline import Fault, UnderWay, Verb
 
 _FILE = "control.json"
 _PATIENCE_S = 5.0
@@ -65,7 +65,13 @@ class Wish:
         chosen = selectors.pairs(self.links, formation, Links.both_ways(formation.agents, formation.edges))
         lasts = None if self.lasts_s is None else max(1, round(self.lasts_s / flown.time.dt))
         fault = Fault(
-            Verb(self.verb), 0, lasts, chosen, self.groups, under_way=UnderWay(self.in_flight), loss=self.loss
+            Verb(self.verb),
+            start=0,
+            end=lasts,
+            pairs=chosen,
+            groups=self.groups,
+            under_way=UnderWay(self.in_flight),
+            probability=self.loss,
         )
         return Order(Action.INJECT, fault)
 

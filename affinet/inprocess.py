@@ -12,30 +12,39 @@ from typing import Any
 import numpy as np
 
 from affinet.plan import Plan
-from agents.agent import Action, AgentState, renew
+from agents.agent import Action, AgentState, chosen, renew
 from agents.estimators.base import Fields, Heard
 from analysis.affine import Array
-from netem import channels
+from netem import channels, lie
 from netem.air import Delivery, Verdicts, out_of_the_ordinary
 from netem.corrupt import Mark, Marks, corrupted_fields
 from netem.fate import Fate
 from netem.links import Integers, Mask
 from netem.medium import Medium
 from netem.plain import to_plain
-from world.history import History, Moment, Moments, gather
+from netem.timeline import Conditions
+from world.history import History, Moment, Moments, Vigil, gather
+from world.world import Scene
 
 Broadcasts = Mapping[str, Fields]
 
 
 class Swarm:
-    """A run in this process."""
+    """A run in this process.
+
+    Parameters
+    ----------
+    plan
+        What to fly.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
+        self.timeline = plan.timeline
         self._links = plan.world.links
         self._agents = plan.agents
         self._fields = self._agents.channels()
-        self._medium = Medium(plan.scenario.seed, plan.channels, plan.profile, plan.timeline, plan.recorded())
+        self._medium = Medium(plan.scenario.seed, plan.channels, plan.profiles, self.timeline, plan.recorded())
         self._said: dict[int, Broadcasts] = {}
         self._air = self._medium.begin()
         self.history = History(plan.world, len(plan.channels))
@@ -47,39 +56,57 @@ class Swarm:
 
     def fly(self, watch: Callable[[Moments], None], batch: int) -> None:
         """All ticks; `watch` sees them, a batch at a time."""
-        world, timeline = self._plan.world, self._medium.timeline
+        world = self._plan.world
         agents = np.arange(1, self._links.agents + 1)
         fresh = self._agents.init(agents.shape)
-        position, state = world.start(), fresh
+        scene, state, vigil = world.start(), fresh, Vigil(world)
         moments: list[Moment] = []
         with np.errstate(over="ignore", invalid="ignore"):
             for tick in range(world.ticks):
-                if restarted := timeline.restarted(tick):
-                    state = renew(state, fresh, np.isin(agents, restarted))
-                state, moment = self._tick(tick, position, state)
-                position = world.step(tick, position, moment.velocity, timeline.at(tick).absent)
+                self._fire(tick, vigil)
+                timeline = self.timeline
+                if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
+                    state = renew(state, fresh, np.isin(agents, [*cold]))
+                measured = world.measure(tick, scene, timeline.at(tick))
+                state, moment = self._tick(tick, scene, measured, state)
+                vigil.see(tick, scene.position, timeline)
+                scene = world.step(tick, scene, measured, moment.velocity, timeline.at(tick))
                 moments.append(moment)
                 if len(moments) == batch or tick == world.ticks - 1:
                     gathered = gather(world, timeline, tick + 1 - len(moments), moments)
-                    self.history.extend(gathered, position)
+                    self.history.extend(gathered, scene.position)
                     watch(gathered)
                     moments = []
 
-    def _tick(self, tick: int, position: Array, state: AgentState) -> tuple[AgentState, Moment]:
-        world, links = self._plan.world, self._links
-        alive = ~self._medium.timeline.at(tick).dead
-        air, verdicts = self._medium.judge(self._air, tick, self._offered(alive), position)
+    def _fire(self, tick: int, vigil: Vigil) -> None:
+        if triggers := self.timeline.due(vigil.errors):
+            self.timeline = self._medium.timeline = self.timeline.fired(triggers, tick)
+
+    def _tick(self, tick: int, scene: Scene, sensed: Array, before: AgentState) -> tuple[AgentState, Moment]:
+        links, now = self._links, self.timeline.at(tick)
+        air, verdicts = self._medium.judge(self._air, tick, self._offered(~now.idle), scene.position)
         seen = (verdicts.fate[0] == Fate.DELIVERED)[links.slots] & links.present
-        measured = np.where(seen[..., None], world.measure(tick, position)[links.slots], 0.0)
-        state, self._said[tick] = self._agents.sense(state, measured, seen)
+        measured = np.where(seen[..., None], sensed[links.slots], 0.0)
+        state, said = self._agents.sense(before, measured, seen)
+        self._said[tick] = self._as_told(said, now)
         self._air, delivery = self._medium.deliver(air, tick, verdicts)
         heard = {name: self._hear(name, delivery) for name in self._fields}
-        state, action = self._agents.act(state, tick, heard, position)
+        state, action = self._agents.act(state, self.timeline.clock(tick), heard, scene.position)
+        if now.idle.any():
+            state = renew(state, before, now.idle)
         self._forget(tick)
-        return state, self._moment(tick, position, alive, action, verdicts, delivery)
+        return state, self._moment(tick, scene, now, action, verdicts, delivery)
 
-    def _offered(self, alive: Mask) -> Mask:
-        speaks = alive[self._links.src - 1]
+    def _as_told(self, said: Broadcasts, now: Conditions) -> Broadcasts:
+        agents = np.arange(1, self._links.agents + 1)
+        for liar in now.liars if lie.CHANNEL in said else ():
+            true, false = said[lie.CHANNEL], lie.told(said[lie.CHANNEL], liar)
+            lies = np.isin(agents, liar.agents)
+            said = {**said, lie.CHANNEL: {name: chosen(lies, false[name], true[name]) for name in true}}
+        return said
+
+    def _offered(self, awake: Mask) -> Mask:
+        speaks = awake[self._links.src - 1]
         return np.stack([speaks | (name == channels.SENSE) for name in self._plan.channels])
 
     def _hear(self, channel: str, delivery: Delivery) -> Heard:
@@ -104,7 +131,7 @@ class Swarm:
         link = self._links.slots[struck]
         draw = self._medium.bit_draws(content[struck], np.full(link.shape, row), link)
         whole = {name: field[struck] for name, field in fields.items()}
-        wrong = corrupted_fields(whole, mark[struck], self._medium.profile.bias[link], draw)
+        wrong = corrupted_fields(whole, mark[struck], self._medium.bias(content[struck], link), draw)
         arriving = {name: field.copy() for name, field in fields.items()}
         for name, field in wrong.items():
             arriving[name][struck] = field
@@ -116,16 +143,16 @@ class Swarm:
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
 
     def _moment(
-        self, tick: int, position: Array, alive: Mask, action: Action, verdicts: Verdicts, delivery: Delivery
+        self, tick: int, scene: Scene, now: Conditions, action: Action, verdicts: Verdicts, delivery: Delivery
     ) -> Moment:
-        estimate = action.estimate
-        real = self._links.present & alive[:, None]
+        estimate, awake = action.estimate, ~now.idle
+        real = self._links.present & awake[:, None]
         return Moment(
-            position=position,
-            velocity=np.where(alive[:, None], action.velocity, 0.0),
+            position=scene.position,
+            velocity=self._plan.world.flown(scene, np.where(awake[:, None], action.velocity, 0.0), now),
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,
-            psi=np.where(alive, estimate.psi, np.nan),
+            psi=np.where(awake, estimate.psi, np.nan),
             fates=verdicts.fate,
             odd=out_of_the_ordinary(tick, verdicts),
             apart=delivery.apart,

@@ -13,7 +13,6 @@ from typing import Any
 from affinet.inject import Access
 from affinet.plan import Plan
 from affinet.supervision import Child, Crew, RunFailed, module
-from agents.controllers import needs_mission
 from agents.process import AgentBrief
 from netem.process import MediumBrief
 from netem.session import CONTROL, HUB, WORLD, Login, agent_name
@@ -32,6 +31,8 @@ class Flight:
     ----------
     in_flight, uninstructed
         Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
+    fired
+        In which tick each trigger fired that did.
     failure
         Why the run ended early, if it did.
     start_s, wall_s
@@ -42,6 +43,7 @@ class Flight:
 
     in_flight: int | None = None
     uninstructed: int | None = None
+    fired: dict[int, int] = field(default_factory=dict)
     failure: str | None = None
     start_s: float = 0.0
     wall_s: float = 0.0
@@ -90,9 +92,10 @@ class Launcher:
         crew = Crew(logs)
         launched = time.perf_counter()
         with tempfile.TemporaryDirectory(prefix="affinet-") as private:
+            self._private = Path(private)
             try:
                 with crew:
-                    self._start(crew, Path(private))
+                    self._start(crew)
                     with Access(self._run, self._logins[CONTROL]).granted(self._out):
                         self._fly(crew, launched)
             except RunFailed as failure:
@@ -100,7 +103,8 @@ class Launcher:
         self.flight.processes = [child.report() for child in crew.children]
         return self.flight
 
-    def _start(self, crew: Crew, private: Path) -> None:
+    def _start(self, crew: Crew) -> None:
+        private = self._private
         self._logins = self._make_logins(private)
         crew.start("world", module("world"), self._world_brief(self._logins[WORLD]))
         crew.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
@@ -134,9 +138,19 @@ class Launcher:
                         crew.kill(self._agents[number])
                     world.order("kill")
                 case "restart":
-                    fresh = [self._start_agent(crew, number) for number in event["agents"]]
-                    self._await_ready(crew, fresh)
+                    new = [self._start_agent(crew, agent, agent in event["remembering"]) for agent in event["agents"]]
+                    self._await_ready(crew, new)
                     world.order("restart")
+                case "pause":
+                    for number in event["agents"]:
+                        self._agents[number].pause()
+                    world.order("pause")
+                case "resume":
+                    for number in event["agents"]:
+                        self._agents[number].resume()
+                    world.order("resume")
+                case "fired":
+                    self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
                 case "done" if child is world:
                     self.flight.uninstructed = event["uninstructed"]
                 case "done" if child is medium:
@@ -148,10 +162,10 @@ class Launcher:
         medium.order("leave")
         crew.await_all_gone(_LAUNCHER_PATIENCE_S)
 
-    def _start_agent(self, crew: Crew, number: int) -> Child:
+    def _start_agent(self, crew: Crew, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         program = self._programs.get(number) or module("agents")
-        self._agents[number] = crew.start("agent", program, self._agent_brief(number, login), number)
+        self._agents[number] = crew.start("agent", program, self._agent_brief(number, login, remembers), number)
         return self._agents[number]
 
     def _await_ready(self, crew: Crew, children: Iterable[Child]) -> None:
@@ -171,6 +185,7 @@ class Launcher:
             world=self._plan.world,
             channels=self._plan.channels,
             faults=self._plan.faults,
+            triggers=self._plan.triggers,
             books=self._plan.books(self._viewer),
             patience_s=_WORLD_PATIENCE_S,
         )
@@ -183,18 +198,19 @@ class Launcher:
             seed=self._plan.scenario.seed,
             links=self._plan.world.links,
             channels=self._plan.channels,
-            profile=self._plan.profile,
+            profiles=self._plan.profiles,
             faults=self._plan.faults,
+            triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
             leaders=self._plan.world.formation.is_leader,
             patience_s=_MEDIUM_PATIENCE_S,
         )
 
-    def _agent_brief(self, number: int, login: Login) -> AgentBrief:
+    def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
         plan, row = self._plan, number - 1
         whole, links = plan.brief, plan.world.links
-        told = bool(whole.leader[row]) or needs_mission(plan.law.build())
+        told = bool(plan.told_mission[row])
         return AgentBrief(
             run=self._run,
             login=login,
@@ -204,4 +220,6 @@ class Launcher:
             law=plan.law,
             leader_gain=plan.scenario.agents.leader_gain,
             brief=replace(whole.of(row), mission=whole.mission if told else None),
+            checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
+            remembers=remembers,
         )

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from affinet import scenario
+from affinet.bites import Bite, bites
 from affinet.plan import Plan
 from netem.fate import Ledger
-from world.history import Arrays, bites, digest
+from netem.timeline import Timeline
+from world.history import Arrays, digest
 
 Verdict = Literal["pass", "fail", "vacuous"]
 
@@ -29,14 +31,15 @@ class Outcome:
     simulated_s: float
     tracking_error: dict[str, float | None]
     messages: dict[str, Any]
-    faults: tuple[dict[str, Any], ...]
+    faults: tuple[Bite, ...]
     processes: tuple[dict[str, Any], ...]
     out: str
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; a figure that does not exist is null."""
-        plain = asdict(self)
+        plain = asdict(replace(self, faults=()))
         plain.pop("simulated_s")
+        plain["faults"] = [bite.to_json() for bite in self.faults]
         plain["wall_s"] = round(self.wall_s, 3)
         plain["ticks_per_s"] = round(self.ticks_per_s, 1)
         plain["real_time_factor"] = round(self.real_time_factor, 3)
@@ -59,6 +62,7 @@ class Outcome:
 
 def judge(
     plan: Plan,
+    timeline: Timeline,
     arrays: Arrays | None,
     *,
     in_flight: int | None,
@@ -74,6 +78,8 @@ def judge(
     ----------
     plan
         What was flown.
+    timeline
+        Its faults, where they came to lie.
     arrays
         What happened; None when the run left nothing.
     in_flight, uninstructed
@@ -86,13 +92,14 @@ def judge(
         Every process there was, and the run directory.
     """
     ticks = 0 if arrays is None else len(arrays["error"])
-    messages, faults = _messages(arrays, in_flight, uninstructed), _faults(plan, arrays)
+    messages = _messages(arrays, in_flight, uninstructed)
+    faults = [] if arrays is None else bites(plan, timeline, arrays)
     wrong = [failure] if failure else []
     if not failure:
         wrong += _what_is_wrong(arrays, messages)
-    idle = [fault["fault"] for fault in faults if fault["messages"] == 0]
+    idle = [bite for bite in faults if not bite.touched]
     verdict: Verdict = "fail" if wrong else "vacuous" if idle else "pass"
-    reasons = wrong or [f"'{fault}' held no message: it proved nothing" for fault in idle]
+    reasons = wrong or [f"'{bite.fault.describe()}' touched no {bite.what}: it proved nothing" for bite in idle]
     return Outcome(
         verdict=verdict,
         reasons=tuple(reasons),
@@ -141,17 +148,6 @@ def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | 
         "in_flight": ledger.outstanding if in_flight is None else in_flight,
         "uninstructed": uninstructed,
     }
-
-
-def _faults(plan: Plan, arrays: Arrays | None) -> list[dict[str, Any]]:
-    if arrays is None:
-        return []
-    counted = zip(plan.timeline.faults, bites(plan.timeline, arrays["fates"]), strict=True)
-    return [
-        {"fault": fault.describe(), "at": fault.start * plan.world.dt, "messages": messages}
-        for fault, messages in counted
-        if fault.start < len(arrays["error"])
-    ]
 
 
 def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]:

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from affinet import air, checks, registry, scenario, sections, selectors
+from affinet import air, checks, registry, scenario, script, sections, selectors
 from affinet.checks import Finding
-from affinet.sections import Scenario, ScenarioError, said_at
+from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
-from agents.brief import Brief
+from agents.brief import Brief, Mask
+from agents.controllers import needs_mission
 from agents.process import Choice
 from analysis.affine import Array, Manoeuvre
 from netem import channels
+from netem.fault import Fault
 from netem.links import Links
 from netem.medium import Verdicted, recorded
 from netem.profile import Profile
-from netem.timeline import Fault, Timeline, UnderWay, Verb
+from netem.timeline import Timeline
+from netem.trigger import Trigger
 from world import maneuver, stress
 from world.brief import Books
 from world.formation import PRESETS, Formation
@@ -43,8 +45,8 @@ class Plan:
     ----------
     scenario
         As resolved.
-    world, profile, faults, channels
-        What the world and the medium are made of; channels with sensing first.
+    world, profiles, faults, triggers, channels
+        What the world and the medium are made of; profiles with the links' own first, channels with sensing first.
     brief, estimator, law
         What the agents are made of; the brief's arrays begin with the agents.
     findings
@@ -57,8 +59,9 @@ class Plan:
 
     scenario: Scenario
     world: World
-    profile: Profile
+    profiles: tuple[Profile, ...]
     faults: tuple[Fault, ...]
+    triggers: tuple[Trigger, ...]
     channels: tuple[str, ...]
     brief: Brief
     estimator: Choice
@@ -88,7 +91,12 @@ class Plan:
     @property
     def timeline(self) -> Timeline:
         """All faults over the links."""
-        return Timeline(self.world.links, (*self.faults, *self.injected))
+        return Timeline(self.world.links, (*self.faults, *self.injected), self.triggers)
+
+    @property
+    def told_mission(self) -> Mask:
+        """Which agents know the manoeuvre, and fly it by their clocks, shape (N,)."""
+        return self.world.formation.is_leader | needs_mission(self.law.build())
 
     @property
     def agents(self) -> Agent:
@@ -173,23 +181,24 @@ def _make(given: Scenario) -> Plan:
         raise PlanError(findings)
     world = _world(given, formation)
     brief = _brief(world, L)
-    faults = _faults(given, formation, world.links)
+    played = script.write(given, formation, world.links)
     batch = Agent(brief, estimator.build(), law.build(), given.agents.leader_gain)
     spoken = batch.channels()
     names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
-    profile, aired = air.plan(
-        given, formation, world.links, air.message_bits(names, spoken, world.links, brief.dimension)
-    )
+    bits = air.message_bits(names, spoken, world.links, brief.dimension)
+    own, aired = air.plan(given, formation, world.links, bits)
+    degraded = tuple(air.degraded(given, formation, world.links, bits, *named) for named in played.profiles)
     return Plan(
         scenario=given,
         world=world,
-        profile=profile,
-        faults=faults,
+        profiles=(own, *degraded),
+        faults=played.faults,
+        triggers=played.triggers,
         channels=names,
         brief=brief,
         estimator=estimator,
         law=law,
-        findings=(*findings, *aired, *checks.timeline(faults, given.time.ticks, given.time.dt)),
+        findings=(*findings, *aired, *checks.timeline(played.faults, given.time.ticks, given.time.dt)),
     )
 
 
@@ -266,46 +275,6 @@ def _brief(world: World, L: Array) -> Brief:
         leader=formation.is_leader,
         mission=world.manoeuvre,
     )
-
-
-def _faults(given: Scenario, formation: Formation, links: Links) -> tuple[Fault, ...]:
-    faults: list[Fault] = []
-    for number, event in enumerate(given.timeline, start=1):
-        start = _tick(event.at, given.time.dt)
-        if isinstance(event, sections.Restart):
-            _restart(faults, event.agents, start, f"timeline.{number}")
-            continue
-        until = None if isinstance(event, sections.Kill) or event.until is None else _tick(event.until, given.time.dt)
-        pairs: tuple[tuple[int, int], ...] = ()
-        if isinstance(event, sections.Cut | sections.Lose):
-            with said_at(f"timeline.{number}.links"):
-                pairs = selectors.pairs(event.links, formation, links)
-        faults += _of_event(event, start, until, pairs)
-        with said_at(f"timeline.{number}"):
-            Timeline(links, faults)
-    return tuple(faults)
-
-
-def _of_event(event: Any, start: int, until: int | None, pairs: tuple[tuple[int, int], ...]) -> list[Fault]:
-    match event:
-        case sections.Cut():
-            return [Fault(Verb.CUT, start, until, pairs=pairs, under_way=UnderWay(event.in_flight))]
-        case sections.Lose():
-            return [Fault(Verb.LOSE, start, until, pairs=pairs, loss=event.loss)]
-        case sections.Partition():
-            groups = tuple(map(tuple, event.groups))
-            return [Fault(Verb.PARTITION, start, until, groups=groups, under_way=UnderWay(event.in_flight))]
-    verb = Verb.KILL if isinstance(event, sections.Kill) else Verb.DEPART
-    return [Fault(verb, start, until, agents=(agent,)) for agent in event.agents]
-
-
-def _restart(faults: list[Fault], agents: Sequence[int], tick: int, key: str) -> None:
-    for agent in agents:
-        killed = [n for n, f in enumerate(faults) if f.verb is Verb.KILL and f.agents == (agent,) and f.end is None]
-        if not any(faults[n].start < tick for n in killed):
-            raise ScenarioError(f"{key}: agent {agent} is not dead then; name its kill before its restart")
-        for n in killed:
-            faults[n] = replace(faults[n], end=tick)
 
 
 def _tick(seconds: float, dt: float) -> int:

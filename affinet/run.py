@@ -52,10 +52,14 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 
     flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
     path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
+    timeline = (plan.facing(journal.injected(journal.read(book))) if book.exists() else plan).timeline
+    for trigger, tick in flight.fired.items():
+        timeline = timeline.fired([trigger], tick)
     if flight.failure and not path.exists() and recording.exists():
         mend(recording)  # the world was killed, or never got far: it could not close its recording
     return outcome.judge(
-        plan.facing(journal.injected(journal.read(book))) if book.exists() else plan,
+        plan,
+        timeline,
         history.load(path) if path.exists() else None,
         in_flight=flight.in_flight,
         uninstructed=flight.uninstructed,
@@ -74,7 +78,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
     with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
 
         def see(moments: Moments) -> None:
-            logbook.write(moments, plan.timeline)
+            logbook.write(moments, swarm.timeline)
             watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
 
         swarm.fly(see, books.batch)
@@ -82,6 +86,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
     swarm.history.save(out / history.FILE)
     return outcome.judge(
         plan,
+        swarm.timeline,
         swarm.history.arrays(),
         in_flight=swarm.in_flight,
         uninstructed=0,

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from affinet import impairments, sections
+from affinet import events, impairments, sections
 from affinet.impairments import Section
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
@@ -111,7 +111,7 @@ def _is_tag(loc: Sequence[str | int], place: int) -> bool:
 
 def _tagged(loc: Sequence[str | int]) -> tuple[str, Mapping[str, type[Section]]]:
     """The key that says which entry of the timeline, or which loss, it is; and all there are."""
-    return ("verb", sections.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
+    return ("verb", events.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
 
 
 def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -> str:

@@ -10,13 +10,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
+from affinet.events import AnyEvent, Finite, Links
 from affinet.impairments import LinkProfile, NotNegative, Positive, Probability, Section
-from affinet.selectors import check, edge
+from affinet.selectors import edge
 from affinet.source import Source
 from world.formation import PRESETS
 
 Ticks = Annotated[int, Field(ge=0)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = list[list[Finite]]
 
 
@@ -40,7 +40,6 @@ def said_at(key: str) -> Iterator[None]:
         raise ScenarioError(f"{key}: {error}") from error
 
 
-Links = Annotated[str, AfterValidator(check)]
 Edge = Annotated[str, AfterValidator(_edge)]
 
 
@@ -186,82 +185,6 @@ class Network(Section):
         return self
 
 
-InFlight = Literal["drop", "deliver", "hold"]
-
-
-class Lasting(Section):
-    """A fault with a beginning and, unless it lasts, an end; simulated seconds."""
-
-    at: NotNegative
-    until: Positive | None = None
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Lasting:
-        if self.until is not None and self.until <= self.at:
-            raise ValueError(f"ends at {self.until:g} s, but begins at {self.at:g} s; until must be later")
-        return self
-
-
-class Cut(Lasting):
-    """Links that carry nothing; `in_flight` says what becomes of the messages under way on them."""
-
-    verb: Literal["cut"]
-    links: Annotated[list[Links], Field(min_length=1)]
-    in_flight: InFlight = "drop"
-
-
-class Partition(Lasting):
-    """Groups between which nothing passes."""
-
-    verb: Literal["partition"]
-    groups: Annotated[list[list[int]], Field(min_length=2)]
-    in_flight: InFlight = "drop"
-
-
-class Lose(Lasting):
-    """Links that lose messages with a probability, on top of what else they lose."""
-
-    verb: Literal["lose"]
-    links: Annotated[list[Links], Field(min_length=1)]
-    loss: Probability
-
-
-class Depart(Lasting):
-    """Agents that leave the formation, and rejoin at the end; their bodies hold."""
-
-    verb: Literal["depart"]
-    agents: Annotated[list[int], Field(min_length=1)]
-
-
-class Kill(Section):
-    """Agents whose processes are killed (SIGKILL)."""
-
-    verb: Literal["kill"]
-    at: NotNegative
-    agents: Annotated[list[int], Field(min_length=1)]
-
-
-class Restart(Section):
-    """Killed agents that come back as fresh processes, knowing nothing."""
-
-    verb: Literal["restart"]
-    at: NotNegative
-    agents: Annotated[list[int], Field(min_length=1)]
-
-
-Event = Annotated[Cut | Partition | Lose | Depart | Kill | Restart, Field(discriminator="verb")]
-
-
-VERBS: dict[str, type[Section]] = {
-    "cut": Cut,
-    "partition": Partition,
-    "lose": Lose,
-    "depart": Depart,
-    "kill": Kill,
-    "restart": Restart,
-}
-
-
 class Record(Section):
     """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
@@ -282,7 +205,7 @@ class Scenario(Section):
     dynamics: Dynamics = Dynamics()
     agents: Agents
     network: Network = Network()
-    timeline: list[Event] = Field(default_factory=list)
+    timeline: list[AnyEvent] = Field(default_factory=list)
     record: Record = Record()
     _source: Source | None = PrivateAttr(default=None)
 

@@ -1,28 +1,78 @@
-"""Words for links: "2->4" one way, "2-4" both ways, roles in place of agents ("leaders->followers"), "leaders", "all"."""
+"""Words for links and agents in a scenario.
+
+Links: "2->4" one way, "2-4" both ways, roles in place of agents ("leaders->followers"), "leaders" for all links from and
+to them, "all"; and what the graph makes of itself: "ring", "bridges", "min-cut", "critical"; "random 3" for a draw.
+Agents: numbers, "leaders", "followers", "all", "cut-vertices", "critical"; "random 2", "random 1 followers".
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
-from netem.links import Links
+import numpy as np
+from numpy.typing import ArrayLike
+
+from analysis import cuts
+from netem.draws import Purpose, uniform
+from netem.links import Integers, Links
+from world import stress
 from world.formation import Formation
 
-_AGENT = r"\d+|leaders|followers|all"
+T = TypeVar("T")
+
+_ROLE = r"leaders|followers|all"
+_AGENT = rf"\d+|{_ROLE}"
 _PAIR = re.compile(rf"({_AGENT})(->|-)({_AGENT})")
-_SAY = "write '2->4' for what 4 hears of 2, '2-4' for both ways, 'leaders->followers', 'leaders' or 'all'"
+_RANDOM = re.compile(r"random (\d+)")
+_RANDOM_AGENTS = re.compile(rf"random (\d+)(?: ({_ROLE}))?")
+_OF_GRAPH = ("ring", "bridges", "min-cut", "critical")
+_AGENTS_OF_GRAPH = ("cut-vertices", "critical")
+_SAY = (
+    "write '2->4' for what 4 hears of 2, '2-4' for both ways, 'leaders->followers', 'leaders', 'all', "
+    f"'random 3' or {', '.join(_OF_GRAPH)}"
+)
+_SAY_AGENTS = f"write a number, 'leaders', 'followers', 'all', 'random 2 leaders' or {', '.join(_AGENTS_OF_GRAPH)}"
+
+
+@dataclass(frozen=True)
+class Lot:
+    """What a random choice is a function of: the seed of the run, and the number of the entry that draws."""
+
+    seed: int
+    entry: int
 
 
 def check(selector: str) -> str:
-    """The selector itself, if it is one.
+    """The selector of links itself, if it is one.
 
     Raises
     ------
     ValueError
         When it is not.
     """
-    if not _PAIR.fullmatch(selector) and not re.fullmatch(_AGENT, selector):
+    if not (
+        _PAIR.fullmatch(selector)
+        or re.fullmatch(_AGENT, selector)
+        or _RANDOM.fullmatch(selector)
+        or selector in _OF_GRAPH
+    ):
         raise ValueError(f"{selector!r} selects no links; {_SAY}")
+    return selector
+
+
+def check_agents(selector: str) -> str:
+    """The selector of agents itself, if it is one.
+
+    Raises
+    ------
+    ValueError
+        When it is not.
+    """
+    if not (re.fullmatch(_ROLE, selector) or _RANDOM_AGENTS.fullmatch(selector) or selector in _AGENTS_OF_GRAPH):
+        raise ValueError(f"{selector!r} selects no agents; {_SAY_AGENTS}")
     return selector
 
 
@@ -39,7 +89,7 @@ def edge(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def rows(selector: str, formation: Formation, links: Links) -> list[int]:
+def rows(selector: str, formation: Formation, links: Links, lot: Lot | None = None) -> list[int]:
     """Rows of the links that a selector names, in the order of the links.
 
     An agent or a role alone names all links from it and to it.
@@ -47,14 +97,18 @@ def rows(selector: str, formation: Formation, links: Links) -> list[int]:
     Raises
     ------
     ValueError
-        When it is no selector, names agents that do not exist, or matches no link.
+        When it is no selector, names agents that do not exist, matches no link, or is random without a `lot`.
     """
     check(selector)
+    if match := _RANDOM.fullmatch(selector):
+        return _drawn(int(match[1]), np.arange(len(links)), links.src, links.dst, lot, "links")
+    if selector in _OF_GRAPH:
+        return sorted(links.index[way] for i, j in _edges(selector, formation) for way in ((i, j), (j, i)))
     if match := _PAIR.fullmatch(selector):
         ways = [(match[1], match[3])] if match[2] == "->" else [(match[1], match[3]), (match[3], match[1])]
     else:
         ways = [(selector, "all"), ("all", selector)]
-    ends = [(_agents(src, formation), _agents(dst, formation)) for src, dst in ways]
+    ends = [(_named(src, formation), _named(dst, formation)) for src, dst in ways]
     found = [
         row
         for (src, dst), row in links.index.items()
@@ -65,7 +119,9 @@ def rows(selector: str, formation: Formation, links: Links) -> list[int]:
     return found
 
 
-def pairs(selectors: Sequence[str], formation: Formation, links: Links) -> tuple[tuple[int, int], ...]:
+def pairs(
+    selectors: Sequence[str], formation: Formation, links: Links, lot: Lot | None = None
+) -> tuple[tuple[int, int], ...]:
     """The directed links (src, dst) that any of the selectors names, each once.
 
     Raises
@@ -73,11 +129,87 @@ def pairs(selectors: Sequence[str], formation: Formation, links: Links) -> tuple
     ValueError
         As `rows` does.
     """
-    chosen = dict.fromkeys(row for selector in selectors for row in rows(selector, formation, links))
+    chosen = dict.fromkeys(row for selector in selectors for row in rows(selector, formation, links, lot))
     return tuple((int(links.src[row]), int(links.dst[row])) for row in chosen)
 
 
-def _agents(word: str, formation: Formation) -> frozenset[int]:
+def agents(selectors: Iterable[int | str], formation: Formation, lot: Lot) -> tuple[int, ...]:
+    """The agents that any of the selectors names, each once.
+
+    Raises
+    ------
+    ValueError
+        When one is no selector, names an agent that does not exist, or nobody.
+    """
+    return tuple(dict.fromkeys(agent for selector in selectors for agent in _whom(selector, formation, lot)))
+
+
+def groups(split: str, formation: Formation) -> tuple[tuple[int, ...], ...]:
+    """The swarm in two: "halves" by number, "leaders" and their followers, or the sides of the smallest cut."""
+    everybody = np.arange(1, formation.agents + 1)
+    side = {
+        "halves": lambda: everybody <= formation.agents // 2,
+        "leaders": lambda: np.isin(everybody, formation.leaders),
+        "min-cut": lambda: cuts.smallest_cut(formation.agents, formation.edges),
+    }[split]()
+    return tuple(everybody[side].tolist()), tuple(everybody[~side].tolist())
+
+
+def _whom(selector: int | str, formation: Formation, lot: Lot) -> list[int]:
+    if isinstance(selector, int):
+        return sorted(_named(str(selector), formation))
+    check_agents(selector)
+    if match := _RANDOM_AGENTS.fullmatch(selector):
+        among = np.array(sorted(_named(match[2] or "all", formation)))
+        return [int(among[row]) for row in _drawn(int(match[1]), np.arange(len(among)), among, 0, lot, "agents")]
+    if selector == "cut-vertices":
+        return _some(cuts.cut_vertices(formation.agents, formation.edges), "no agent's loss disconnects the others")
+    if selector == "critical":
+        return _some(
+            _first(range(1, formation.agents + 1), lambda one: not stress.survives(formation, agent=one)), _SAFE
+        )
+    return sorted(_named(selector, formation))
+
+
+_SAFE = "the framework stays rigid whichever is lost"
+
+
+def _edges(selector: str, formation: Formation) -> list[tuple[int, int]]:
+    size, edges = formation.agents, formation.edges
+    match selector:
+        case "ring":
+            around = {frozenset((n, n % size + 1)) for n in range(1, size + 1)}
+            return _some([edge for edge in edges if frozenset(edge) in around], "no agents in succession are linked")
+        case "bridges":
+            return _some(cuts.bridges(size, edges), "no edge's loss disconnects the formation")
+        case "min-cut":
+            side = cuts.smallest_cut(size, edges)
+            return [(i, j) for i, j in edges if side[i - 1] != side[j - 1]]
+        case _:
+            return _some(_first(edges, lambda one: not stress.survives(formation, edge=one)), _SAFE)
+
+
+def _first(candidates: Iterable[T], holds: Callable[[T], bool]) -> list[T]:
+    return next(([one] for one in candidates if holds(one)), [])
+
+
+def _some(found: list[T], otherwise: str) -> list[T]:
+    if not found:
+        raise ValueError(otherwise)
+    return found
+
+
+def _drawn(number: int, candidates: Integers, src: ArrayLike, dst: ArrayLike, lot: Lot | None, what: str) -> list[int]:
+    """So many of the candidates, by draws that are a function of each alone."""
+    if lot is None:
+        raise ValueError("a random choice is for the timeline only")
+    if not 1 <= number <= len(candidates):
+        raise ValueError(f"cannot choose {number} of {len(candidates)} {what}")
+    draw = uniform(lot.seed, Purpose.SELECTION, tick=lot.entry, src=src, dst=dst)[..., 0]
+    return sorted(candidates[np.argsort(draw)[:number]].tolist())
+
+
+def _named(word: str, formation: Formation) -> frozenset[int]:
     everybody = range(1, formation.agents + 1)
     if word.isdecimal():
         if int(word) not in everybody:

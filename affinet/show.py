@@ -71,10 +71,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
             ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
-        *(
-            ("fault", f"{fault['at']:g} s: {fault['fault']} held {fault['messages']} messages")
-            for fault in outcome.faults
-        ),
+        *(("fault", str(bite)) for bite in outcome.faults),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
     ]

@@ -75,6 +75,14 @@ class Child:
             self._stdin.write(brief_bytes(brief))
             self._stdin.flush()
 
+    def pause(self) -> None:
+        """Stop it, as the script says."""
+        self.process.send_signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on."""
+        self.process.send_signal(signal.SIGCONT)
+
     def measure(self) -> None:
         """Note its resident memory."""
         with suppress(psutil.NoSuchProcess):
@@ -171,6 +179,7 @@ class Crew:
         """The run is over: from now on everybody may leave."""
         for child in self.children:
             child.expected_to_die = True
+            child.resume()
 
     def await_all_gone(self, timeout_s: float) -> None:
         """Wait until every child has left.
@@ -210,6 +219,7 @@ class Crew:
         alive = [child for child in self.children if child.process.poll() is None]
         for child in sorted(alive, key=lambda child: child.role != "world"):
             child.process.terminate()
+            child.resume()  # one that is stopped could not hear that it has to leave
         deadline = time.monotonic() + _GRACE_S
         for child in alive:
             try:

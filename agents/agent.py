@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Reading
 from agents.controllers import Law, pilot
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
 from netem.channels import INPUT
@@ -70,9 +70,12 @@ class Agent:
         return state._replace(estimator=estimator), {INPUT: {"velocity": state.velocity}, **said}
 
     def act(
-        self, state: AgentState, tick: int, heard: Mapping[str, Heard], position: Array | None
+        self, state: AgentState, tick: Reading, heard: Mapping[str, Heard], position: Array | None
     ) -> tuple[AgentState, Action]:
-        """Estimate from what was heard, and steer; only leaders have their own `position` (..., D)."""
+        """Estimate from what was heard, and steer; `tick` is what its clock says.
+
+        Only leaders have their own `position` (..., D).
+        """
         brief = self.brief
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard)
         law, velocity = self.law.command(brief, state.law, tick, state.velocity, estimate, heard[INPUT])
@@ -86,4 +89,9 @@ def renew(state: Any, fresh: Any, which: Mask) -> Any:
     """The state with the agents in `which` (batch axes) replaced by fresh ones."""
     if isinstance(state, tuple):
         return type(state)(*(renew(old, new, which) for old, new in zip(state, fresh, strict=True)))
-    return np.where(which.reshape(which.shape + (1,) * (state.ndim - which.ndim)), fresh, state)
+    return chosen(which, fresh, state)
+
+
+def chosen(which: Mask, one: Any, other: Any) -> Any:
+    """Array `one` where `which` (batch axes) is true, the other elsewhere."""
+    return np.where(which.reshape(which.shape + (1,) * (other.ndim - which.ndim)), one, other)

@@ -12,6 +12,7 @@ from analysis.affine import Manoeuvre
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Reading = int | NDArray[np.int64]  # of a clock, in ticks; one for all, or each its own
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from agents.brief import Array, Brief
+from agents.brief import Array, Brief, Reading
 from agents.estimators.base import Estimate, Heard
 from analysis.affine import Manoeuvre
 
@@ -25,7 +25,7 @@ class Law(Protocol[State]):
         """The state before the first tick, with `batch` as its leading axes."""
 
     def command(
-        self, brief: Brief, state: State, tick: int, velocity: Array, estimate: Estimate, inputs: Heard
+        self, brief: Brief, state: State, tick: Reading, velocity: Array, estimate: Estimate, inputs: Heard
     ) -> tuple[State, Array]:
         """The input of this tick, shape (..., D), in metres per second.
 
@@ -69,7 +69,7 @@ class Static:
         self,
         brief: Brief,
         state: Nothing,
-        tick: int,  # noqa: ARG002
+        tick: Reading,  # noqa: ARG002
         velocity: Array,  # noqa: ARG002
         estimate: Estimate,
         inputs: Heard,  # noqa: ARG002
@@ -101,7 +101,7 @@ class ConstantVelocity:
         self,
         brief: Brief,
         state: Integral,
-        tick: int,  # noqa: ARG002
+        tick: Reading,  # noqa: ARG002
         velocity: Array,  # noqa: ARG002
         estimate: Estimate,
         inputs: Heard,  # noqa: ARG002
@@ -139,7 +139,7 @@ class VaryingVelocity:
         return LastHeard(np.zeros((*batch, *brief.relative.shape[-2:])))
 
     def command(
-        self, brief: Brief, state: LastHeard, tick: int, velocity: Array, estimate: Estimate, inputs: Heard
+        self, brief: Brief, state: LastHeard, tick: Reading, velocity: Array, estimate: Estimate, inputs: Heard
     ) -> tuple[LastHeard, Array]:
         """Move as the neighbours do, and fall toward the formation."""
         heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
@@ -148,7 +148,9 @@ class VaryingVelocity:
         law = (motion - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
         return LastHeard(heard), (1.0 - self.relaxation) * velocity + self.relaxation * law
 
-    def _neighbours_velocity(self, brief: Brief, tick: int, velocity: Array, estimate: Estimate, heard: Array) -> Array:
+    def _neighbours_velocity(
+        self, brief: Brief, tick: Reading, velocity: Array, estimate: Estimate, heard: Array
+    ) -> Array:
         if self.source == "communicated":
             return heard
         if self.source == "estimated":
@@ -157,7 +159,8 @@ class VaryingVelocity:
             return velocity[..., None, :] - estimate.relative_velocity
         if brief.mission is None:
             raise ValueError("the velocity source 'feed-forward' needs the mission in the brief")
-        return brief.mission.velocity(tick, brief.nominal[..., None, :] - brief.relative, brief.dt)
+        of_edges = np.asarray(tick)[..., None]
+        return brief.mission.velocity(of_edges, brief.nominal[..., None, :] - brief.relative, brief.dt)
 
 
 def stress_force(brief: Brief, estimate: Estimate) -> Array:
@@ -167,7 +170,7 @@ def stress_force(brief: Brief, estimate: Estimate) -> Array:
     return total
 
 
-def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: int, position: Array) -> Array:
+def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array) -> Array:
     """A leader's input: the target's velocity, and a pull toward the target, shape (..., D), in metres per second.
 
     Parameters

@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zenoh
 
+from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Array, Brief
 from agents.estimators.base import Heard
@@ -45,6 +47,8 @@ class AgentBrief:
         Its number, and the numbers of the agents in its neighbour slots.
     estimator, law, leader_gain, brief
         What `Agent` is made of.
+    checkpoint, remembers
+        The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
     """
 
     run: str
@@ -55,6 +59,8 @@ class AgentBrief:
     law: Choice
     leader_gain: float
     brief: Brief
+    checkpoint: str | None
+    remembers: bool
 
 
 class Node:
@@ -66,7 +72,10 @@ class Node:
         self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
         self._agent = Agent(brief.brief, brief.estimator.build(), brief.law.build(), brief.leader_gain)
         self._width, self._dimension = brief.brief.relative.shape
+        self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
         self._state: AgentState = self._agent.init(())
+        if self._checkpoint and brief.remembers:
+            self._state = checkpoint.load(self._checkpoint, like=self._state)
         self._heard = 0
         self._numbers = Numbering()
         self._inboxes = Sequences("the medium's")
@@ -87,15 +96,15 @@ class Node:
 
     def run(self) -> None:
         """Sense, broadcast, hear and act until the medium says that the run is over."""
-        position: wire.Rows | None = None
+        sensed: wire.SenseInbox | None = None
         while True:
             inbox = wire.unpack_inbox(self._inbox.recv().payload.to_bytes())
             self._inboxes.check("inbox", inbox.seq)
             if isinstance(inbox, wire.SenseInbox):
-                position = inbox.position
+                sensed = inbox
                 self._sense(inbox)
-            elif isinstance(inbox, wire.ExchangeInbox):
-                self._exchange(inbox, position)
+            elif isinstance(inbox, wire.ExchangeInbox) and sensed is not None:
+                self._exchange(inbox, sensed)
             else:
                 return
 
@@ -112,10 +121,12 @@ class Node:
                 wire.pack(wire.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
             )
 
-    def _exchange(self, inbox: wire.ExchangeInbox, position: wire.Rows | None) -> None:
+    def _exchange(self, inbox: wire.ExchangeInbox, sensed: wire.SenseInbox) -> None:
         self._heard += len(inbox.messages)
-        own = None if position is None else np.array(position, dtype=np.float64)
-        self._state, action = self._agent.act(self._state, inbox.k, self._gather(inbox.messages), own)
+        own = None if sensed.position is None else np.array(sensed.position, dtype=np.float64)
+        self._state, action = self._agent.act(self._state, sensed.clock, self._gather(inbox.messages), own)
+        if self._checkpoint:
+            checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
         act = wire.Act(
             k=inbox.k,

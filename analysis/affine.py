@@ -26,18 +26,15 @@ class Manoeuvre:
     offset: Array
 
     def target(self, tick: int | NDArray[np.int64], nominal: Array) -> Array:
-        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3); with ticks (T,), of each.
+        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3), in a tick each.
 
-        Returns
-        -------
-        Array
-            Shape (..., D), or (T, ..., D).
+        Ticks and agents broadcast against each other; after its last tick the manoeuvre rests.
         """
-        axes = tuple(range(np.ndim(tick), np.ndim(tick) + nominal.ndim - 1))
-        theta = np.expand_dims(self.theta[tick], axes)
-        return (theta @ nominal[..., None])[..., 0] + np.expand_dims(self.offset[tick], axes)
+        last = len(self.theta) - 1
+        reached = np.minimum(tick, last)
+        return (self.theta[reached] @ nominal[..., None])[..., 0] + self.offset[reached]
 
-    def velocity(self, tick: int, nominal: Array, dt: float) -> Array:
+    def velocity(self, tick: int | NDArray[np.int64], nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
         travelled: Array = self.target(tick + 1, nominal) - self.target(tick, nominal)
         return travelled / dt

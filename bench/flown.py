@@ -10,10 +10,11 @@ import numpy as np
 from netem.air import Verdicts
 from netem.chain import Chain, ChainLayer
 from netem.draws import Array
+from netem.fault import Fault
 from netem.links import Links, Mask
 from netem.medium import Medium
 from netem.profile import Profile
-from netem.timeline import Fault, Timeline
+from netem.timeline import Timeline
 
 DT = 0.01
 ONE = ("theta",)
@@ -68,7 +69,7 @@ def medium(
     seed: int, links: Links, channels: Sequence[str] = ONE, faults: Sequence[Fault] = (), **impairments: Any
 ) -> Medium:
     """The air of some links with these impairments alone."""
-    return Medium(seed, channels, profile(links, channels, **impairments), Timeline(links, faults))
+    return Medium(seed, channels, [profile(links, channels, **impairments)], Timeline(links, faults))
 
 
 def fly(air: Medium, ticks: int, offered: Mask | None = None, position: Array | None = None) -> Verdicts:

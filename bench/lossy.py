@@ -12,9 +12,9 @@ from against import Against, Row
 from netem.chain import Chain, all_together
 from netem.draws import Array
 from netem.fate import Fate
+from netem.fault import Fault, Verb
 from netem.links import Integers, Mask
 from netem.loss import bernoulli, bursts, gilbert_elliott, markov
-from netem.timeline import Fault, Verb
 
 # Bursts longer than one message, or there is nothing to compare; and the share that is cut short.
 _ENOUGH, _HARDLY = 25, 0.002
@@ -137,7 +137,7 @@ def _age(lost: Mask) -> Integers:
 def _scripted(verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     everywhere = tuple(links.index)
-    faults = [Fault(Verb.LOSE, 0, None, pairs=everywhere, loss=loss) for loss in (0.1, 0.3)]
+    faults = [Fault(Verb.LOSE, 0, None, pairs=everywhere, probability=loss) for loss in (0.1, 0.3)]
     fate = flown.fly(flown.medium(seed, links, faults=faults), ticks).fate
     against = Against("scripted loss", "0.1 and 0.3 at once")
     yield against.share("mean loss", 1.0 - 0.9 * 0.7, fate == Fate.SCRIPTED)

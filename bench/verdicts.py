@@ -22,6 +22,7 @@ import numpy as np
 from netem import schedule
 from netem.delay import Delay
 from netem.delay import Law as DelayLaw
+from netem.fault import Fault, Verb
 from netem.jamming import Zone
 from netem.links import Links
 from netem.loss import bernoulli, gilbert_elliott
@@ -29,7 +30,6 @@ from netem.medium import Medium
 from netem.rate import Rate
 from netem.reach import Law, Reach
 from netem.schedule import Schedule
-from netem.timeline import Fault, Verb
 
 _CHANNELS = ("sense", "measurement", "input", "theta")
 _WARM = 128
@@ -50,7 +50,7 @@ def everything(links: Links, ticks: int) -> Medium:
         faults=(
             Fault(Verb.CUT, third, 2 * third, pairs=pairs[:4]),
             Fault(Verb.PARTITION, 2 * third, None, groups=groups),
-            Fault(Verb.LOSE, 0, None, pairs=pairs, loss=0.02),
+            Fault(Verb.LOSE, 0, None, pairs=pairs, probability=0.02),
         ),
         chains=flown.layers(links, bernoulli(0.1), gilbert_elliott(0.02, 0.25, 0.95, 0.01, 0.03)),
         delays=(Delay(DelayLaw.NORMAL, all_, 0.015, 0.006, np.empty(0), 0.5, False),),

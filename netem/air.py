@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from netem.corrupt import Mark, Marks
-from netem.draws import Array
 from netem.fate import PASSED, Fate, Fates
 from netem.links import Integers, Mask
 
@@ -64,29 +63,25 @@ class Air(NamedTuple):
         Where one was offered in the last tick, shape (C, L).
     last_due
         When the last message that passed arrives, shape (C, L).
-    debt
-        Of the queues of limited links, in bits, shape (L,).
-    packet_states
-        Of the chains that step with the messages, shape (C', L) each.
+    memories
+        What each profile remembers.
     """
 
     under_way: Integers
     offered: Integers
     spoke: Mask
     last_due: Integers
-    debt: Array
-    packet_states: tuple[Integers, ...]
+    memories: tuple[Any, ...]
 
     @classmethod
-    def empty(cls, shape: tuple[int, int], debt: Array, packet_states: tuple[Integers, ...]) -> Air:
+    def empty(cls, shape: tuple[int, int], memories: tuple[Any, ...]) -> Air:
         """The air before the first tick, over (channels, links)."""
         return cls(
             under_way=np.empty((6, 0), dtype=np.int64),
             offered=np.zeros(shape, dtype=np.int64),
             spoke=np.zeros(shape, dtype=bool),
             last_due=np.full(shape, -1),
-            debt=debt,
-            packet_states=packet_states,
+            memories=memories,
         )
 
     @property

@@ -12,6 +12,7 @@ import zlib
 SENSE = "sense"
 MEASUREMENT = "measurement"
 INPUT = "input"
+THETA = "theta"
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from netem.fault import Fault, Verb
 from netem.links import Links
-from netem.timeline import Fault, Timeline, Verb
+from netem.timeline import Timeline
 
 INJECTABLE = (Verb.CUT, Verb.PARTITION, Verb.LOSE)
 
@@ -84,8 +85,8 @@ class Obeyed:
 def _why_not(fault: Fault | None, links: Links) -> str | None:
     if fault is None or fault.verb not in INJECTABLE:
         return f"only {', '.join(INJECTABLE)} can be injected into a run that flies"
-    if not 0.0 <= fault.loss <= 1.0:
-        return f"a probability of loss lies in [0, 1], got {fault.loss:g}"
+    if not 0.0 <= fault.probability <= 1.0:
+        return f"a probability of loss lies in [0, 1], got {fault.probability:g}"
     if fault.end is not None and fault.end <= 0:
         return f"a fault lasts at least one tick, got {fault.end}"
     try:

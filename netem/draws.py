@@ -44,6 +44,10 @@ class Purpose(IntEnum):
     CORRUPTION = 14
     CORRUPTED_BIT = 15
     SCRIPTED_LOSS = 16
+    DROPOUT = 17
+    OUTLIER = 18
+    OUTLIER_SIZE = 19
+    SELECTION = 20
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:

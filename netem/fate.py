@@ -8,8 +8,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from netem.fault import Verb
 from netem.links import Links
-from netem.timeline import Conditions, Verb
+from netem.timeline import Conditions
 
 Fates = NDArray[np.uint8]
 Counts = NDArray[np.int64]
@@ -25,16 +26,18 @@ class Fate(IntEnum):
     DELIVERED = 1
     DELAYED = 2  # under way, delivered or dropped in a later tick
     DEAD = 3
-    DEPARTED = 4
-    CUT = 5
-    PARTITION = 6
-    SCRIPTED = 7
-    CLOSED = 8
-    RANGE = 9
-    JAMMED = 10
-    LISTED = 11
-    LOST = 12
-    OVERFLOW = 13
+    PAUSED = 4
+    DEPARTED = 5
+    CUT = 6
+    PARTITION = 7
+    SCRIPTED = 8
+    DROPOUT = 9  # the sensor made no measurement
+    CLOSED = 10
+    RANGE = 11
+    JAMMED = 12
+    LISTED = 13
+    LOST = 14
+    OVERFLOW = 15
 
     @property
     def label(self) -> str:
@@ -44,10 +47,13 @@ class Fate(IntEnum):
 
 FATE_OF = {
     Verb.KILL: Fate.DEAD,
+    Verb.PAUSE: Fate.PAUSED,
     Verb.DEPART: Fate.DEPARTED,
     Verb.CUT: Fate.CUT,
     Verb.PARTITION: Fate.PARTITION,
     Verb.LOSE: Fate.SCRIPTED,
+    Verb.DROPOUT: Fate.DROPOUT,
+    Verb.DELAY: Fate.DELAYED,
 }
 REASONS = tuple(fate for fate in Fate if fate >= Fate.DEAD)
 
@@ -73,6 +79,7 @@ def doom(links: Links, now: Conditions) -> Fates:
         (Fate.PARTITION, now.partition_drops),
         (Fate.CUT, now.cut_drops),
         (Fate.DEPARTED, now.departed[receiver]),
+        (Fate.PAUSED, now.pause_drops),
         (Fate.DEAD, now.dead[receiver]),
     ):
         reason[held] = fate

@@ -22,9 +22,9 @@ from netem.channels import SENSE
 from netem.corrupt import Mark
 from netem.draws import Array
 from netem.fate import Fate
+from netem.fault import Fault
 from netem.links import Integers, Links, Mask
 from netem.plain import from_plain, plainly
-from netem.timeline import Fault
 
 FILE = "journal.arrows"
 VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import zenoh
 
-from netem import channels, wire
+from netem import channels, lie, wire
 from netem.air import Delivery, out_of_the_ordinary
 from netem.control import Order, obey
 from netem.corrupt import Mark, corrupted_fields
 from netem.draws import Array
 from netem.fate import Fate
+from netem.fault import Fault
 from netem.keys import Keys
 from netem.links import Integers, Links, Mask
 from netem.medium import Medium, recorded
@@ -25,7 +26,8 @@ from netem.profile import Profile
 from netem.sequence import Numbering, Sequences
 from netem.session import HUB, Login, await_subscribers, hub
 from netem.supervised import Supervisor, patience
-from netem.timeline import Fault, Timeline
+from netem.timeline import Timeline
+from netem.trigger import Trigger
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class MediumBrief:
         The run's name, part of every key.
     login, dictionary_file
         Where to listen, and the file with everybody's password.
-    seed, links, channels, profile, faults
+    seed, links, channels, profiles, faults, triggers
         What the medium is made of.
     injected
         Faults that an earlier run was given while it flew.
@@ -56,8 +58,9 @@ class MediumBrief:
     seed: int
     links: Links
     channels: tuple[str, ...]
-    profile: Profile
+    profiles: tuple[Profile, ...]
     faults: tuple[Fault, ...]
+    triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
     leaders: Mask
@@ -83,8 +86,8 @@ class Sentence:
     ----------
     tick
         k.
-    alive
-        Numbers of the agents whose processes live.
+    awake
+        Numbers of the agents whose processes live and run.
     seen
         For each agent, the neighbours whose measurement reaches it, and the link rows these stand in.
     heard
@@ -94,7 +97,7 @@ class Sentence:
     """
 
     tick: int
-    alive: tuple[int, ...]
+    awake: tuple[int, ...]
     seen: dict[int, tuple[list[int], list[int]]]
     heard: dict[int, list[Arriving]]
     journal: bytes
@@ -109,10 +112,11 @@ class Relay:
         self._brief = brief
         self._links = brief.links
         self._injected = brief.injected
-        self._timeline = Timeline(brief.links, (*brief.faults, *brief.injected))
+        self._scripted = Timeline(brief.links, brief.faults, brief.triggers)
+        self._timeline = self._scripted.facing(brief.injected)
         path = None if brief.recorded is None else Path(brief.recorded)
         verdicts = recorded(path, brief.links, brief.channels)
-        self._medium = Medium(brief.seed, brief.channels, brief.profile, self._timeline, verdicts)
+        self._medium = Medium(brief.seed, brief.channels, brief.profiles, self._timeline, verdicts)
         self._air = self._ahead = self._medium.begin()
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
         self._said: dict[tuple[int, int, str], bytes] = {}
@@ -144,6 +148,9 @@ class Relay:
             if sense.last:
                 self._end(sense.k)
                 return
+            if sense.fired:
+                self._scripted = self._scripted.fired(sense.fired, sense.k)
+                self._change()
             if sentence is None:
                 sentence = self._judge(sense.k, np.array(sense.position, dtype=np.float64))
             self._welcome_back(sense.k)
@@ -158,8 +165,8 @@ class Relay:
 
     def _judge(self, tick: int, position: Array | None) -> Sentence:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
-        alive = ~self._timeline.at(tick).dead
-        speaks = alive[self._links.src - 1]
+        awake = ~self._timeline.at(tick).idle
+        speaks = awake[self._links.src - 1]
         offered = np.stack([speaks | (name == channels.SENSE) for name in self._brief.channels])
         air, verdicts = self._medium.judge(self._air, tick, offered, position)
         self._ahead, delivery = self._medium.deliver(air, tick, verdicts)
@@ -177,8 +184,8 @@ class Relay:
             handed=[len(heard[agent]) for agent in self._inboxes],
             injected=list(self._injected) if changed else None,
         )
-        living = tuple((np.flatnonzero(alive) + 1).tolist())
-        return Sentence(tick, living, self._seen(verdicts.fate[0] == Fate.DELIVERED), heard, wire.pack(journal))
+        awake_agents = tuple((np.flatnonzero(awake) + 1).tolist())
+        return Sentence(tick, awake_agents, self._seen(verdicts.fate[0] == Fate.DELIVERED), heard, wire.pack(journal))
 
     def _take_orders(self, tick: int) -> bool:
         """Obey whoever asks to change the air from this tick on; whether anything changed."""
@@ -190,14 +197,16 @@ class Relay:
                 except wire.WireError as error:
                     query.reply_err(str(error).encode())
                     continue
-                obeyed = obey(order, tick, self._brief.faults, self._injected, self._links)
+                obeyed = obey(order, tick, self._scripted.faults, self._injected, self._links)
                 self._injected = obeyed.injected
                 query.reply(self._keys.control, wire.pack_record(obeyed.answer))
         if self._injected == before:
             return False
-        self._timeline = Timeline(self._links, (*self._brief.faults, *self._injected))
-        self._medium.timeline = self._timeline
+        self._change()
         return True
+
+    def _change(self) -> None:
+        self._timeline = self._medium.timeline = self._scripted.facing(self._injected)
 
     def _seen(self, arrived: Mask) -> dict[int, tuple[list[int], list[int]]]:
         seen: dict[int, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
@@ -230,13 +239,15 @@ class Relay:
                 self._from_agents.restart(f"{agent} {name}")
 
     def _hand_out_measurements(self, sense: wire.Sense, sentence: Sentence) -> None:
-        for agent in sentence.alive:
+        clock = self._timeline.clock(sense.k).tolist()
+        for agent in sentence.awake:
             neighbours, links = sentence.seen[agent]
             inbox = wire.SenseInbox(
                 k=sense.k,
                 src=HUB,
                 seq=self._numbers.next(f"inbox {agent}"),
                 phase=wire.Phase.SENSE,
+                clock=clock[agent - 1],
                 neighbours=neighbours,
                 measured=[sense.measured[link] for link in links],
                 position=sense.position[agent - 1] if self._brief.leaders[agent - 1] else None,
@@ -245,7 +256,7 @@ class Relay:
 
     def _collect(self, sentence: Sentence) -> None:
         tick = sentence.tick
-        awaited = {(agent, name) for agent in sentence.alive for name in self._spoken}
+        awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
         with patience(self._brief.patience_s, lambda: _missing(tick, awaited)):
             while awaited:
                 sample = self._broadcasts.recv()
@@ -256,21 +267,32 @@ class Relay:
                         f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}"
                     )
                 self._from_agents.check(f"{said.src} {said.channel}", said.seq)
-                self._said[tick, said.src, said.channel] = data
+                self._said[tick, said.src, said.channel] = self._as_told(said, data)
                 awaited.remove((said.src, said.channel))
 
     def _hand_out_broadcasts(self, sentence: Sentence) -> None:
-        for agent in sentence.alive:
+        for agent in sentence.awake:
             arriving = [self._as_it_arrives(said) for said in sentence.heard[agent]]
             seq = self._numbers.next(f"inbox {agent}")
             self._inboxes[agent].put(wire.pack_exchange(sentence.tick, seq, arriving))
+
+    def _as_told(self, said: wire.Broadcast, data: bytes) -> bytes:
+        for liar in self._timeline.at(said.k).liars:
+            if said.src in liar.agents and said.channel == lie.CHANNEL:
+                fields = {name: np.array(field) for name, field in said.payload.items()}
+                said = said._replace(payload=lie.told(fields, liar))
+                data = wire.pack(said)
+        return data
 
     def _as_it_arrives(self, said: Arriving) -> bytes:
         data = self._said[said.content, said.src, self._brief.channels[said.channel]]
         if said.mark in (Mark.NONE, Mark.STALE):
             return data
         draw = self._medium.bit_draws(*(np.array([n]) for n in (said.content, said.channel, said.link)))
-        kind, bias = np.array([said.mark], dtype=np.uint8), self._brief.profile.bias[[said.link]]
+        kind, bias = (
+            np.array([said.mark], dtype=np.uint8),
+            self._medium.bias(np.array([said.content]), np.array([said.link])),
+        )
         broadcast = wire.unpack(wire.Broadcast, data)
         fields = {name: np.array([field]) for name, field in broadcast.payload.items()}
         wrong = {name: field[0] for name, field in corrupted_fields(fields, kind, bias, draw).items()}

@@ -34,6 +34,8 @@ _PRIORITIES = (
     "background",
 )
 _LONGEST_QUEUE = 16
+# A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh.
+_LEASE_MS = 3_600_000
 
 
 def agent_name(agent: int) -> str:
@@ -97,7 +99,7 @@ def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
                 "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
                 "transport": {
                     "shared_memory": {"enabled": False},
-                    "link": {"tx": {"queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
+                    "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
                     "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
                 },
             }

@@ -7,94 +7,18 @@ the conditions are the union of all faults then active, so the end of one cannot
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from netem import cut
 from netem.draws import Array
-from netem.links import Links, Mask
-
-
-class Verb(StrEnum):
-    """What a fault does while it lasts."""
-
-    CUT = "cut"
-    PARTITION = "partition"
-    LOSE = "lose"
-    KILL = "kill"
-    DEPART = "depart"
-
-
-class UnderWay(StrEnum):
-    """What a cut or a partition does to the messages under way on its links."""
-
-    DROP = "drop"
-    DELIVER = "deliver"
-    HOLD = "hold"
-
-
-@dataclass(frozen=True)
-class Fault:
-    """One scripted fault, active in the ticks start <= k < end.
-
-    Parameters
-    ----------
-    verb
-        What happens: the directed links `pairs` carry nothing, nothing crosses between `groups`, `pairs` lose messages, the
-        processes of `agents` are dead, or `agents` have left the formation.
-    start, end
-        Ticks; `end` is None for a fault that lasts to the end of the run.
-    pairs, groups, agents
-        What it takes hold of; only those of its verb are filled.
-    under_way
-        What a cut or partition does to messages under way: drop them, deliver them when they are due, or hold them and deliver
-        them when it ends, in order.
-    loss
-        Probability with which LOSE loses a message, on top of what else does.
-    """
-
-    verb: Verb
-    start: int
-    end: int | None
-    pairs: tuple[tuple[int, int], ...] = ()
-    groups: tuple[tuple[int, ...], ...] = ()
-    agents: tuple[int, ...] = ()
-    under_way: UnderWay = UnderWay.DROP
-    loss: float = 0.0
-
-    def active(self, tick: int) -> bool:
-        """Whether it holds in this tick."""
-        return self.start <= tick and (self.end is None or tick < self.end)
-
-    def describe(self) -> str:
-        """What it does, for people."""
-        match self.verb:
-            case Verb.CUT:
-                return f"cut {self._links()}"
-            case Verb.LOSE:
-                return f"lose {self.loss:g} on {self._links()}"
-            case Verb.PARTITION:
-                return "partition " + " | ".join(",".join(map(str, group)) for group in self.groups)
-            case Verb.KILL | Verb.DEPART:
-                return f"{self.verb} {','.join(map(str, self.agents))}"
-
-    def describe_end(self) -> str:
-        """What its end does, for people."""
-        match self.verb:
-            case Verb.KILL:
-                return f"restart {','.join(map(str, self.agents))}"
-            case Verb.DEPART:
-                return f"rejoin {','.join(map(str, self.agents))}"
-            case Verb.CUT | Verb.PARTITION | Verb.LOSE:
-                return f"heal: {self.describe()}"
-
-    def _links(self) -> str:
-        shown = ", ".join(f"{src}->{dst}" for src, dst in self.pairs[:12])
-        return f"{shown} and {len(self.pairs) - 12} more" if len(self.pairs) > 12 else shown
+from netem.fault import Body, Fault, UnderWay, Verb
+from netem.links import Integers, Links, Mask
+from netem.trigger import Trigger
 
 
 @dataclass(frozen=True)
@@ -103,38 +27,92 @@ class Conditions:
 
     Parameters
     ----------
-    dead, departed
-        Agents, shape (N,).
+    dead, paused, departed
+        Agents whose processes are dead, or stopped, and agents that have left the formation, shape (N,).
+    drifting, vanished
+        Departed agents whose bodies fly on as they did, or are gone, shape (N,).
     cut, partitioned
         Links that carry nothing, shape (L,).
-    cut_drops, partition_drops, holds
-        Links on which messages under way are dropped by a cut, by a partition, or wait, shape (L,).
-    loss
-        Probability of scripted loss, shape (L,).
+    cut_drops, partition_drops, pause_drops, holds
+        Links on which messages under way are dropped by a cut, a partition or a paused receiver, or wait, shape (L,).
+    loss, dropout
+        Probabilities of scripted loss, and of a measurement that is not made, shape (L,).
+    delay_s
+        Scripted delay, shape (L,), in seconds.
+    profile
+        Which profile rules each link, 0 its own, shape (L,).
+    frozen
+        Links whose sensor repeats itself, shape (L,).
+    bias, push
+        What is added to measurements, in metres, and to velocities, in metres per second, shape (L, D) and (N, D), or (L, 1)
+        and (N, 1) of zeros.
+    outlier, deviation
+        Probability of an outlier, and its standard deviation in metres, shape (L,).
+    liars
+        Faults by which agents lie.
     """
 
     dead: Mask
+    paused: Mask
     departed: Mask
+    drifting: Mask
+    vanished: Mask
     cut: Mask
     partitioned: Mask
     cut_drops: Mask
     partition_drops: Mask
+    pause_drops: Mask
     holds: Mask
     loss: Array
+    dropout: Array
+    delay_s: Array
+    profile: NDArray[np.uint8]
+    frozen: Mask
+    bias: Array
+    push: Array
+    outlier: Array
+    deviation: Array
+    liars: tuple[Fault, ...]
 
     @property
     def absent(self) -> Mask:
         """Agents that take no part: dead or departed, shape (N,)."""
         return self.dead | self.departed
 
+    @property
+    def idle(self) -> Mask:
+        """Agents whose processes neither hear nor speak, shape (N,)."""
+        return self.dead | self.paused
+
+    @property
+    def still(self) -> Mask:
+        """Agents whose bodies hold where they are, shape (N,)."""
+        return self.absent & ~self.coasting
+
+    @property
+    def coasting(self) -> Mask:
+        """Agents whose bodies fly on with the input they had, shape (N,)."""
+        return ((self.paused & ~self.departed) | self.drifting) & ~self.dead
+
 
 class Timeline:
-    """All scripted faults of a run over its links."""
+    """All scripted faults of a run over its links.
 
-    def __init__(self, links: Links, faults: Sequence[Fault]) -> None:
+    Parameters
+    ----------
+    links
+        Of the nominal graph.
+    faults
+        All of them.
+    triggers
+        Those that set some of them off.
+    """
+
+    def __init__(self, links: Links, faults: Sequence[Fault], triggers: Sequence[Trigger] = ()) -> None:
         """Fails with ValueError where a fault names a link, group or agent that does not exist."""
         self.links = links
         self.faults = tuple(faults)
+        self.triggers = tuple(triggers)
         self._link_masks = [self._links_held(fault) for fault in self.faults]
         self._agent_masks = [self._agents_held(fault) for fault in self.faults]
 
@@ -142,63 +120,146 @@ class Timeline:
         """The conditions of a tick; the same object for as long as nothing changes."""
         return self._segments[bisect_right(self._boundaries, tick) - 1]
 
+    @cached_property
+    def pending(self) -> tuple[int, ...]:
+        """Triggers that have not fired yet and still hold a fault back."""
+        return tuple(sorted({fault.trigger for fault in self.faults if fault.trigger is not None}))
+
+    def due(self, errors: Array) -> list[int]:
+        """Triggers that fire in the tick after these tracking errors, shape (T,), in square metres."""
+        return [number for number in self.pending if self.triggers[number].fires(errors)]
+
+    def fired(self, triggers: Iterable[int], tick: int) -> Timeline:
+        """The timeline once these triggers have fired in this tick."""
+        chosen = set(triggers)
+        return Timeline(
+            self.links,
+            [_placed(fault, tick) if fault.trigger in chosen else fault for fault in self.faults],
+            self.triggers,
+        )
+
+    def facing(self, injected: Iterable[Fault]) -> Timeline:
+        """The timeline with faults on top."""
+        return Timeline(self.links, (*self.faults, *injected), self.triggers)
+
     def starting(self, tick: int) -> list[Fault]:
         """Faults whose first tick this is."""
-        return [fault for fault in self.faults if fault.start == tick]
+        return [fault for fault in self.faults if fault.trigger is None and fault.start == tick]
 
     def ending(self, tick: int) -> list[Fault]:
         """Faults that hold no longer from this tick on."""
-        return [fault for fault in self.faults if fault.end == tick]
+        return [fault for fault in self.faults if fault.trigger is None and fault.end == tick]
 
     def restarted(self, tick: int) -> list[int]:
-        """Agents whose processes are fresh in this tick."""
+        """Agents whose processes are new in this tick."""
         ended = {agent for fault in self.ending(tick) if fault.verb is Verb.KILL for agent in fault.agents}
         return sorted(agent for agent in ended if not self.at(tick).dead[agent - 1])
+
+    def remembering(self, tick: int) -> list[int]:
+        """Those among them that go on from their own last state."""
+        warm = {agent for fault in self.ending(tick) if fault.warm for agent in fault.agents}
+        return [agent for agent in self.restarted(tick) if agent in warm]
 
     def killed(self, tick: int) -> list[int]:
         """Agents whose processes die at this tick."""
         starting = {agent for fault in self.starting(tick) if fault.verb is Verb.KILL for agent in fault.agents}
         return sorted(agent for agent in starting if tick == 0 or not self.at(tick - 1).dead[agent - 1])
 
+    def paused(self, tick: int) -> list[int]:
+        """Agents whose processes are to be stopped at this tick."""
+        now = self.at(tick).paused.copy()
+        if tick:
+            now &= ~self.at(tick - 1).paused
+        return (np.flatnonzero(now) + 1).tolist()
+
+    def resumed(self, tick: int) -> list[int]:
+        """Agents whose processes go on at this tick."""
+        if not tick:
+            return []
+        return (np.flatnonzero(self.at(tick - 1).paused & ~self.at(tick).idle) + 1).tolist()
+
+    def clock(self, tick: int) -> Integers:
+        """What each agent's clock says in this tick, in ticks, shape (N,)."""
+        reading = np.full(self.links.agents, tick)
+        for fault, mask in self._acting(tick, Verb.CLOCK, self._agent_masks):
+            reading += mask * int(np.floor(fault.rate * (tick - fault.start)))
+        return np.maximum(reading, 0)
+
     def held(self, fault: int) -> Mask:
         """Links on which fault number `fault` acts, shape (L,)."""
         return self._link_masks[fault] | self.links.touching(self._agent_masks[fault])
 
+    @property
+    def warm(self) -> frozenset[int]:
+        """Agents that at some time go on from their own last state."""
+        return frozenset(agent for fault in self.faults if fault.warm for agent in fault.agents)
+
     @cached_property
     def _boundaries(self) -> list[int]:
-        ends = {fault.end for fault in self.faults if fault.end is not None}
-        return sorted({0} | {fault.start for fault in self.faults} | ends)
+        placed = [fault for fault in self.faults if fault.trigger is None]
+        ends = {fault.end for fault in placed if fault.end is not None}
+        return sorted({0} | {fault.start for fault in placed} | ends)
 
     @cached_property
     def _segments(self) -> list[Conditions]:
         return [self._conditions(tick) for tick in self._boundaries]
 
+    def _acting(self, tick: int, verb: Verb, masks: Sequence[Mask]) -> list[tuple[Fault, Mask]]:
+        pairs = zip(self.faults, masks, strict=True)
+        return [(fault, mask) for fault, mask in pairs if fault.verb is verb and fault.active(tick)]
+
     def _conditions(self, tick: int) -> Conditions:
-        def union(verb: Verb, masks: list[Mask], size: int) -> Mask:
-            held = [m for f, m in zip(self.faults, masks, strict=True) if f.verb is verb and f.active(tick)]
-            return np.logical_or.reduce([np.zeros(size, dtype=bool), *held])
+        size, agents = len(self.links), self.links.agents
 
-        def under_way(policy: UnderWay, *verbs: Verb) -> Mask:
-            held = [
-                mask
-                for fault, mask in zip(self.faults, self._link_masks, strict=True)
-                if fault.under_way is policy and fault.verb in verbs and fault.active(tick)
-            ]
-            return np.logical_or.reduce([np.zeros(len(self.links), dtype=bool), *held])
+        def links(*verbs: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
+            acting = [pair for verb in verbs for pair in self._acting(tick, verb, self._link_masks)]
+            return np.logical_or.reduce([np.zeros(size, dtype=bool), *(m for f, m in acting if which(f))])
 
-        passing = np.ones(len(self.links))
-        for fault, mask in zip(self.faults, self._link_masks, strict=True):
-            if fault.verb is Verb.LOSE and fault.active(tick):
-                passing = passing * np.where(mask, 1.0 - fault.loss, 1.0)
+        def whom(verb: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
+            acting = self._acting(tick, verb, self._agent_masks)
+            return np.logical_or.reduce([np.zeros(agents, dtype=bool), *(m for f, m in acting if which(f))])
+
+        def chance(verb: Verb) -> Array:
+            passing = np.ones(size)
+            for fault, mask in self._acting(tick, verb, self._link_masks):
+                passing = passing * np.where(mask, 1.0 - fault.probability, 1.0)
+            return 1.0 - passing
+
+        def sums(verb: Verb, masks: Sequence[Mask], rows: int) -> Array:
+            acting = self._acting(tick, verb, masks)
+            return sum((mask[:, None] * np.array(fault.vector) for fault, mask in acting), start=np.zeros((rows, 1)))
+
+        def largest(verb: Verb, value: Callable[[Fault], float]) -> Array:
+            acting = self._acting(tick, verb, self._link_masks)
+            return np.max([np.zeros(size), *(mask * value(fault) for fault, mask in acting)], axis=0)
+
+        dead, receiver = whom(Verb.KILL), self.links.dst - 1
+        drops, holds = (
+            (lambda fault, policy=policy: fault.under_way is policy) for policy in UnderWay if policy != "deliver"
+        )
+        delays = [mask * fault.seconds for fault, mask in self._acting(tick, Verb.DELAY, self._link_masks)]
         return Conditions(
-            dead=union(Verb.KILL, self._agent_masks, self.links.agents),
-            departed=union(Verb.DEPART, self._agent_masks, self.links.agents),
-            cut=union(Verb.CUT, self._link_masks, len(self.links)),
-            partitioned=union(Verb.PARTITION, self._link_masks, len(self.links)),
-            cut_drops=under_way(UnderWay.DROP, Verb.CUT),
-            partition_drops=under_way(UnderWay.DROP, Verb.PARTITION),
-            holds=under_way(UnderWay.HOLD, Verb.CUT, Verb.PARTITION),
-            loss=1.0 - passing,
+            dead=dead,
+            paused=whom(Verb.PAUSE) & ~dead,
+            departed=whom(Verb.DEPART),
+            drifting=whom(Verb.DEPART, lambda fault: fault.body is Body.DRIFT),
+            vanished=whom(Verb.DEPART, lambda fault: fault.body is Body.VANISH),
+            cut=links(Verb.CUT),
+            partitioned=links(Verb.PARTITION),
+            cut_drops=links(Verb.CUT, which=drops),
+            partition_drops=links(Verb.PARTITION, which=drops),
+            pause_drops=whom(Verb.PAUSE, drops)[receiver],
+            holds=links(Verb.CUT, Verb.PARTITION, which=holds) | whom(Verb.PAUSE, holds)[receiver],
+            loss=chance(Verb.LOSE),
+            dropout=chance(Verb.DROPOUT),
+            delay_s=np.sum([np.zeros(size), *delays], axis=0),
+            profile=largest(Verb.DEGRADE, lambda fault: fault.profile).astype(np.uint8),
+            frozen=links(Verb.FREEZE),
+            bias=sums(Verb.BIAS, self._link_masks, size),
+            push=sums(Verb.GUST, self._agent_masks, agents),
+            outlier=chance(Verb.OUTLIER),
+            deviation=largest(Verb.OUTLIER, lambda fault: fault.deviation),
+            liars=tuple(fault for fault, _ in self._acting(tick, Verb.LIE, self._agent_masks)),
         )
 
     def _links_held(self, fault: Fault) -> Mask:
@@ -211,3 +272,7 @@ class Timeline:
                 raise ValueError(f"agent {agent} does not exist: agents are 1 to {self.links.agents}")
             mask[agent - 1] = True
         return mask
+
+
+def _placed(fault: Fault, tick: int) -> Fault:
+    return replace(fault, trigger=None, start=tick + fault.start, end=None if fault.end is None else tick + fault.end)

@@ -38,7 +38,7 @@ class Sense(NamedTuple):
     """World to medium: the raw sensing of tick k; `last` says that the run is over and nothing was sensed.
 
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
-    (N, D), both in metres.
+    (N, D), both in metres; `fired` are the numbers of the triggers that fire in this tick.
     """
 
     k: int
@@ -47,19 +47,22 @@ class Sense(NamedTuple):
     last: bool
     measured: Array | Rows
     position: Array | Rows
+    fired: Rows
 
 
 class SenseInbox(NamedTuple):
     """Medium to agent: the measurements of tick k that reached it.
 
-    `neighbours` are the agents measured, shape (m,), `measured` their relative positions z_i - z_j, shape (m, D), in
-    metres; `position` is the agent's own, shape (D,), and only leaders, who have positioning, get it.
+    `clock` is what the agent's own clock says, in ticks; `neighbours` are the agents measured, shape (m,), `measured` their
+    relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
+    positioning, get it.
     """
 
     k: int
     src: str
     seq: int
     phase: Phase
+    clock: int
     neighbours: Rows
     measured: Rows
     position: Rows | None

@@ -12,6 +12,7 @@ from netem.air import Air, Delivery, Verdicts
 from netem.chain import Chain, ChainLayer
 from netem.channels import SENSE
 from netem.delay import Delay, Law
+from netem.fault import Fault, UnderWay, Verb
 from netem.jamming import Zone
 from netem.links import Links
 from netem.loss import bernoulli
@@ -20,7 +21,7 @@ from netem.profile import Profile
 from netem.rate import Rate
 from netem.reach import Reach
 from netem.schedule import Schedule
-from netem.timeline import Fault, Timeline, UnderWay, Verb
+from netem.timeline import Timeline
 from netem.trace import Trace
 
 DT = 0.1
@@ -96,7 +97,7 @@ def fly(medium, offered, position=None):
 
 def fates_of(seed, channels, profile, timeline, ticks):
     """What becomes of a message on every channel and link in every tick, shape (ticks, C, L)."""
-    medium = Medium(seed, channels, profile, timeline)
+    medium = Medium(seed, channels, [profile], timeline)
     flown = fly(
         medium, np.broadcast_to(everything(channels, timeline.links), (ticks, len(channels), len(timeline.links)))
     )
@@ -249,7 +250,9 @@ def faults_over(links, ticks):
             sides,
             policies,
         ),
-        st.builds(lambda t, p, loss: Fault(Verb.LOSE, *t, pairs=p, loss=loss), times, pairs, st.floats(0.0, 1.0)),
+        st.builds(
+            lambda t, p, loss: Fault(Verb.LOSE, *t, pairs=p, probability=loss), times, pairs, st.floats(0.0, 1.0)
+        ),
         st.builds(lambda t, agent: Fault(Verb.KILL, *t, agents=(agent,)), times, agents),
         st.builds(lambda t, agent: Fault(Verb.DEPART, *t, agents=(agent,)), times, agents),
     )
@@ -305,7 +308,7 @@ def fly_case(case, channels, ticks):
     links, timeline = case.links, Timeline(case.links, case.faults)
     profile = mixture(case.mix, case.has, links, channels, coupled=case.coupled, least_delay=case.least_delay)
     offered = chatter(case.mix, channels, links, ticks, case.talk)
-    medium = Medium(case.seed, channels, profile, timeline)
+    medium = Medium(case.seed, channels, [profile], timeline)
     return timeline, offered, fly(medium, offered, roaming(case.mix, case.agents, ticks))
 
 

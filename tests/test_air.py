@@ -26,11 +26,12 @@ from netem.chain import ChainLayer
 from netem.corrupt import Mark
 from netem.delay import Delay, Law
 from netem.fate import FATE_OF, REASONS, Fate, Ledger
+from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
 from netem.loss import gilbert_elliott
 from netem.medium import Medium
 from netem.rate import Rate
-from netem.timeline import Fault, Timeline, UnderWay, Verb
+from netem.timeline import Timeline
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 SIZE = len(LINKS)
@@ -45,7 +46,7 @@ def quiet(**changes):
 
 
 def medium(standing, *faults, seed=1):
-    return Medium(seed, CHANNELS, standing, Timeline(LINKS, faults))
+    return Medium(seed, CHANNELS, [standing], Timeline(LINKS, faults))
 
 
 def always(ticks):
@@ -180,7 +181,7 @@ def test_a_message_held_for_a_receiver_that_dies_is_dropped_for_that():
 
 
 def test_scripted_loss_leaves_what_is_under_way():
-    lose = Fault(Verb.LOSE, 2, 9, pairs=((1, 2),), loss=1.0)
+    lose = Fault(Verb.LOSE, 2, 9, pairs=((1, 2),), probability=1.0)
     assert arrivals(fly(medium(quiet(delays=taking([2] * SIZE)), lose), only(12, 1))) == [(3, 1)]
 
 
@@ -461,7 +462,7 @@ class Scripted:
     ],
 )
 def test_the_newest_content_that_arrives_decides_and_of_equally_new_the_last(sent, newest, mark):
-    flying = Medium(1, CHANNELS, quiet(), Timeline(LINKS, []), Scripted(sent))
+    flying = Medium(1, CHANNELS, [quiet()], Timeline(LINKS, []), Scripted(sent))
     delivery = fly(flying, always(8))[7].delivery
     here = np.zeros((len(CHANNELS), SIZE), dtype=bool)
     here[INPUT, ROW] = True
@@ -586,14 +587,14 @@ def test_the_mixtures_have_everything_in_them():
         Fault(Verb.PARTITION, 65, 70, groups=((1, 2), (3, 4, 5))),
         Fault(Verb.KILL, 75, 80, agents=(2,)),
         Fault(Verb.DEPART, 85, 90, agents=(3,)),
-        Fault(Verb.LOSE, 0, None, pairs=tuple(links.index), loss=0.05),
+        Fault(Verb.LOSE, 0, None, pairs=tuple(links.index), probability=0.05),
     ]
     fates, marks, under_way, released, copies = Counter(), Counter(), Counter(), 0, 0
     for coupled in (True, False):
         standing = mixture(3, IMPAIRMENTS, links, CHANNELS, coupled=coupled)
         offered = chatter(3, CHANNELS, links, 100, 0.7)
         for verdicts, delivery, _ in fly(
-            Medium(3, CHANNELS, standing, Timeline(links, faults)), offered, roaming(3, 5, 100)
+            Medium(3, CHANNELS, [standing], Timeline(links, faults)), offered, roaming(3, 5, 100)
         ):
             fates.update(verdicts.fate.ravel().tolist())
             marks.update(verdicts.mark.ravel().tolist())

@@ -20,9 +20,10 @@ from netem import channels as channel_names
 from netem.chain import Chain, ChainLayer
 from netem.corrupt import Mark
 from netem.fate import Fate
+from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
 from netem.medium import Medium
-from netem.timeline import Fault, Timeline, UnderWay, Verb
+from netem.timeline import Timeline
 from netem.weather import Forecast
 
 CHANNELS = ("sense", "input", "theta")
@@ -93,7 +94,7 @@ RING = ((1, 2), (2, 3), (3, 4), (4, 1), (1, 3))
 ONE_OF_EACH = [
     *(Fault(Verb.CUT, 9, 14, pairs=((1, 2), (4, 3)), under_way=policy) for policy in UnderWay),
     *(Fault(Verb.PARTITION, 9, 14, groups=((1, 2), (3, 4)), under_way=policy) for policy in UnderWay),
-    Fault(Verb.LOSE, 9, 14, pairs=((1, 2), (4, 3)), loss=0.7),
+    Fault(Verb.LOSE, 9, 14, pairs=((1, 2), (4, 3)), probability=0.7),
     Fault(Verb.KILL, 9, 14, agents=(2,)),
     Fault(Verb.DEPART, 9, 14, agents=(2,)),
 ]
@@ -164,7 +165,7 @@ THERE = PAIR.index[1, 2]
 
 def toggling(by_packet, *, coupled):
     layer = ChainLayer.of(0, [TOGGLE] * 2, np.full(2, by_packet), sensing=True, comms=True)
-    return Medium(5, CHANNELS, quiet_profile(PAIR, CHANNELS, chains=(layer,), coupled=coupled), Timeline(PAIR, []))
+    return Medium(5, CHANNELS, [quiet_profile(PAIR, CHANNELS, chains=(layer,), coupled=coupled)], Timeline(PAIR, []))
 
 
 def outcomes(medium, offered):
@@ -226,7 +227,7 @@ def test_a_message_that_is_lost_steps_its_chain_too():
 def test_a_link_that_steps_with_messages_leaves_those_that_step_with_time():
     mixed = np.array([row == THERE for row in range(2)])
     layer = ChainLayer.of(0, [TOGGLE] * 2, mixed, sensing=True, comms=True)
-    both = Medium(5, CHANNELS, quiet_profile(PAIR, CHANNELS, chains=(layer,)), Timeline(PAIR, []))
+    both = Medium(5, CHANNELS, [quiet_profile(PAIR, CHANNELS, chains=(layer,))], Timeline(PAIR, []))
     by_time = toggling(False, coupled=True)
     other = PAIR.index[2, 1]
     offered = np.zeros((20, len(CHANNELS), 2), dtype=bool)

@@ -11,8 +11,8 @@ from affinet.inject import Access, NotFlying, Wish
 from affinet.run import fly
 from netem import journal
 from netem.control import Action, Order, obey
+from netem.fault import Fault, Verb
 from netem.links import Links
-from netem.timeline import Fault, Verb
 
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 SCRIPTED = (Fault(Verb.CUT, 0, None, pairs=((1, 2),)),)
@@ -104,16 +104,16 @@ def order(verb, **what):
 
 
 def test_healing_leaves_what_is_scripted():
-    injected = obey(order(Verb.LOSE, pairs=((2, 3),), loss=0.4), 5, SCRIPTED, (), LINKS).injected
+    injected = obey(order(Verb.LOSE, pairs=((2, 3),), probability=0.4), 5, SCRIPTED, (), LINKS).injected
     done = obey(Order(Action.HEAL, None), 9, SCRIPTED, injected, LINKS)
-    assert done.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), loss=0.4),)
+    assert done.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), probability=0.4),)
     assert done.answer.holds == ("cut 1->2",)
 
 
 @pytest.mark.parametrize(
     ("asked", "why"),
     [
-        (order(Verb.LOSE, pairs=((1, 2),), loss=1.5), "lies in [0, 1]"),
+        (order(Verb.LOSE, pairs=((1, 2),), probability=1.5), "lies in [0, 1]"),
         (order(Verb.CUT, pairs=((1, 3),)), "not in the nominal graph"),
         (order(Verb.CUT, pairs=()), "no link"),
         (order(Verb.CUT, pairs=((1, 2),), end=0), "at least one tick"),

@@ -37,21 +37,21 @@ def test_corridor_starts_at_twice_the_nominal_formation_of_zhao7():
 
 
 def test_corridor_passes_between_the_walls():
-    targets = corridor(np.arange(0, 125, 0.05)).target(np.arange(2500), NOMINAL)
+    targets = corridor(np.arange(0, 125, 0.05)).target(np.arange(2500)[:, None], NOMINAL)
     for x, y, width, height in ([18, 1.8, 5, 15], [18, -16.5, 5, 14.5], [18, -25, 5, 6.5]):
         within = (targets >= [x, y]) & (targets <= [x + width, y + height])
         assert not within.all(axis=-1).any()
 
 
 def test_corridor_moves_without_jumps():
-    step = np.diff(corridor(np.arange(0, 130, 0.01)).target(np.arange(13000), NOMINAL), axis=0)
+    step = np.diff(corridor(np.arange(0, 130, 0.01)).target(np.arange(13000)[:, None], NOMINAL), axis=0)
     assert 0.01 < np.linalg.norm(step, axis=-1).max() < 0.05  # at most 5 m/s
 
 
 def test_hover_holds_the_nominal_formation():
     still = hover(np.arange(5.0), 3)
     nominal = np.random.default_rng(1).normal(size=(6, 3))
-    np.testing.assert_array_equal(still.target(np.arange(5), nominal), np.broadcast_to(nominal, (5, 6, 3)))
+    np.testing.assert_array_equal(still.target(np.arange(5)[:, None], nominal), np.broadcast_to(nominal, (5, 6, 3)))
     np.testing.assert_array_equal(still.velocity(2, nominal, 0.1), np.zeros((6, 3)))
 
 
@@ -99,7 +99,7 @@ def test_keyframes_leave_rest_and_come_to_rest_at_a_continuous_velocity():
 def test_target_of_many_ticks_is_the_target_of_each():
     flown, nominal = corridor(np.arange(0.0, 60.0, 7.0)), NOMINAL
     each = [flown.theta[k] @ p + flown.offset[k] for k in (1, 4) for p in nominal]
-    np.testing.assert_allclose(flown.target(np.array([1, 4]), nominal), np.reshape(each, (2, 7, 2)), atol=1e-13)
+    np.testing.assert_allclose(flown.target(np.array([[1], [4]]), nominal), np.reshape(each, (2, 7, 2)), atol=1e-13)
 
 
 def test_velocity_carries_the_target_of_this_tick_to_the_next():

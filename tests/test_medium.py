@@ -8,13 +8,14 @@ from airs import DT, constant, fates_of, fly, losing, quiet_profile, taking
 from airs import everything as everything_on
 
 from netem.fate import REASONS, Fate, Ledger
+from netem.fault import Fault, Verb
 from netem.jamming import Zone
 from netem.links import Links
 from netem.medium import Medium
 from netem.rate import Rate
 from netem.reach import Law, Reach
 from netem.schedule import Schedule
-from netem.timeline import Fault, Timeline, Verb
+from netem.timeline import Timeline
 from netem.trace import Trace
 
 LINKS = Links.both_ways(5, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (1, 3)])
@@ -38,7 +39,7 @@ def always(ticks):
 
 
 def medium(standing, faults=(), seed=1):
-    return Medium(seed, CHANNELS, standing, Timeline(LINKS, faults))
+    return Medium(seed, CHANNELS, [standing], Timeline(LINKS, faults))
 
 
 def judged(standing, faults=(), seed=1, offered=None, position=None):
@@ -107,7 +108,7 @@ HOLDING_LINK_1_2 = [
     (Fate.DEPARTED, Fault(Verb.DEPART, 0, None, agents=(2,))),
     (Fate.CUT, Fault(Verb.CUT, 0, None, pairs=((1, 2),))),
     (Fate.PARTITION, Fault(Verb.PARTITION, 0, None, groups=((1,), (2,)))),
-    (Fate.SCRIPTED, Fault(Verb.LOSE, 0, None, pairs=((1, 2),), loss=1.0)),
+    (Fate.SCRIPTED, Fault(Verb.LOSE, 0, None, pairs=((1, 2),), probability=1.0)),
     (Fate.CLOSED, with_closed),
     (Fate.RANGE, with_nothing_in_range),
     (Fate.JAMMED, with_all_jammed),
@@ -153,7 +154,7 @@ def test_layers_are_independent():
         Fault(Verb.PARTITION, 10, 30, groups=((1, 2), (3, 4, 5))),
         Fault(Verb.DEPART, 15, 35, agents=(3,)),
         Fault(Verb.KILL, 20, 28, agents=(2,)),
-        Fault(Verb.LOSE, 3, 37, pairs=((1, 2), (1, 3), (5, 1)), loss=0.5),
+        Fault(Verb.LOSE, 3, 37, pairs=((1, 2), (1, 3), (5, 1)), probability=0.5),
     ]
     trace = Trace(np.array([0]), np.full((1, SIZE), 0.8), sensing=True, comms=True)
     duty = Schedule(np.full(SIZE, 7), np.arange(SIZE) % 7, np.full(SIZE, 5), sensing=True, comms=True)
@@ -258,7 +259,7 @@ def test_another_seed_loses_other_messages():
 
 
 def test_scripted_loss_comes_on_top_of_the_loss_of_the_air():
-    lose = Fault(Verb.LOSE, 0, None, pairs=tuple(LINKS.index), loss=0.4)
+    lose = Fault(Verb.LOSE, 0, None, pairs=tuple(LINKS.index), probability=0.4)
     fates = verdicts(profile(availability=0.7, coupled=False), 1000, [lose, lose], seed=3)
     messages = fates.size
     for fate, share in ((Fate.SCRIPTED, 1 - 0.6**2), (Fate.LOST, 0.6**2 * 0.3), (Fate.DELIVERED, 0.6**2 * 0.7)):

@@ -5,8 +5,8 @@ import pytest
 
 from affinet import plan, scenario, selectors
 from affinet.sections import ScenarioError
+from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
-from netem.timeline import Fault, UnderWay, Verb
 from world.formation import PRESETS
 
 GOOD = """\
@@ -132,7 +132,7 @@ def test_the_faults_of_the_network_fly_as_they_are_written(file):
     assert plan.make(scenario.load(str(file))).faults[2:] == (
         Fault(Verb.CUT, 60, None, pairs=((1, 2),), under_way=UnderWay.HOLD),
         Fault(Verb.PARTITION, 60, 70, groups=((1, 2), (3,)), under_way=UnderWay.DELIVER),
-        Fault(Verb.LOSE, 20, None, pairs=((4, 2),), loss=0.25),
+        Fault(Verb.LOSE, 20, None, pairs=((4, 2),), probability=0.25),
     )
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
-from netem.timeline import Fault, Timeline, UnderWay, Verb
+from netem.timeline import Timeline
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 
@@ -84,7 +85,7 @@ def test_dead_and_departed_agents_are_absent():
         (Verb.CUT, {"pairs": ((1, 2),)}, "cut"),
         (Verb.CUT, {"pairs": ((1, 2),)}, "cut_drops"),
         (Verb.PARTITION, {"groups": ((1,), (2,)), "under_way": UnderWay.HOLD}, "holds"),
-        (Verb.LOSE, {"pairs": ((1, 2),), "loss": 0.5}, "loss"),
+        (Verb.LOSE, {"pairs": ((1, 2),), "probability": 0.5}, "loss"),
         (Verb.PARTITION, {"groups": ((1,), (2,))}, "partitioned"),
         (Verb.KILL, {"agents": (1,)}, "dead"),
         (Verb.DEPART, {"agents": (1,)}, "departed"),
@@ -136,7 +137,7 @@ def test_what_is_under_way_on_the_links_of_a_partition_is_dropped_unless_it_says
     [
         Fault(Verb.KILL, 0, None, agents=(1,)),
         Fault(Verb.DEPART, 0, None, agents=(1,)),
-        Fault(Verb.LOSE, 0, None, pairs=((1, 2),), loss=1.0),
+        Fault(Verb.LOSE, 0, None, pairs=((1, 2),), probability=1.0),
     ],
     ids=lambda fault: fault.verb,
 )
@@ -148,8 +149,8 @@ def test_only_cuts_and_partitions_say_what_becomes_of_what_is_under_way_on_links
 
 def test_scripted_losses_of_a_link_are_independent_of_each_other():
     faults = [
-        Fault(Verb.LOSE, 0, 5, pairs=((1, 2), (2, 3)), loss=0.5),
-        Fault(Verb.LOSE, 3, 9, pairs=((1, 2),), loss=0.2),
+        Fault(Verb.LOSE, 0, 5, pairs=((1, 2), (2, 3)), probability=0.5),
+        Fault(Verb.LOSE, 3, 9, pairs=((1, 2),), probability=0.2),
     ]
     timeline, row = Timeline(LINKS, faults), LINKS.index[1, 2]
     assert [float(timeline.at(tick).loss[row]) for tick in (2, 3, 5, 9)] == pytest.approx([0.5, 0.6, 0.2, 0.0])
@@ -217,7 +218,7 @@ def test_a_fault_holds_its_links_and_all_links_of_its_agents():
     ("fault", "says", "says_at_its_end"),
     [
         (Fault(Verb.CUT, 0, 1, pairs=((1, 2), (2, 1))), "cut 1->2, 2->1", "heal: cut 1->2, 2->1"),
-        (Fault(Verb.LOSE, 0, 1, pairs=((1, 2),), loss=0.25), "lose 0.25 on 1->2", "heal: lose 0.25 on 1->2"),
+        (Fault(Verb.LOSE, 0, 1, pairs=((1, 2),), probability=0.25), "lose 0.25 on 1->2", "heal: lose 0.25 on 1->2"),
         (Fault(Verb.PARTITION, 0, 1, groups=((1, 2), (3,))), "partition 1,2 | 3", "heal: partition 1,2 | 3"),
         (Fault(Verb.KILL, 0, 1, agents=(4,)), "kill 4", "restart 4"),
         (Fault(Verb.DEPART, 0, 1, agents=(1, 2)), "depart 1,2", "rejoin 1,2"),
@@ -236,7 +237,7 @@ def test_a_fault_of_many_links_names_the_first_and_counts_the_rest():
     ("fault", "match"),
     [
         (Fault(Verb.CUT, 0, None, pairs=((1, 2), (1, 3))), "link 1->3 is not in the nominal graph"),
-        (Fault(Verb.LOSE, 0, None, pairs=((1, 3),), loss=0.5), "link 1->3 is not in the nominal graph"),
+        (Fault(Verb.LOSE, 0, None, pairs=((1, 3),), probability=0.5), "link 1->3 is not in the nominal graph"),
         (Fault(Verb.PARTITION, 0, None, groups=((1,), (5,))), "agent 5 does not exist: agents are 1 to 4"),
         (Fault(Verb.PARTITION, 0, None, groups=((1, 2), (2,))), "agent 2 stands in two groups"),
         (Fault(Verb.KILL, 0, None, agents=(1, 0)), "agent 0 does not exist: agents are 1 to 4"),

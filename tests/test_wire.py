@@ -13,11 +13,11 @@ from agents.brief import Brief
 from analysis.affine import Manoeuvre
 from netem import wire
 from netem.delay import Law
+from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
 from netem.plain import PlainError, from_plain, plainly
 from netem.process import MediumBrief
 from netem.session import Login
-from netem.timeline import Fault, UnderWay, Verb
 from netem.wire import Phase, WireError
 
 
@@ -270,7 +270,7 @@ MEDIUM = MediumBrief(
     profile=PROFILE,
     faults=(
         Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1)), under_way=UnderWay.HOLD),
-        Fault(Verb.LOSE, 3, 6, pairs=((1, 2),), loss=0.25),
+        Fault(Verb.LOSE, 3, 6, pairs=((1, 2),), probability=0.25),
         Fault(Verb.PARTITION, 3, None, groups=((1,), (2, 3))),
         Fault(Verb.KILL, 9, None, agents=(3,)),
     ),

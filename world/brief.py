@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from netem.fault import Fault
 from netem.session import Login
-from netem.timeline import Fault
+from netem.trigger import Trigger
 from world.world import World
 
 _LEAST_BATCH = 50
@@ -48,7 +49,7 @@ class WorldBrief:
         Where it connects, and as whom.
     out
         The run directory.
-    world, channels, faults
+    world, channels, faults, triggers
         What it simulates.
     books
         How it writes that down.
@@ -62,5 +63,6 @@ class WorldBrief:
     world: World
     channels: tuple[str, ...]
     faults: tuple[Fault, ...]
+    triggers: tuple[Trigger, ...]
     books: Books
     patience_s: float

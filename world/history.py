@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from analysis.metrics import tracking_error
 from netem.air import Entry, newest_of
 from netem.corrupt import Mark
-from netem.fate import FATE_OF, Fate, Fates
+from netem.fate import Fate, Fates
 from netem.links import Integers, Mask
 from netem.timeline import Timeline
 from world.formation import Array
@@ -163,6 +163,26 @@ def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry], moments: Se
     return newest.astype(np.int32)
 
 
+class Vigil:
+    """Follows the tracking error tick by tick, where a fault waits for it."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._errors = np.full(world.ticks, np.nan)
+        self._seen = 0
+
+    @property
+    def errors(self) -> Array:
+        """Of the ticks seen so far, shape (T,), in square metres."""
+        return self._errors[: self._seen]
+
+    def see(self, tick: int, position: Array, timeline: Timeline) -> None:
+        """Take in a tick, if anything waits for it."""
+        if timeline.pending:
+            self._errors[tick] = tracking_error(position, self._world.target(tick), ~timeline.at(tick).absent)
+            self._seen = tick + 1
+
+
 class History:
     """The moments of a run, gathered; arrays begin with the ticks."""
 
@@ -222,12 +242,3 @@ def digest(arrays: Arrays) -> str:
         total.update(f"{name}{array.dtype.str}{array.shape}".encode())
         total.update(np.ascontiguousarray(array).tobytes())
     return total.hexdigest()
-
-
-def bites(timeline: Timeline, fates: Fates) -> list[int]:
-    """How many messages each fault held in the ticks flown, from verdicts (ticks, C, L): 0 means that it proved nothing."""
-    counted = []
-    for number, fault in enumerate(timeline.faults):
-        verdicts = fates[fault.start : fault.end][:, :, timeline.held(number)]
-        counted.append(int((verdicts == FATE_OF[fault.verb]).sum()))
-    return counted

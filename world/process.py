@@ -9,17 +9,19 @@ import numpy as np
 import zenoh
 
 from netem import wire
+from netem.fault import Fault
 from netem.keys import Keys
 from netem.plain import from_plain
 from netem.sequence import Numbering, Sequences
 from netem.session import WORLD, await_subscribers, client
 from netem.supervised import Supervisor, patience
-from netem.timeline import Fault, Timeline
+from netem.timeline import Conditions, Timeline
 from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
-from world.history import History, Moment, gather
+from world.history import History, Moment, Vigil, gather
 from world.logbook import Logbook
+from world.world import Scene
 
 
 class Theatre:
@@ -29,7 +31,7 @@ class Theatre:
         self._brief = brief
         self._world = brief.world
         self._supervisor = supervisor
-        self._timeline = Timeline(brief.world.links, brief.faults)
+        self._timeline = self._scripted = Timeline(brief.world.links, brief.faults, brief.triggers)
         keys = Keys(brief.run)
         self._acting = {keys.act(agent): agent for agent in range(1, brief.world.links.agents + 1)}
         self._acts = session.declare_subscriber(keys.act("*"), zenoh.handlers.FifoChannel(4096))
@@ -43,6 +45,7 @@ class Theatre:
         self._batch = brief.books.batch
         self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
         self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
+        self._vigil = Vigil(brief.world)
         self.uninstructed = 0
         self.history = History(brief.world, len(brief.channels))
 
@@ -52,37 +55,52 @@ class Theatre:
 
     def run(self, logbook: Logbook) -> None:
         """Fly all ticks, and write them down."""
-        position = self._world.start()
+        scene = self._world.start()
         for tick in range(self._world.ticks):
-            self._kill_and_restart(tick)
-            self._publish(tick, position)
+            fired = self._fire(tick)
+            self._move_processes(tick)
+            measured = self._world.measure(tick, scene, self._timeline.at(tick))
+            self._publish(tick, measured, scene, fired)
             if tick % self._batch == 0:  # while the agents work on this tick
-                self._write_down(tick, position, logbook)
+                self._write_down(tick, scene, logbook)
             with patience(self._brief.patience_s, partial(self._missing, tick)):
                 journal = self._read_journal(tick)
                 acts = self._read_acts(tick)
             self._hear_of_faults(journal)
-            moment = self._moment(position, journal, acts)
+            now = self._timeline.at(tick)
+            moment = self._moment(scene, journal, acts, now)
             self._moments.append(moment)
-            position = self._world.step(tick, position, moment.velocity, self._timeline.at(tick).absent)
-        self._write_down(self._world.ticks, position, logbook)
-        self._sense.put(wire.pack(wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [])))
+            self._vigil.see(tick, scene.position, self._timeline)
+            scene = self._world.step(tick, scene, measured, moment.velocity, now)
+        self._write_down(self._world.ticks, scene, logbook)
+        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], [])
+        self._sense.put(wire.pack(end))
 
-    def _kill_and_restart(self, tick: int) -> None:
+    def _fire(self, tick: int) -> list[int]:
+        fired = self._timeline.due(self._vigil.errors)
+        if fired:
+            self._scripted, self._timeline = (each.fired(fired, tick) for each in (self._scripted, self._timeline))
+            self._supervisor.tell("fired", triggers=fired, k=tick)
+        return fired
+
+    def _move_processes(self, tick: int) -> None:
+        timeline = self._timeline
         for event, agents in (
-            ("kill", self._timeline.killed(tick)),
-            ("restart", self._timeline.restarted(tick)),
+            ("kill", timeline.killed(tick)),
+            ("restart", timeline.restarted(tick)),
+            ("pause", timeline.paused(tick)),
+            ("resume", timeline.resumed(tick)),
         ):
             if agents:
-                self._supervisor.tell(event, agents=agents, k=tick)
+                self._supervisor.tell(event, agents=agents, remembering=timeline.remembering(tick), k=tick)
                 self._supervisor.await_order(event)
         for agent in self._timeline.restarted(tick):
             self._streams.restart(f"{agent} act")
             self._heard[agent] = 0
 
-    def _publish(self, tick: int, position: Array) -> None:
-        measured = self._world.measure(tick, position)
-        self._sense.put(wire.pack(wire.Sense(tick, WORLD, self._numbers.next("sense"), False, measured, position)))
+    def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
+        sense = wire.Sense(tick, WORLD, self._numbers.next("sense"), False, measured, scene.position, fired)
+        self._sense.put(wire.pack(sense))
 
     def _read_journal(self, tick: int) -> wire.Journal:
         journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
@@ -93,10 +111,10 @@ class Theatre:
     def _hear_of_faults(self, journal: wire.Journal) -> None:
         if journal.injected is not None:
             injected = [from_plain(Fault, fault) for fault in journal.injected]
-            self._timeline = Timeline(self._world.links, [*self._brief.faults, *injected])
+            self._timeline = self._scripted.facing(injected)
 
     def _read_acts(self, tick: int) -> dict[int, wire.Act]:
-        self._awaited = set((np.flatnonzero(~self._timeline.at(tick).dead) + 1).tolist())
+        self._awaited = set((np.flatnonzero(~self._timeline.at(tick).idle) + 1).tolist())
         acts = {}
         while self._awaited:
             sample = self._acts.recv()
@@ -113,12 +131,12 @@ class Theatre:
             return f"agents {sorted(self._awaited)} to act in tick {tick}"
         return f"the medium's journal of tick {tick}"
 
-    def _moment(self, position: Array, journal: wire.Journal, acts: dict[int, wire.Act]) -> Moment:
+    def _moment(self, scene: Scene, journal: wire.Journal, acts: dict[int, wire.Act], now: Conditions) -> Moment:
         self._account(journal, acts)
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
         return Moment(
-            position=position,
-            velocity=np.array([act.velocity for act in everybody]),
+            position=scene.position,
+            velocity=self._world.flown(scene, np.array([act.velocity for act in everybody]), now),
             estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
             known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
             psi=[act.psi for act in everybody],
@@ -131,12 +149,12 @@ class Theatre:
             injected=journal.injected,
         )
 
-    def _write_down(self, tick: int, next_position: Array, logbook: Logbook) -> None:
+    def _write_down(self, tick: int, scene: Scene, logbook: Logbook) -> None:
         if not self._moments:
             return
         moments = gather(self._world, self._timeline, tick - len(self._moments), self._moments)
         self._moments = []
-        self.history.extend(moments, next_position)
+        self.history.extend(moments, scene.position)
         logbook.write(moments, self._timeline)
         self._supervisor.tell("tick", k=tick, error=float(moments.error[-1]))
 

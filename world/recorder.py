@@ -22,16 +22,19 @@ from world.realised import Realised
 
 _TIMELINE = "sim_time"
 
-_LEADER, _FOLLOWER, _DEAD, _DEPARTED = 0xF2B705FF, 0x3FA7F5FF, 0x7A1F1FFF, 0x6E6E6EFF
+_LEADER, _FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
+_DEAD, _PAUSED, _DEPARTED, _VANISHED = 0x7A1F1FFF, 0xB388FFFF, 0x6E6E6EFF, 0x00000000
 _LINK_COLOURS = {
     Fate.SILENT: 0x00000000,
     Fate.DELIVERED: 0x3DDC84FF,
     Fate.DELAYED: 0x9AD0FFFF,
     Fate.DEAD: 0x7A1F1FFF,
+    Fate.PAUSED: 0xB388FFFF,
     Fate.DEPARTED: 0x6E6E6EFF,
     Fate.CUT: 0xFF3B30FF,
     Fate.PARTITION: 0xC86BFFFF,
     Fate.SCRIPTED: 0xFF6B6BFF,
+    Fate.DROPOUT: 0xFF80ABFF,
     Fate.CLOSED: 0x4A4A4AFF,
     Fate.RANGE: 0x8D6E63FF,
     Fate.JAMMED: 0xFFEB3BFF,
@@ -181,7 +184,8 @@ class Recorder:
 
     def _agent_colours(self, now: Conditions) -> NDArray[np.uint32]:
         flying = np.where(self._formation.is_leader, _LEADER, _FOLLOWER)
-        return np.where(now.dead, _DEAD, np.where(now.departed, _DEPARTED, flying)).astype(np.uint32)
+        states = [now.vanished, now.dead, now.departed, now.paused]
+        return np.select(states, [_VANISHED, _DEAD, _DEPARTED, _PAUSED], flying).astype(np.uint32)
 
     def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
         position, target = _spatial(flown), _spatial(wanted)

@@ -82,10 +82,29 @@ def stabilises(formation: Formation, up: NDArray[np.bool_]) -> NDArray[np.bool_]
     return answers[place].reshape(up.shape[:-1])
 
 
+def survives(formation: Formation, *, edge: tuple[int, int] | None = None, agent: int | None = None) -> bool:
+    """Whether the framework still has a stabilising stress, and leaders that span, once an edge or an agent is lost."""
+    edges = tuple(each for each in formation.edges if each != edge and agent not in each)
+    if agent is None:
+        return _rigid(replace(formation, edges=edges))
+    left = [other for other in range(1, formation.agents + 1) if other != agent]
+    number = {other: place for place, other in enumerate(left, start=1)}
+    leaders = tuple(number[leader] for leader in formation.leaders if leader != agent)
+    among = formation.nominal[[leader - 1 for leader in formation.leaders if leader != agent]]
+    spans = len(among) and np.linalg.matrix_rank(among - among.mean(axis=0)) == formation.dimension
+    renamed = tuple((number[i], number[j]) for i, j in edges)
+    nominal = formation.nominal[np.array(left) - 1]
+    return bool(spans) and _rigid(Formation(nominal, renamed, leaders))
+
+
 def _carries_stress(formation: Formation, up: NDArray[np.bool_]) -> bool:
     edges = tuple(edge for edge, works in zip(formation.edges, up.tolist(), strict=True) if works)
+    return _rigid(replace(formation, edges=edges))
+
+
+def _rigid(formation: Formation) -> bool:
     try:
-        solve(replace(formation, edges=edges))
+        solve(formation)
     except NotRigid:
         return False
     return True

@@ -4,21 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
-from netem.draws import Purpose, Tape
-from netem.links import Links
+from netem.draws import Purpose, Tape, uniform
+from netem.links import Links, Mask
+from netem.timeline import Conditions
 from world import dynamics, sensors
 from world.formation import Array, Formation
 from world.noise import normal
 
 
+class Scene(NamedTuple):
+    """What the world remembers from tick to tick.
+
+    Parameters
+    ----------
+    position
+        Of the agents, shape (N, D), in metres.
+    velocity
+        The inputs they flew in the tick before, shape (N, D), in metres per second.
+    measured
+        What was measured in the tick before, shape (L, D), in metres.
+    """
+
+    position: Array
+    velocity: Array
+    measured: Array
+
+
 @dataclass(frozen=True)
 class World:
-    """The physics of a run. Positions are state, and are handed in: shape (N, D), in metres.
+    """The physics of a run. The scene is state, and is handed in.
 
     Parameters
     ----------
@@ -48,40 +68,48 @@ class World:
     disturbance: float
     spread: float
 
-    def start(self) -> Array:
-        """Positions in tick 0: leaders on their targets, followers scattered about theirs."""
+    def start(self) -> Scene:
+        """The scene in tick 0: leaders on their targets, followers scattered about theirs, everybody at rest."""
         agents = np.arange(1, self.formation.agents + 1)
         offset = normal(self.seed, Purpose.INITIAL_POSITION, src=agents, axes=self.formation.dimension)
-        return self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, self.spread * offset)
+        position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, self.spread * offset)
+        return Scene(position, np.zeros_like(position), sensors.relative(position, self.links))
 
     def target(self, tick: int | NDArray[np.int64]) -> Array:
         """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
-        return self.manoeuvre.target(tick, self.formation.nominal)
+        return self.manoeuvre.target(np.asarray(tick)[..., None], self.formation.nominal)
 
-    def measure(self, tick: int, position: Array) -> Array:
-        """y_ij of every directed link, shape (L, D)."""
-        return sensors.relative(position, self.links) + self._sensor_noise.at(tick)
+    def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
+        """y_ij of every directed link, shape (L, D), in metres."""
+        measured = sensors.relative(scene.position, self.links) + self._sensor_noise.at(tick)
+        if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
+            return measured
+        size = self._normal(Purpose.OUTLIER_SIZE, tick)
+        return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
 
-    def step(self, tick: int, position: Array, velocity: Array, absent: NDArray[np.bool_]) -> Array:
-        """Positions in the next tick; the body of an agent that is absent holds still."""
-        moved = dynamics.single_integrator(position, velocity, self.dt, self._disturbances.at(tick))
-        return np.where(absent[:, None], position, moved)
+    def outliers(self, tick: int, now: Conditions) -> Mask:
+        """Which measurements of a tick are outliers, shape (L,)."""
+        links = self.links
+        draw = uniform(self.seed, Purpose.OUTLIER, tick=tick, src=links.src, dst=links.dst)[..., 0]
+        return sensors.stray(draw, now)
+
+    def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
+        """The inputs that the bodies fly when their agents command these, shape (N, D), in metres per second."""
+        return dynamics.flown(commanded, scene.velocity, now)
+
+    def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
+        """The scene of the next tick, after what was measured and flown in this one."""
+        moved = dynamics.single_integrator(scene.position, flown + now.push, self.dt, self._disturbances.at(tick))
+        return Scene(np.where(now.still[:, None], scene.position, moved), flown, measured)
 
     @cached_property
     def _sensor_noise(self) -> Tape:
-        return Tape(
-            lambda ticks: sensors.noise(
-                normal(
-                    self.seed,
-                    Purpose.SENSOR_NOISE,
-                    tick=ticks[:, None],
-                    src=self.links.src,
-                    dst=self.links.dst,
-                    axes=self.formation.dimension,
-                ),
-                self.covariance,
-            )
-        )
+        return Tape(lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.covariance))
+
+    def _normal(self, purpose: Purpose, tick: int | NDArray[np.int64]) -> Array:
+        """Standard normal draws for every measurement of a tick, shape (..., L, D)."""
+        links, axes = self.links, self.formation.dimension
+        return normal(self.seed, purpose, tick=tick, src=links.src, dst=links.dst, axes=axes)
 
     @cached_property
     def _disturbances(self) -> Tape:

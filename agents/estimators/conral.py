@@ -16,7 +16,8 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
-from agents.estimators.ral import THETA, Perceived, RelativeAffineLocalization, complete
+from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
+from netem.channels import THETA
 
 
 class Agreement(NamedTuple):

@@ -11,8 +11,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
-
-THETA = "theta"
+from netem.channels import THETA
 
 
 class Perceived(NamedTuple):

@@ -1,0 +1,106 @@
+"""What each fault of a run took hold of: a fault that touched nothing has proved nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from affinet.plan import Plan
+from netem import lie
+from netem.fate import FATE_OF, Fate
+from netem.fault import Fault, Verb
+from netem.links import Mask
+from netem.timeline import Timeline
+from world.history import Arrays
+
+
+@dataclass(frozen=True)
+class Bite:
+    """What a fault took hold of.
+
+    Parameters
+    ----------
+    fault
+        As it was placed in the run.
+    at
+        When it began, in seconds; None if what it waited for never came.
+    touched, what
+        How many, of what: messages, measurements, or ticks of agents.
+    """
+
+    fault: Fault
+    at: float | None
+    touched: int
+    what: str
+
+    def __str__(self) -> str:
+        when = "never" if self.at is None else f"{self.at:g} s"
+        return f"{when}: {self.fault.describe()} touched {self.touched} {self.what}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"fault": self.fault.describe(), "at": self.at, "touched": self.touched, "what": self.what}
+
+
+def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
+    """What every fault took hold of in the ticks flown; those that lie beyond the end of the run are left out.
+
+    Parameters
+    ----------
+    plan
+        What was flown.
+    timeline
+        Its faults, where they came to lie.
+    arrays
+        What happened.
+    """
+    ticks = len(arrays["error"])
+    return [
+        Bite(fault, _at(fault, plan.world.dt), *_touched(plan, timeline, number, arrays))
+        for number, fault in enumerate(timeline.faults)
+        if fault.trigger is not None or fault.start < ticks
+    ]
+
+
+def _at(fault: Fault, dt: float) -> float | None:
+    return None if fault.trigger is not None else fault.start * dt
+
+
+def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tuple[int, str]:
+    fault = timeline.faults[number]
+    if fault.trigger is not None:
+        return 0, "messages: its condition never came"
+    span = range(fault.start, min(len(arrays["error"]), len(arrays["error"]) if fault.end is None else fault.end))
+    fates = arrays["fates"][span.start : span.stop]
+    held = timeline.held(number)
+    match fault.verb:
+        case Verb.GUST:
+            return _agent_ticks(span, fault, lambda tick: ~timeline.at(tick).still), "ticks of agents"
+        case Verb.CLOCK:
+            wrong = lambda tick: plan.told_mission & ~timeline.at(tick).idle & (timeline.clock(tick) != tick)  # noqa: E731
+            return _agent_ticks(span, fault, wrong), "ticks of agents that fly by the clock"
+        case Verb.BIAS | Verb.FREEZE:
+            return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
+        case Verb.OUTLIER:
+            struck = [plan.world.outliers(tick, timeline.at(tick)) & held for tick in span]
+            return int((np.array(struck, dtype=bool) & (fates[:, 0] == Fate.DELIVERED)).sum()), "measurements"
+        case Verb.LIE:
+            return _told(plan, fault, fates), "messages"
+        case Verb.DEGRADE:
+            return int((fates[:, :, held] > Fate.DELIVERED).sum()), "messages"
+    return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
+
+
+def _agent_ticks(span: range, fault: Fault, which: Any) -> int:
+    agents = np.array(fault.agents) - 1
+    return sum(int(which(tick)[agents].sum()) for tick in span)
+
+
+def _told(plan: Plan, fault: Fault, fates: Any) -> int:
+    if lie.CHANNEL not in plan.channels:
+        return 0
+    said: Mask = np.isin(plan.world.links.src, fault.agents)
+    told = fates[:, plan.channels.index(lie.CHANNEL), said]
+    return int(((told == Fate.DELIVERED) | (told == Fate.DELAYED)).sum())

@@ -1,0 +1,19 @@
+"""What an agent says of its perceived shape, and what a liar says in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from netem.channels import THETA
+from netem.fault import Fault
+
+CHANNEL = THETA
+
+
+def told(fields: Mapping[str, Any], liar: Fault) -> dict[str, Any]:
+    """The fields (..., D, D) of maps that a liar tells, each multiplied by its matrix; other fields as they are."""
+    matrix = np.array(liar.matrix)
+    return {name: matrix @ field if field.shape[-2:] == matrix.shape else field for name, field in fields.items()}
