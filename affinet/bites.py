@@ -45,7 +45,7 @@ class Bite:
 
 
 def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
-    """What every fault took hold of in the ticks flown; those that lie beyond the end of the run are left out.
+    """What every fault took hold of in the ticks flown.
 
     Parameters
     ----------
@@ -56,11 +56,9 @@ def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
     arrays
         What happened.
     """
-    ticks = len(arrays["error"])
     return [
         Bite(fault, _at(fault, plan.world.dt), *_touched(plan, timeline, number, arrays))
         for number, fault in enumerate(timeline.faults)
-        if fault.trigger is not None or fault.start < ticks
     ]
 
 
@@ -72,8 +70,9 @@ def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tup
     fault = timeline.faults[number]
     if fault.trigger is not None:
         return 0, "messages: its condition never came"
-    span = range(fault.start, min(len(arrays["error"]), len(arrays["error"]) if fault.end is None else fault.end))
-    fates = arrays["fates"][span.start : span.stop]
+    ticks = len(arrays["error"])
+    span = range(fault.start, ticks if fault.end is None else min(ticks, fault.end))
+    fates = arrays["fates"][fault.start : fault.end]
     held = timeline.held(number)
     match fault.verb:
         case Verb.GUST:
@@ -84,8 +83,12 @@ def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tup
         case Verb.BIAS | Verb.FREEZE:
             return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
         case Verb.OUTLIER:
-            struck = [plan.world.outliers(tick, timeline.at(tick)) & held for tick in span]
-            return int((np.array(struck, dtype=bool) & (fates[:, 0] == Fate.DELIVERED)).sum()), "measurements"
+            seen = fates[:, 0] == Fate.DELIVERED
+            hits = [
+                plan.world.outliers(tick, timeline.at(tick)) & held & here
+                for tick, here in zip(span, seen, strict=True)
+            ]
+            return int(np.sum(hits)), "measurements"
         case Verb.LIE:
             return _told(plan, fault, fates), "messages"
         case Verb.DEGRADE:

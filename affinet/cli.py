@@ -7,22 +7,30 @@ from __future__ import annotations
 
 import argparse
 import json
+import operator
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import reduce
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from affinet import compare, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
+from affinet.evidence import Evidence
 from affinet.inject import Access, NotFlying, Wish
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, fly
 from affinet.sections import ScenarioError
 from world import history
+
+if TYPE_CHECKING:
+    from affinet.checkers import Checker
+    from affinet.hunt import Quarry
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -69,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
         command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+    _add_hunt(commands)
     run.set_defaults(command=_run)
     check.set_defaults(command=_check)
     replay.set_defaults(command=_replay)
@@ -112,6 +121,32 @@ def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     verbs.add_parser("heal", help="end what was injected; what the scenario scripts stays")
     verbs.add_parser("show", help="what is imposed now")
     inject.set_defaults(command=_inject)
+
+
+def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    hunt = commands.add_parser(
+        "hunt",
+        help="look for the smallest fault that breaks an invariant",
+        description="Draw schedules of faults, fly them in process, and shrink the first that breaks an invariant; "
+        "the smallest is written as a scenario and confirmed over processes. Exit status 1 when one was found.",
+    )
+    hunt.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(scenario.shipped())}")
+    _add_overrides(hunt)
+    hunt.add_argument(
+        "--invariant",
+        required=True,
+        action="append",
+        metavar="CHECKER",
+        help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'",
+    )
+    hunt.add_argument("--budget", type=int, default=100, metavar="N", help="schedules to draw (default: %(default)s)")
+    hunt.add_argument(
+        "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
+    )
+    hunt.add_argument(
+        "--out", type=Path, metavar="FILE", help="the smallest, as a scenario (default: hunted-SCENARIO.toml)"
+    )
+    hunt.set_defaults(command=_hunt)
 
 
 def _groups(text: str) -> tuple[tuple[int, ...], ...]:
@@ -181,6 +216,41 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
             return FAIL
     print(f"twice in process and once over processes: {len(flown[0]['error'])} ticks, the same bits")  # noqa: T201
     return PASS
+
+
+def _hunt(parsed: argparse.Namespace) -> int:
+    from affinet import hunt, invariants  # hypothesis takes a while to import
+    from affinet.testing import strategies
+
+    given = scenario.load(parsed.scenario, _overrides(parsed))
+    invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
+    verbs = parsed.verbs or list(strategies.VERBS)
+    if strangers := sorted(set(verbs) - set(strategies.VERBS)):
+        raise ScenarioError(f"--verbs {','.join(strangers)}: there are {', '.join(strategies.VERBS)}")
+    with show.Chase(parsed.budget) as chase:
+        quarry, coverage = hunt.hunt(
+            given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
+        )
+    if quarry is None:
+        show.hunted(None, coverage)
+        return PASS
+    file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
+    file.write_text(scenario.to_toml(quarry.scenario))
+    show.hunted(quarry, coverage)
+    return _confirm(quarry, invariant, file)
+
+
+def _confirm(quarry: Quarry, invariant: Checker, file: Path) -> int:
+    plan = planning.make(scenario.load(str(file)))
+    out = Path("runs") / f"{file.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    with show.Progress(plan, file.stem, out) as watch:
+        flown = fly(plan, "processes", out, watch.see)
+    same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
+    found = (
+        invariant(Evidence(plan, history.load(out / history.FILE), flown)) if flown.digest else "; ".join(flown.reasons)
+    )
+    print(f"over processes, {same}: {found}\n{file}: affinet run {file}")  # noqa: T201
+    return FAIL
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:

@@ -152,6 +152,7 @@ class Swarm:
             velocity=self._plan.world.flown(scene, np.where(awake[:, None], action.velocity, 0.0), now),
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,
+            covariance=np.where(real[..., None], estimate.spread, 0.0),
             psi=np.where(awake, estimate.psi, np.nan),
             fates=verdicts.fate,
             odd=out_of_the_ordinary(tick, verdicts),

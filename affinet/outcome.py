@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,7 +21,10 @@ Verdict = Literal["pass", "fail", "vacuous"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds."""
+    """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds.
+
+    `timeline` has its faults where they came to lie, `faults` what each took hold of.
+    """
 
     verdict: Verdict
     reasons: tuple[str, ...]
@@ -32,13 +35,13 @@ class Outcome:
     tracking_error: dict[str, float | None]
     messages: dict[str, Any]
     faults: tuple[Bite, ...]
+    timeline: Timeline
     processes: tuple[dict[str, Any], ...]
     out: str
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; a figure that does not exist is null."""
-        plain = asdict(replace(self, faults=()))
-        plain.pop("simulated_s")
+        plain = {name: value for name, value in vars(self).items() if name not in ("simulated_s", "timeline")}
         plain["faults"] = [bite.to_json() for bite in self.faults]
         plain["wall_s"] = round(self.wall_s, 3)
         plain["ticks_per_s"] = round(self.ticks_per_s, 1)
@@ -110,6 +113,7 @@ def judge(
         tracking_error=_tracking(arrays),
         messages=messages,
         faults=tuple(faults),
+        timeline=timeline,
         processes=tuple(processes),
         out=str(out),
     )
@@ -154,6 +158,8 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
     wrong = []
     if arrays is None or not np.isfinite(arrays["position"]).all():
         wrong.append("the swarm diverged: a position is not a number any more")
+    elif not np.isfinite(arrays["estimate"][arrays["known"]]).all():
+        wrong.append("an estimate is not a number any more")
     if messages["uninstructed"]:
         wrong.append(f"{messages['uninstructed']} messages were lost that nobody ordered")
     booked = messages["delivered"] + sum(messages["dropped"].values()) + (messages["in_flight"] or 0)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from affinet import outcome
+from affinet.evidence import Evidence
 from affinet.inprocess import Swarm
 from affinet.launcher import Launcher
 from affinet.outcome import Outcome
@@ -45,6 +46,26 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     done = (_over_processes if runtime == "processes" else _in_process)(plan, out, watch, viewer)
     done.save()
     return done
+
+
+def rehearse(plan: Plan) -> Evidence:
+    """Run a plan in this process, and leave nothing behind."""
+    swarm = Swarm(plan)
+    started = time.perf_counter()
+    swarm.fly(lambda _: None, plan.books(None).batch)
+    arrays = swarm.history.arrays()
+    done = outcome.judge(
+        plan,
+        swarm.timeline,
+        arrays,
+        in_flight=swarm.in_flight,
+        uninstructed=0,
+        failure=None,
+        wall_s=time.perf_counter() - started,
+        processes=[],
+        out=Path(),
+    )
+    return Evidence(plan, arrays, done)
 
 
 def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import tomli_w
 from pydantic import ValidationError
 
 from affinet import events, impairments, sections
@@ -67,6 +68,33 @@ def resolved(out: Path, overrides: Sequence[str] = ()) -> Scenario:
     except (OSError, ValueError) as error:
         raise ScenarioError(f"{out}: no run directory: {error}") from error
     return _validated(raw, Source(str(file), "", tuple(overrides)))
+
+
+def extended(given: Scenario, entries: Sequence[Mapping[str, Any]]) -> Scenario:
+    """The scenario with further entries in its timeline, said as a file says them.
+
+    Raises
+    ------
+    ScenarioError
+        When something in them is wrong.
+    """
+    raw = given.model_dump(mode="json", exclude_none=True)
+    raw["timeline"] += entries
+    return _validated(raw, Source("in code", "", ()))
+
+
+def to_toml(given: Scenario) -> str:
+    """The scenario as a file says it."""
+    return tomli_w.dumps(given.model_dump(mode="json", exclude_none=True, exclude_defaults=True) | _verbs(given))
+
+
+def _verbs(given: Scenario) -> dict[str, Any]:
+    # The verb of an entry is a default of its model, and must be said all the same.
+    entries = [
+        {"verb": entry.model_dump()["verb"]} | entry.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+        for entry in given.timeline
+    ]
+    return {"timeline": entries} if entries else {}
 
 
 def _validated(raw: dict[str, Any], source: Source) -> Scenario:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich import progress as bar
 from rich.console import Console
@@ -14,6 +15,10 @@ from affinet.checks import Finding
 from affinet.outcome import Outcome
 from affinet.plan import Plan
 from netem.control import Answer
+
+if TYPE_CHECKING:
+    from affinet.hunt import Coverage, Quarry
+    from affinet.testing.strategies import Entries
 
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
@@ -51,6 +56,56 @@ class Progress:
         elapsed = now - self._first[1]
         factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
         self._bar.update(self._task, completed=tick, says=f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
+
+
+class Chase:
+    """How a hunt goes, on standard error."""
+
+    def __init__(self, budget: int) -> None:
+        self._budget = budget
+        self._broken = 0
+        self._bar = bar.Progress(
+            bar.TextColumn("{task.description}"),
+            bar.BarColumn(),
+            bar.TextColumn("{task.fields[says]}"),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task("hunting", total=budget, says="")
+
+    def __enter__(self) -> Chase:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def see(self, coverage: Coverage, broken: Entries | None) -> None:
+        """Show how far it is, and every schedule that breaks the invariant."""
+        if broken is not None:
+            self._broken += 1
+            verbs = ", ".join(entry["verb"] for entry in broken)
+            self._bar.console.print(f"breaks: {verbs}", highlight=False)
+        says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
+        self._bar.update(self._task, completed=min(coverage.schedules, self._budget), says=says)
+
+
+def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
+    """What a hunt has found, and what it tried."""
+    console = Console()
+    if quarry is None:
+        console.print("nothing found that breaks it", highlight=False)
+    else:
+        console.print(f"{quarry.finding}", markup=False, highlight=False)
+        for entry in quarry.scenario.timeline:
+            said = entry.model_dump(mode="json", exclude_none=True)
+            console.print(f"  {said.pop('verb')} {said}", markup=False, highlight=False)
+    table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
+    for counted in (coverage.verbs, coverage.selectors):
+        for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
+            table.add_row(name, str(number))
+        table.add_section()
+    console.print(table)
 
 
 def outcome(outcome: Outcome, plan: Plan) -> None:

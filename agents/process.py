@@ -135,6 +135,7 @@ class Node:
             velocity=action.velocity,
             estimate=estimate.relative[:degree],
             known=estimate.known[:degree],
+            covariance=estimate.spread[:degree],
             psi=float(estimate.psi),
             heard=self._heard,
         )

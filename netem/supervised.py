@@ -2,17 +2,20 @@
 
 Supervision does not travel the air it supervises. A child gets its brief on standard input, hears orders there, and
 reports events on standard output, one JSON map a line. Standard input is also its lifeline: when it closes, the launcher is
-gone and the child goes too, so nothing is ever orphaned.
+gone and the child goes too, so nothing is ever orphaned, be it stopped or inside a call that lasts.
 """
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import queue
 import signal
 import struct
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -26,6 +29,8 @@ T = TypeVar("T")
 
 _LENGTH = struct.Struct("<I")
 _STDIN, _STDOUT, _STDERR = 0, 1, 2
+_PR_SET_PDEATHSIG = 1
+_LAST_RESORT_S = 3.0
 
 
 class Stalled(RuntimeError):
@@ -47,6 +52,7 @@ class Supervisor:
         os.dup2(_STDERR, _STDOUT)
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
+        _go_on_without_a_launcher()
 
     def brief(self, kind: type[T]) -> T:
         """The child's brief; from then on the lifeline is watched."""
@@ -89,6 +95,9 @@ class Supervisor:
             for line in lines:
                 self._orders.put(line.decode())
         os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(_LAST_RESORT_S)
+        # A library call, like one that waits for a router that is gone, keeps the main thread from hearing a signal.
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 @contextmanager
@@ -105,6 +114,12 @@ def patience(seconds: float, missing: Callable[[], str]) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
+
+
+def _go_on_without_a_launcher() -> None:
+    # A process that the script has stopped cannot see its lifeline close; elsewhere than on Linux nothing wakes it.
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
 
 
 def _leave(signum: int, _frame: FrameType | None) -> NoReturn:

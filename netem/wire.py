@@ -104,8 +104,9 @@ class Act(NamedTuple):
     """Agent to world: its control input, and what it believes.
 
     `velocity` is the input u_i, shape (D,), in metres per second; `estimate` the relative positions it acts on, one per
-    neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape (m,); `psi` its convergence
-    indicator, NaN where undefined; `heard` how many broadcasts it has received so far.
+    neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape (m,); `covariance` the upper
+    triangles of their covariances, row by row, shape (m, D (D + 1) / 2), in square metres, 0 where not known; `psi` its
+    convergence indicator, NaN where undefined; `heard` how many broadcasts it has received so far.
     """
 
     k: int
@@ -114,6 +115,7 @@ class Act(NamedTuple):
     velocity: Array | Rows
     estimate: Array | Rows
     known: Mask | Rows
+    covariance: Array | Rows
     psi: float
     heard: int
 

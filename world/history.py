@@ -29,6 +29,7 @@ _BY_TICK = (
     "velocity",
     "estimate",
     "known",
+    "covariance",
     "psi",
     "fates",
     "newest",
@@ -48,8 +49,9 @@ class Moment(NamedTuple):
     ----------
     position, velocity
         Where the agents are, and their inputs, shape (N, D), in metres and metres per second.
-    estimate, known
-        Estimated relative positions, shape (N, n, D), in metres, and where there are any, shape (N, n).
+    estimate, known, covariance
+        Estimated relative positions, shape (N, n, D), in metres, where there are any, shape (N, n), and the upper triangles of
+        their covariances, shape (N, n, D (D + 1) / 2), in square metres.
     psi
         Convergence indicators, shape (N,), NaN where undefined.
     fates
@@ -66,6 +68,7 @@ class Moment(NamedTuple):
     velocity: Any
     estimate: Any
     known: Any
+    covariance: Any
     psi: Any
     fates: Any
     odd: Any
@@ -103,6 +106,7 @@ class Moments:
     velocity: Array
     estimate: Array
     known: Mask
+    covariance: Array
     psi: Array
     fates: Fates
     newest: NDArray[np.int32]
@@ -135,6 +139,7 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
         velocity=np.array([moment.velocity for moment in moments]),
         estimate=np.array([moment.estimate for moment in moments]),
         known=np.array([moment.known for moment in moments], dtype=bool),
+        covariance=np.array([moment.covariance for moment in moments]),
         psi=np.array([moment.psi for moment in moments]),
         fates=fates,
         newest=_newest(ticks, fates, entries, moments),
@@ -196,6 +201,7 @@ class History:
         self.velocity = np.zeros((ticks, agents, dimension))
         self.estimate = np.zeros((ticks, agents, width, dimension))
         self.known = np.zeros((ticks, agents, width), dtype=bool)
+        self.covariance = np.zeros((ticks, agents, width, dimension * (dimension + 1) // 2))
         self.psi = np.full((ticks, agents), np.nan)
         self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
         self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)

@@ -43,8 +43,10 @@ class Theatre:
         self._awaited: set[int] = set()
         self._moments: list[Moment] = []
         self._batch = brief.books.batch
-        self._unknown = [[0.0] * brief.world.formation.dimension] * brief.world.links.slots.shape[1]
-        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], np.nan, 0)
+        dimension = brief.world.formation.dimension
+        self._unknown = [[0.0] * dimension] * brief.world.links.slots.shape[1]
+        self._unsure = [[0.0] * (dimension * (dimension + 1) // 2)] * brief.world.links.slots.shape[1]
+        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, 0)
         self._vigil = Vigil(brief.world)
         self.uninstructed = 0
         self.history = History(brief.world, len(brief.channels))
@@ -139,6 +141,7 @@ class Theatre:
             velocity=self._world.flown(scene, np.array([act.velocity for act in everybody]), now),
             estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
             known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
+            covariance=[act.covariance + self._unsure[len(act.covariance) :] for act in everybody],
             psi=[act.psi for act in everybody],
             fates=journal.fates,
             odd=journal.odd,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,15 +52,25 @@ def solve(formation: Formation) -> Array:
     NotRigid
         When no stress is positive semidefinite of rank N - D - 1: the framework is not universally rigid (theorem 3.2).
     """
+    weights, why = _solved(formation.nominal.tobytes(), formation.nominal.shape, formation.edges)
+    if weights is None:
+        raise NotRigid(why)
+    return weights.copy()
+
+
+@cache
+def _solved(nominal: bytes, shape: tuple[int, int], edges: Edges) -> tuple[Array | None, str]:
+    """The weights, or why there are none; a framework is solved once, however often it is planned."""
     import cvxpy as cp  # takes seconds to import, and only planning needs it
 
+    formation = Formation(np.frombuffer(nominal).reshape(shape), edges, ())
     basis = equilibrium(formation)
     affine = np.column_stack([formation.nominal, np.ones(formation.agents)])
     if np.linalg.matrix_rank(affine) <= formation.dimension:
-        raise NotRigid(f"the nodes do not span {formation.dimension} dimensions: they lie on a line or plane")
+        return None, f"the nodes do not span {formation.dimension} dimensions: they lie on a line or plane"
     Q = null_space(affine.T).T
     if not basis.shape[1] or not len(Q):
-        raise NotRigid("no stress but zero balances the framework")
+        return None, "no stress but zero balances the framework"
     B = incidence(formation.agents, formation.edges)
     coordinates, least = cp.Variable(basis.shape[1]), cp.Variable()
     reduced = Q @ B @ cp.diag(basis @ coordinates) @ B.T @ Q.T
@@ -67,12 +78,12 @@ def solve(formation: Formation) -> Array:
     problem = cp.Problem(cp.Maximize(least), [reduced >> least * np.eye(len(Q)), cp.norm(coordinates, 2) <= 1.0])
     problem.solve(solver=cp.CLARABEL)
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE) or least.value < _RIGID:
-        raise NotRigid(
+        return None, (
             "the framework is not universally rigid: no stress is positive semidefinite of rank "
             f"N - D - 1 = {len(Q)} (solver: {problem.status}, smallest eigenvalue {least.value})"
         )
     weights: Array = basis @ coordinates.value
-    return weights
+    return weights, ""
 
 
 def stabilises(formation: Formation, up: NDArray[np.bool_]) -> NDArray[np.bool_]:

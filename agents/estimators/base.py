@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from agents.brief import Array, Brief, Mask
+from agents.estimators.small import triangle
 
 State = TypeVar("State")
 Fields = Mapping[str, Any]
@@ -65,6 +66,11 @@ class Estimate(NamedTuple):
     covariance: Array
     psi: Array
     relative_velocity: Array | None = None
+
+    @property
+    def spread(self) -> Array:
+        """Upper triangles of the covariances, row by row, shape (..., n, D (D + 1) / 2); 0 where not known."""
+        return np.where(self.known[..., None], triangle(self.covariance), 0.0)
 
 
 class Estimator(Protocol[State]):

@@ -27,3 +27,10 @@ def inverse(matrix: Array) -> Array:
     adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
     inverted: Array = adjugate / determinant(matrix)[..., None, None]
     return inverted
+
+
+def triangle(matrix: Array) -> Array:
+    """The upper triangles of matrices (..., D, D), row by row, shape (..., D (D + 1) / 2)."""
+    rows, columns = np.triu_indices(matrix.shape[-1])
+    upper: Array = matrix[..., rows, columns]
+    return upper

@@ -1,0 +1,324 @@
+"""Checkers: what should hold of a run, each with a verdict and the first tick that offends.
+
+A checker is a pure function of the evidence. It passes, fails, or is vacuous when the run never put it to the test, and
+checkers compose: `both & of_these`, `either | of_these`, `~refuted`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from affinet.evidence import Evidence
+from analysis import consistency
+from netem.fault import Verb
+from netem.links import Integers, Mask
+from world import sensors
+from world.formation import Array
+
+Verdict = Literal["pass", "fail", "vacuous"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a checker found.
+
+    Parameters
+    ----------
+    checker
+        Its name, with its parameters.
+    verdict
+        Pass, fail or vacuous.
+    tick
+        The first tick that offends, when it fails.
+    says
+        Why, for people.
+    """
+
+    checker: str
+    verdict: Verdict
+    tick: int | None
+    says: str
+
+    def __str__(self) -> str:
+        return f"{self.checker}: {self.verdict}: {self.says}"
+
+
+@dataclass(frozen=True)
+class Checker:
+    """What should hold of a run.
+
+    Parameters
+    ----------
+    name
+        With its parameters, as one writes it.
+    check
+        Finds out.
+    """
+
+    name: str
+    check: Callable[[Evidence], Finding]
+
+    def __call__(self, evidence: Evidence) -> Finding:
+        """What it finds in a run."""
+        return self.check(evidence)
+
+    def __and__(self, other: Checker) -> Checker:
+        """Both hold: the first failure counts, else what is vacuous."""
+        return _joined("&", self, other, worst=("fail", "vacuous", "pass"))
+
+    def __or__(self, other: Checker) -> Checker:
+        """Either holds."""
+        return _joined("|", self, other, worst=("pass", "vacuous", "fail"))
+
+    def __invert__(self) -> Checker:
+        """It does not hold."""
+        name = f"~{self.name}"
+
+        def check(evidence: Evidence) -> Finding:
+            found = self(evidence)
+            turned: dict[Verdict, Verdict] = {"pass": "fail", "fail": "pass", "vacuous": "vacuous"}
+            verdict = turned[found.verdict]
+            return Finding(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
+
+        return Checker(name, check)
+
+
+Signal = Callable[[Evidence], Mask]
+
+
+def error_below(level: float) -> Signal:
+    """Whether the tracking error is below a level, in square metres, in each tick."""
+    return lambda evidence: evidence.error < level
+
+
+def always(signal: Signal, *, since: float = 0.0, until: float | None = None, name: str = "always") -> Checker:
+    """A signal (T,) holds in every tick from `since` to `until`, in seconds."""
+
+    def check(evidence: Evidence) -> Finding:
+        span = _span(evidence, since, until)
+        return _every(name, evidence, span, signal(evidence)[span.start : span.stop])
+
+    return Checker(name, check)
+
+
+def eventually(signal: Signal, *, since: float = 0.0, within: float | None = None, name: str = "eventually") -> Checker:
+    """A signal (T,) holds in some tick from `since` on, `within` so many seconds."""
+
+    def check(evidence: Evidence) -> Finding:
+        span = _span(evidence, since, None if within is None else since + within)
+        holds = signal(evidence)[span.start : span.stop]
+        if not len(holds):
+            return Finding(name, "vacuous", None, "the run ended before")
+        if holds.any():
+            tick = span.start + int(np.argmax(holds))
+            return Finding(name, "pass", None, f"from tick {tick} ({tick * evidence.dt:g} s)")
+        return Finding(name, "fail", span.stop - 1, f"never, up to {(span.stop - 1) * evidence.dt:g} s")
+
+    return Checker(name, check)
+
+
+def bounded(level: float) -> Checker:
+    """The tracking error stays below a level, in square metres."""
+    return always(error_below(level), name=f"bounded({level:g})")
+
+
+def converged(level: float, by: float) -> Checker:
+    """From a time on, in seconds, the tracking error stays below a level, in square metres."""
+    return always(error_below(level), since=by, name=f"converged({level:g}, by={by:g})")
+
+
+def recovers(level: float, within: float) -> Checker:
+    """After each fault that ends, the tracking error falls below a level (m2) within so many seconds.
+
+    A fault after which another begins before that is not looked at. Vacuous where no fault ends early enough to tell, or none
+    ever lifted the error above the level.
+    """
+    name = f"recovers({level:g}, within={within:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        faults = [bite.fault for bite in evidence.bites if bite.at is not None]
+        spent = 0
+        for fault in sorted(faults, key=lambda fault: fault.end or evidence.ticks):
+            if fault.end is None or fault.end >= evidence.ticks:
+                continue
+            deadline = fault.end + evidence.tick(within)
+            if any(fault.end < other.start <= deadline for other in faults) or deadline >= evidence.ticks:
+                continue
+            if (evidence.error[fault.start : deadline + 1] < level).all():
+                continue
+            spent += 1
+            if not (evidence.error[fault.end : deadline + 1] < level).any():
+                says = f"{evidence.error[deadline]:.4g} m² still, {within:g} s after the end of '{fault.describe()}'"
+                return Finding(name, "fail", deadline, says)
+        if not spent:
+            return Finding(name, "vacuous", None, f"no fault that ended had lifted the error above {level:g} m²")
+        return Finding(name, "pass", None, f"after {spent} faults")
+
+    return Checker(name, check)
+
+
+def never_heard_across_a_cut() -> Checker:
+    """While a cut or partition holds, nothing that was said under it arrives over its links."""
+    name = "never_heard_across_a_cut()"
+
+    def check(evidence: Evidence) -> Finding:
+        newest, links, cuts = evidence.arrays["newest"], evidence.plan.world.links, 0
+        for number, fault in enumerate(evidence.timeline.faults):
+            if fault.verb not in (Verb.CUT, Verb.PARTITION) or fault.trigger is not None:
+                continue
+            held = evidence.timeline.held(number)
+            under = newest[fault.start : fault.end][:, :, held]
+            cuts += under.size
+            heard = np.argwhere(under >= fault.start)
+            if len(heard):
+                tick, channel, place = heard[0].tolist()
+                row = int(np.flatnonzero(held)[place])
+                who = f"{links.dst[row]} heard {links.src[row]} on {evidence.plan.channels[channel]}"
+                return Finding(name, "fail", fault.start + tick, f"{who} across '{fault.describe()}'")
+        return Finding(name, "pass" if cuts else "vacuous", None, f"{cuts} times silent" if cuts else "nothing was cut")
+
+    return Checker(name, check)
+
+
+def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
+    """The filters' covariances tell the truth: mean NEES over all edges inside its chi-square band, in most ticks.
+
+    In a share of at least `level` of the ticks from `since` on, the mean over the edges estimated lies in the two-sided band of
+    that probability. Edges of one agent count as independent, so the band is a little narrow.
+    """
+    name = f"consistent({level:g}, since={since:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        span = _span(evidence, since, None)
+        mean, number = _mean_nees(evidence, span)
+        tested = number > 0
+        if not tested.any():
+            return Finding(name, "vacuous", None, "no edge was estimated")
+        dimension = evidence.plan.world.formation.dimension
+        bands = {count: consistency.band(level, dimension, count) for count in np.unique(number[tested]).tolist()}
+        low, high = np.array([bands.get(count, (-np.inf, np.inf)) for count in number.tolist()]).T
+        inside = (mean >= low) & (mean <= high)
+        share = inside[tested].mean()
+        says = (
+            f"{share:.1%} of the ticks inside the band, mean NEES {mean[tested].mean():.3g} for {dimension} dimensions"
+        )
+        if share >= level:
+            return Finding(name, "pass", None, says)
+        return Finding(name, "fail", span.start + int(np.argmax(~inside & tested)), says)
+
+    return Checker(name, check)
+
+
+def collision_free(distance: float) -> Checker:
+    """No two bodies come closer than a distance, in metres."""
+    name = f"collision_free({distance:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        position, agents = evidence.position, evidence.plan.world.links.agents
+        one, other = np.triu_indices(agents, 1)
+        apart = np.linalg.norm(position[:, one] - position[:, other], axis=-1)
+        apart = np.where(evidence.embodied[:, one] & evidence.embodied[:, other], apart, np.inf)
+        return _every(
+            name,
+            evidence,
+            range(evidence.ticks),
+            (apart >= distance).all(axis=-1),
+            lambda tick: _closest(apart[tick], one, other),
+        )
+
+    return Checker(name, check)
+
+
+def agreement(level: float, by: float = 0.0) -> Checker:
+    """From a time on, in seconds, the maps Theta that neighbours perceive differ by an indicator psi (16) below a level.
+
+    Vacuous for estimators that perceive no map.
+    """
+    name = f"agreement({level:g}, by={by:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        psi, span = evidence.arrays["psi"], _span(evidence, by, None)
+        told = psi[span.start : span.stop]
+        if not len(told) or np.isnan(told).all():
+            return Finding(name, "vacuous", None, "nobody perceived a map and heard another")
+        agreed = np.isnan(told) | (told < level)
+        return _every(
+            name,
+            evidence,
+            span,
+            agreed.all(axis=-1),
+            lambda tick: f"psi of agent {int(np.argmin(agreed[tick - span.start])) + 1} is {np.nanmax(psi[tick]):.4g}",
+        )
+
+    return Checker(name, check)
+
+
+def energy(level: float) -> Checker:
+    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s."""
+    name = f"energy({level:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        power = np.where(evidence.present[..., None], evidence.arrays["velocity"] ** 2, 0.0).sum(axis=(1, 2))
+        spent = np.cumsum(power) * evidence.dt
+        return _every(
+            name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} m²/s are spent"
+        )
+
+    return Checker(name, check)
+
+
+def summed_up(evidence: Evidence, findings: Sequence[Finding]) -> Verdict:
+    """The verdict of a test: a failure outweighs what proved nothing, and that outweighs a pass."""
+    verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
+    ranked: tuple[Verdict, ...] = ("fail", "vacuous", "pass")
+    return next(verdict for verdict in ranked if verdict in verdicts)
+
+
+def _joined(sign: str, one: Checker, other: Checker, worst: tuple[Verdict, ...]) -> Checker:
+    name = f"({one.name} {sign} {other.name})"
+
+    def check(evidence: Evidence) -> Finding:
+        found = [one(evidence), other(evidence)]
+        chosen = min(found, key=lambda finding: (worst.index(finding.verdict), finding.tick or 0))
+        return Finding(name, chosen.verdict, chosen.tick, f"{chosen.checker}: {chosen.says}")
+
+    return Checker(name, check)
+
+
+def _span(evidence: Evidence, since: float, until: float | None) -> range:
+    stop = evidence.ticks if until is None else min(evidence.ticks, evidence.tick(until) + 1)
+    return range(evidence.tick(since), stop)
+
+
+def _every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[[int], str] | None = None) -> Finding:
+    if not len(holds):
+        return Finding(name, "vacuous", None, "the run ended before")
+    if holds.all():
+        return Finding(name, "pass", None, f"in all of {len(holds)} ticks")
+    tick = span.start + int(np.argmin(holds))
+    says = why(tick) if why else f"the tracking error is {evidence.error[tick]:.4g} m²"
+    return Finding(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {says}")
+
+
+def _closest(apart: Array, one: Integers, other: Integers) -> str:
+    pair = int(np.argmin(apart))
+    return f"agents {one[pair] + 1} and {other[pair] + 1} are {apart[pair]:.3g} m apart"
+
+
+def _mean_nees(evidence: Evidence, span: range) -> tuple[Array, Array]:
+    """Mean normalised error of the edges estimated in each tick, and how many there are, shape (T,)."""
+    links, arrays = evidence.plan.world.links, evidence.arrays
+    part = slice(span.start, span.stop)
+    known = arrays["known"][part] & (evidence.awake & evidence.present)[part, :, None]
+    true = sensors.relative(evidence.position[part], links)[:, links.slots]
+    error = np.where(known[..., None], arrays["estimate"][part] - true, 0.0)
+    dimension = error.shape[-1]
+    certain = np.eye(dimension)[np.triu_indices(dimension)]
+    covariance = np.where(known[..., None], arrays["covariance"][part], certain)
+    total = consistency.nees(error, covariance).sum(axis=(1, 2))
+    number = known.sum(axis=(1, 2))
+    return total / np.maximum(number, 1), number

@@ -1,0 +1,59 @@
+"""Checkers by the words that name them: "bounded(5) & recovers(0.1, within=5)"."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from affinet import checkers
+from affinet.checkers import Checker
+from affinet.sections import ScenarioError
+
+NAMED: dict[str, Callable[..., Checker]] = {
+    made.__name__: made
+    for made in (
+        checkers.bounded,
+        checkers.converged,
+        checkers.recovers,
+        checkers.never_heard_across_a_cut,
+        checkers.consistent,
+        checkers.collision_free,
+        checkers.agreement,
+        checkers.energy,
+    )
+}
+
+
+def parse(text: str) -> Checker:
+    """The checker that the text says.
+
+    Raises
+    ------
+    ScenarioError
+        When it says none: which words there are.
+    """
+    try:
+        return _built(ast.parse(text, mode="eval").body)
+    except (SyntaxError, TypeError, ValueError) as error:
+        known = ", ".join(f"{name}{_parameters(made)}" for name, made in NAMED.items())
+        raise ScenarioError(f"invariant {text!r}: {error}; there are {known}, and & | ~ between them") from error
+
+
+def _built(node: ast.expr) -> Checker:
+    match node:
+        case ast.BinOp(left, ast.BitAnd(), right):
+            return _built(left) & _built(right)
+        case ast.BinOp(left, ast.BitOr(), right):
+            return _built(left) | _built(right)
+        case ast.UnaryOp(ast.Invert(), operand):
+            return ~_built(operand)
+        case ast.Call(ast.Name(name), given, named) if name in NAMED:
+            numbers: list[Any] = [ast.literal_eval(value) for value in given]
+            return NAMED[name](*numbers, **{str(one.arg): ast.literal_eval(one.value) for one in named})
+    raise ValueError(f"{ast.unparse(node)} is no checker")
+
+
+def _parameters(made: Callable[..., Checker]) -> str:
+    return f"({', '.join(inspect.signature(made).parameters)})"

@@ -1,0 +1,67 @@
+"""The pytest plugin: fixture `swarm`, marks for seeds and runtime, and a report that says how to repeat a failure.
+
+What it needs is imported when a test asks for it: pytest loads this file in every environment where affinet is installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from affinet.testing.swarm import Hangar
+
+_SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
+_HANGAR: pytest.StashKey[Hangar] = pytest.StashKey()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Where the swarms of tests fly."""
+    parser.getgroup("affinet").addoption(
+        "--affinet-runtime",
+        choices=["inprocess", "processes"],
+        default="inprocess",
+        help="where the swarms of tests fly: in the test's process, or each agent as a process (default: %(default)s)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The marks."""
+    config.addinivalue_line("markers", f"{_SEEDS}(*seeds): run the test once with each of these seeds of all draws")
+    config.addinivalue_line("markers", f"{_RUNTIME}(name): fly in this runtime, whatever the command line says")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """One test for each seed asked for."""
+    mark = metafunc.definition.get_closest_marker(_SEEDS)
+    if mark and "swarm" in metafunc.fixturenames:
+        metafunc.parametrize("swarm", mark.args, indirect=True, ids=[f"seed{seed}" for seed in mark.args])
+
+
+@pytest.fixture
+def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Hangar:
+    """Builds runs: `swarm("corridor").fault("cut", links=["6-7"], at=2).fly().check(bounded(1.0))`."""
+    from affinet.testing.swarm import Hangar
+
+    mark = request.node.get_closest_marker(_RUNTIME)
+    runtime = mark.args[0] if mark else request.config.getoption("--affinet-runtime")
+    seed = getattr(request, "param", None)
+    hangar = Hangar(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"))
+    request.node.stash[_HANGAR] = hangar
+    return hangar
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keep the runs of a test that failed, and say where they are and how to fly them again."""
+    report = yield
+    hangar = item.stash.get(_HANGAR, None)
+    if report.when == "call" and report.failed and hangar is not None:
+        for plan, out in hangar.keep():
+            says = f"seed {plan.scenario.seed}, {hangar.runtime}\nrecording: {out / 'run.rrd'}\nrepeat: affinet replay {out}"
+            report.sections.append(("affinet run", f"{says} --runtime {hangar.runtime}"))
+    return report

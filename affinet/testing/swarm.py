@@ -1,0 +1,147 @@
+"""A run as a test builds it: a scenario, faults chained onto it, and what came of it to assert on."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from affinet import plan as planning
+from affinet import scenario as scenarios
+from affinet.checkers import Checker, Verdict
+from affinet.evidence import Evidence
+from affinet.outcome import Outcome
+from affinet.plan import Plan
+from affinet.run import Runtime, fly, rehearse
+from affinet.sections import Scenario
+from world import history
+
+_KEPT = 4
+
+
+class Broken(AssertionError):
+    """A run, or what was checked of it, did not come out as the test expects."""
+
+
+class Flown(Evidence):
+    """A run that was flown: its arrays, and its faults with what they touched."""
+
+    def check(self, *checkers: Checker) -> Flown:
+        """Nothing if every checker passes; one that is vacuous proves nothing, and fails.
+
+        Raises
+        ------
+        Broken
+            When one does not pass: which, why, and the first tick that offends.
+        """
+        __tracebackhide__ = True
+        findings = [checker(self) for checker in checkers]
+        if wrong := [finding for finding in findings if finding.verdict != "pass"]:
+            raise Broken("\n".join(map(str, wrong)))
+        return self
+
+
+@dataclass(frozen=True)
+class Swarm:
+    """A run to be flown.
+
+    Parameters
+    ----------
+    scenario
+        With all faults so far.
+    launch
+        Flies a plan.
+    """
+
+    scenario: Scenario
+    launch: Callable[[Plan], Flown]
+
+    def fault(self, verb: str, **keys: Any) -> Swarm:
+        """The same run with one more entry in its timeline: the keys are those of a scenario file (docs/scenario.md).
+
+        Raises
+        ------
+        ScenarioError
+            When a file that said so would be refused.
+        """
+        return replace(self, scenario=scenarios.extended(self.scenario, [{"verb": verb} | keys]))
+
+    def fly(self, verdict: Verdict = "pass") -> Flown:
+        """Fly it.
+
+        Parameters
+        ----------
+        verdict
+            What the run itself must come to. A fault that touched nothing makes it "vacuous"; divergence makes it "fail".
+
+        Raises
+        ------
+        Broken
+            When it comes to another: why.
+        ScenarioError, PlanError
+            When it cannot fly.
+        """
+        __tracebackhide__ = True
+        flown = self.launch(planning.make(self.scenario))
+        if flown.outcome.verdict != verdict:
+            why = "; ".join(flown.outcome.reasons) or "every fault bit and nothing broke"
+            raise Broken(f"the run is {flown.outcome.verdict}, not {verdict}: {why}")
+        return flown
+
+
+class Hangar:
+    """The runs of one test: it flies them, and keeps what a failure needs.
+
+    Parameters
+    ----------
+    runtime
+        In which they are flown.
+    seed
+        For all of them; None leaves each scenario's own.
+    room
+        Makes a new, empty directory.
+    """
+
+    def __init__(self, runtime: Runtime, seed: int | None, room: Callable[[], Path]) -> None:
+        self.runtime = runtime
+        self._seed = seed
+        self._room = room
+        self._flown: deque[tuple[Plan, Path | None]] = deque(maxlen=_KEPT)
+
+    def __call__(self, scenario: str | Path, *overrides: str) -> Swarm:
+        """A run of a scenario, shipped or a file, with `key=value` overrides.
+
+        Raises
+        ------
+        ScenarioError
+            When there is none, or something in it is wrong.
+        """
+        seed = () if self._seed is None else (f"seed={self._seed}",)
+        return Swarm(scenarios.load(str(scenario), (*seed, *overrides)), self._launch)
+
+    def keep(self) -> list[tuple[Plan, Path]]:
+        """The last runs, each with a directory that holds all of it; those flown in process are flown again to record them."""
+        return [(plan, out or self._recorded(plan)) for plan, out in self._flown]
+
+    def _launch(self, plan: Plan) -> Flown:
+        if self.runtime == "inprocess":
+            self._flown.append((plan, None))
+            evidence = rehearse(plan)
+            return Flown(plan, evidence.arrays, evidence.outcome)
+        out = self._room() / "run"
+        self._flown.append((plan, out))
+        return _landed(plan, fly(plan, "processes", out, lambda *_: None))
+
+    def _recorded(self, plan: Plan) -> Path:
+        out = self._room() / "run"
+        fly(plan, "inprocess", out, lambda *_: None)
+        return out
+
+
+def _landed(plan: Plan, outcome: Outcome) -> Flown:
+    path = Path(outcome.out) / history.FILE
+    if not path.exists():
+        raise Broken(f"the run left nothing: {'; '.join(outcome.reasons)}")
+    return Flown(plan, history.load(path), outcome)
