@@ -7,7 +7,7 @@ from typing import get_args
 import pytest
 from flying import digest_of, plan_of
 
-from affinet import impairments, sections
+from affinet import events, impairments, sections
 from affinet.run import fly
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -65,7 +65,7 @@ def test_every_key_of_a_scenario_is_documented(section):
 
 def test_every_verb_of_the_timeline_is_documented():
     text = (DOCS / "scenario.md").read_text()
-    for verb, model in sections.VERBS.items():
+    for verb, model in events.VERBS.items():
         assert f"| `{verb}` |" in text
         for key in set(model.model_fields) - {"verb"}:
             assert f"`{key}`" in text
