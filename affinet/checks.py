@@ -79,7 +79,7 @@ def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
             f"'{fault.describe()}' at {fault.start * dt:g} s lies beyond the end of the run",
         )
         for fault in faults
-        if fault.start >= ticks
+        if fault.trigger is None and fault.start >= ticks
     ]
 
 
