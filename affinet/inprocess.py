@@ -23,7 +23,7 @@ from netem.links import Integers, Mask
 from netem.medium import Medium
 from netem.plain import to_plain
 from netem.timeline import Conditions
-from world.history import History, Moment, Moments, Vigil, gather
+from world.history import Moment, Moments, Vigil, gather
 from world.world import Scene
 
 Broadcasts = Mapping[str, Fields]
@@ -44,18 +44,17 @@ class Swarm:
         self._links = plan.world.links
         self._agents = plan.agents
         self._fields = self._agents.channels()
-        self._medium = Medium(plan.scenario.seed, plan.channels, plan.profiles, self.timeline, plan.recorded())
+        self._medium = Medium(plan.world.seed, plan.channels, plan.profiles, self.timeline, plan.recorded())
         self._said: dict[int, Broadcasts] = {}
         self._air = self._medium.begin()
-        self.history = History(plan.world, len(plan.channels))
 
     @property
     def in_flight(self) -> int:
         """Messages under way."""
         return self._air.in_flight
 
-    def fly(self, watch: Callable[[Moments], None], batch: int) -> None:
-        """All ticks; `watch` sees them, a batch at a time."""
+    def fly(self, watch: Callable[[Moments, Array], None], batch: int) -> None:
+        """All ticks; `watch` sees them, a batch at a time, and where the last of them led."""
         world = self._plan.world
         agents = np.arange(1, self._links.agents + 1)
         fresh = self._agents.init(agents.shape)
@@ -74,8 +73,7 @@ class Swarm:
                 moments.append(moment)
                 if len(moments) == batch or tick == world.ticks - 1:
                     gathered = gather(world, timeline, tick + 1 - len(moments), moments)
-                    self.history.extend(gathered, scene.position)
-                    watch(gathered)
+                    watch(gathered, scene.position)
                     moments = []
 
     def _fire(self, tick: int, vigil: Vigil) -> None:

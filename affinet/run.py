@@ -15,7 +15,8 @@ from affinet.outcome import Outcome
 from affinet.plan import Plan
 from affinet.rerun_command import mend
 from world import history
-from world.history import Moments
+from world.formation import Array
+from world.history import History, Moments
 
 Runtime = Literal["processes", "inprocess"]
 Watch = Callable[[int, float], None]
@@ -50,10 +51,10 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
 
 def rehearse(plan: Plan) -> Evidence:
     """Run a plan in this process, and leave nothing behind."""
-    swarm = Swarm(plan)
+    swarm, flown = Swarm(plan), History(plan.world, len(plan.channels))
     started = time.perf_counter()
-    swarm.fly(lambda _: None, plan.books(None).batch)
-    arrays = swarm.history.arrays()
+    swarm.fly(flown.extend, plan.books(None).batch)
+    arrays = flown.arrays()
     done = outcome.judge(
         plan,
         swarm.timeline,
@@ -94,21 +95,22 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
-    swarm, books = Swarm(plan), plan.books(viewer)
+    swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels))
     started = time.perf_counter()
     with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
 
-        def see(moments: Moments) -> None:
+        def see(moments: Moments, next_position: Array) -> None:
+            flown.extend(moments, next_position)
             logbook.write(moments, swarm.timeline)
             watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
 
         swarm.fly(see, books.batch)
     wall_s = time.perf_counter() - started
-    swarm.history.save(out / history.FILE)
+    flown.save(out / history.FILE)
     return outcome.judge(
         plan,
         swarm.timeline,
-        swarm.history.arrays(),
+        flown.arrays(),
         in_flight=swarm.in_flight,
         uninstructed=0,
         failure=None,

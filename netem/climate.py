@@ -16,7 +16,7 @@ from netem import channels as channel_names
 from netem import delay
 from netem.air import Air, Verdicts
 from netem.corrupt import Mark, Marks
-from netem.draws import Array, Purpose, uniform
+from netem.draws import Array, Purpose, Seed, uniform
 from netem.fate import PASSED, Fate, Fates
 from netem.links import Integers, Links, Mask
 from netem.profile import Profile
@@ -68,9 +68,9 @@ class Climate:
         What impairs the links.
     """
 
-    def __init__(self, seed: int, links: Links, channels: Sequence[str], profile: Profile) -> None:
+    def __init__(self, seed: Seed, links: Links, channels: Sequence[str], profile: Profile) -> None:
         self.profile = profile
-        self._seed, self._links = seed, links
+        self._seed, self._links = links.seeds(seed), links
         self._shape = (len(channels), len(links))
         self._sensing = np.array([name == channel_names.SENSE for name in channels])
         self._comms = ~self._sensing[:, None]
@@ -142,9 +142,9 @@ class Climate:
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
-        src, dst = self._links.src[link], self._links.dst[link]
-        names = self._names[channel]
-        return uniform(self._seed, Purpose.CORRUPTED_BIT, tick=content, src=src, dst=dst, channel=names, lanes=2)
+        seed = self._seed if isinstance(self._seed, int) else self._seed[link]
+        ends = {name: numbers[link] for name, numbers in self._links.ends.items()}
+        return uniform(seed, Purpose.CORRUPTED_BIT, tick=content, **ends, channel=self._names[channel], lanes=2)
 
     def draw(self, purpose: Purpose, ticks: Integers) -> Array:
         """Uniform draws for every message of ticks (T,), shape (T, C', L); C' is 1 where channels share them."""

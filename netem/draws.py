@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Words = NDArray[np.uint64]
+Seed = int | Words  # of one run, or of the run that each row of a batch belongs to
 
 _WORD = np.uint64(0xFFFFFFFF)
 _HALF = np.uint64(32)
@@ -90,7 +91,7 @@ def _mixed(product: Words, word: Words, key: Words, *, out: Words) -> Words:
 
 
 def uniform(
-    seed: int,
+    seed: Seed,
     purpose: Purpose,
     *,
     tick: ArrayLike = 0,
@@ -104,7 +105,7 @@ def uniform(
     Parameters
     ----------
     seed
-        Of the run, in [0, 2**64).
+        Of the run, in [0, 2**64); of many runs, an array that broadcasts against the indices.
     purpose
         What the draws are for.
     tick, channel
@@ -126,7 +127,7 @@ def uniform(
     """
     if not 0 < lanes <= _MOST_LANES:
         raise ValueError(f"lanes must lie in [1, 2**17], got {lanes}")
-    if not 0 <= seed < 2**64:
+    if isinstance(seed, int) and not 0 <= seed < 2**64:
         raise ValueError(f"seed {seed} is outside [0, 2**64)")
     ticks, sources, targets, channels = np.broadcast_arrays(
         _words("tick", tick, 32),
@@ -134,6 +135,7 @@ def uniform(
         _words("dst", dst, 16),
         _words("channel", channel, 32),
     )
+    keys = np.asarray(seed, dtype=np.uint64)[..., None]
     blocks = np.arange((lanes + 1) // 2, dtype=np.uint64)
     counter = (
         ticks[..., None],
@@ -141,8 +143,7 @@ def uniform(
         channels[..., None],
         np.uint64(int(purpose) << 16) | blocks,
     )
-    key = np.uint64(seed & 0xFFFFFFFF), np.uint64(seed >> 32)
-    x0, x1, x2, x3 = philox(counter, (np.asarray(key[0]), np.asarray(key[1])))
+    x0, x1, x2, x3 = philox(counter, (keys & _WORD, keys >> _HALF))
     pairs = np.stack([_unit(x0, x1), _unit(x2, x3)], axis=-1)
     return np.ascontiguousarray(pairs.reshape(*pairs.shape[:-2], 2 * len(blocks))[..., :lanes])
 

@@ -13,6 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from netem.draws import Seed
+
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
@@ -27,21 +29,44 @@ class Links:
         How many agents there are.
     src, dst
         Agent numbers, shape (L,).
+    swarm
+        How many agents a swarm has: fewer than all when several swarms fly side by side, each a run of its own.
     """
 
     agents: int
     src: Integers
     dst: Integers
+    swarm: int
 
     @classmethod
     def both_ways(cls, agents: int, edges: Iterable[tuple[int, int]]) -> Links:
         """The two directed links of every undirected edge."""
         pairs = sorted({(i, j) for a, b in edges for i, j in ((a, b), (b, a))})
         dst, src = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        return cls(agents, np.ascontiguousarray(src), np.ascontiguousarray(dst))
+        return cls(agents, np.ascontiguousarray(src), np.ascontiguousarray(dst), agents)
 
     def __len__(self) -> int:
         return len(self.src)
+
+    def side_by_side(self, swarms: int) -> Links:
+        """The links of so many swarms of the same kind, one after the other."""
+        first = np.repeat(np.arange(swarms) * self.agents, len(self))
+        return Links(
+            swarms * self.agents, np.tile(self.src, swarms) + first, np.tile(self.dst, swarms) + first, self.agents
+        )
+
+    def own_number(self, agents: Integers) -> Integers:
+        """The numbers of agents in their own swarms: what their draws are a function of."""
+        return (agents - 1) % self.swarm + 1
+
+    @cached_property
+    def ends(self) -> dict[str, Integers]:
+        """`src` and `dst` of every link, in its own swarm, as draws are indexed by them."""
+        return {"src": self.own_number(self.src), "dst": self.own_number(self.dst)}
+
+    def seeds(self, seed: Seed) -> Seed:
+        """The seed of every link, from that of the run, or of every agent's run."""
+        return seed if isinstance(seed, int) else seed[self.dst - 1]
 
     @cached_property
     def index(self) -> dict[tuple[int, int], int]:

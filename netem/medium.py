@@ -17,7 +17,7 @@ import numpy as np
 from netem.air import Air, Delivery, Verdicts, deliver
 from netem.channels import SENSE
 from netem.climate import Climate, Memory
-from netem.draws import Array, Purpose, Tape
+from netem.draws import Array, Purpose, Seed, Tape
 from netem.fate import PASSED, Fate, Fates, doom, standing
 from netem.links import Integers, Links, Mask
 from netem.profile import Profile
@@ -76,7 +76,7 @@ class Medium:
     Parameters
     ----------
     seed
-        Of the run.
+        Of the run, or of every agent's run.
     channels
         Names, sensing first; the rows of every (C, L) array.
     profiles
@@ -89,7 +89,7 @@ class Medium:
 
     def __init__(
         self,
-        seed: int,
+        seed: Seed,
         channels: Sequence[str],
         profiles: Sequence[Profile],
         timeline: Timeline,

@@ -15,7 +15,7 @@ from scipy.special import ndtr, ndtri
 from netem import corrupt, delay
 from netem.chain import ChainLayer
 from netem.corrupt import Marks
-from netem.draws import Array, Purpose, uniform
+from netem.draws import Array, Purpose, Seed, uniform
 from netem.links import Integers, Links, Mask
 from netem.profile import Profile
 from netem.reach import Law, Reach
@@ -68,8 +68,8 @@ class Forecast:
         Which channels are sensing, shape (C,).
     """
 
-    def __init__(self, seed: int, links: Links, profile: Profile, codes: NDArray[np.int64], sensing: Mask) -> None:
-        self._seed, self._links, self._profile = seed, links, profile
+    def __init__(self, seed: Seed, links: Links, profile: Profile, codes: NDArray[np.int64], sensing: Mask) -> None:
+        self._seed, self._links, self._profile = links.seeds(seed), links, profile
         self._codes = codes
         self._sensing, self._comms = sensing, ~sensing[:, None]
         self._rows: Weather
@@ -106,7 +106,7 @@ class Forecast:
         mark = np.zeros(shape, dtype=np.uint8)
         if profile.corrupt.any():
             mark = corrupt.marks(profile.corrupt, self.draw(Purpose.CORRUPTION, ticks, 1)[..., 0])
-        jam_draws = uniform(self._seed, Purpose.JAMMING, tick=ticks, lanes=max(1, len(profile.zones)))
+        jam_draws = self._jam_draws(ticks)
         return Weather(
             closed=self._closed(ticks),
             lost=lost,
@@ -116,8 +116,12 @@ class Forecast:
             copy_delay_s=np.where(self._comms, copy_s + extra_s, 0.0),
             mark=np.where(self._comms, mark, np.uint8(0)),
             squared_limit=self._squared_limits(ticks),
-            jams=jam_draws[:, : len(profile.zones)] < np.array([zone.share for zone in profile.zones]),
+            jams=jam_draws < np.array([zone.share for zone in profile.zones]),
         )
+
+    def _jam_draws(self, ticks: Integers) -> Array:
+        zones = len(self._profile.zones)
+        return uniform(self._seed, Purpose.JAMMING, tick=ticks, lanes=zones) if zones else np.empty((len(ticks), 0))
 
     def _chains(self, ticks: Integers) -> tuple[Mask, Array]:
         layers = self._profile.chains
@@ -182,7 +186,8 @@ class Forecast:
 
     def _shadows(self, ticks: Integers, reach: Reach) -> Array:
         """Standard normal, the same both ways and for a spell of ticks, shape (T, 1, L)."""
-        low, high = np.minimum(self._links.src, self._links.dst), np.maximum(self._links.src, self._links.dst)
+        src, dst = self._links.ends.values()
+        low, high = np.minimum(src, dst), np.maximum(src, dst)
         spells, place = np.unique(ticks // reach.coherence, return_inverse=True)
         shadows: Array = ndtri(uniform(self._seed, Purpose.SHADOWING, tick=spells[:, None], src=low, dst=high))
         return shadows[place, None, :, 0]
@@ -208,8 +213,7 @@ class Forecast:
             self._seed,
             purpose,
             tick=ticks[:, None, None],
-            src=self._links.src,
-            dst=self._links.dst,
+            **self._links.ends,
             channel=self._codes[:, None],
             lanes=lanes,
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from netem.draws import Array, Purpose, uniform
+from netem.draws import Array, Purpose, Seed, uniform
 
 
 def normal(
-    seed: int, purpose: Purpose, *, tick: ArrayLike = 0, src: ArrayLike = 0, dst: ArrayLike = 0, axes: int
+    seed: Seed, purpose: Purpose, *, tick: ArrayLike = 0, src: ArrayLike = 0, dst: ArrayLike = 0, axes: int
 ) -> Array:
     """Standard normal draws, shape (..., axes), one row per broadcast (tick, src, dst)."""
     draws: Array = ndtri(uniform(seed, purpose, tick=tick, src=src, dst=dst, lanes=axes))

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
-from netem.draws import Purpose, Tape, uniform
-from netem.links import Links, Mask
+from netem.draws import Purpose, Seed, Tape, uniform
+from netem.links import Integers, Links, Mask
 from netem.timeline import Conditions
 from world import dynamics, sensors
 from world.formation import Array, Formation
@@ -43,7 +43,7 @@ class World:
     Parameters
     ----------
     seed
-        Of the run.
+        Of the run, or of every agent's run, shape (N,).
     dt
         Tick, in seconds.
     ticks
@@ -58,7 +58,7 @@ class World:
         Standard deviation of the followers' initial offset from their targets, per axis, in metres.
     """
 
-    seed: int
+    seed: Seed
     dt: float
     ticks: int
     formation: Formation
@@ -70,8 +70,7 @@ class World:
 
     def start(self) -> Scene:
         """The scene in tick 0: leaders on their targets, followers scattered about theirs, everybody at rest."""
-        agents = np.arange(1, self.formation.agents + 1)
-        offset = normal(self.seed, Purpose.INITIAL_POSITION, src=agents, axes=self.formation.dimension)
+        offset = normal(self.seed, Purpose.INITIAL_POSITION, src=self._numbers, axes=self.formation.dimension)
         position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, self.spread * offset)
         return Scene(position, np.zeros_like(position), sensors.relative(position, self.links))
 
@@ -89,8 +88,8 @@ class World:
 
     def outliers(self, tick: int, now: Conditions) -> Mask:
         """Which measurements of a tick are outliers, shape (L,)."""
-        links = self.links
-        draw = uniform(self.seed, Purpose.OUTLIER, tick=tick, src=links.src, dst=links.dst)[..., 0]
+        src, dst = self.links.ends.values()
+        draw = uniform(self.links.seeds(self.seed), Purpose.OUTLIER, tick=tick, src=src, dst=dst)[..., 0]
         return sensors.stray(draw, now)
 
     def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
@@ -108,12 +107,15 @@ class World:
 
     def _normal(self, purpose: Purpose, tick: int | NDArray[np.int64]) -> Array:
         """Standard normal draws for every measurement of a tick, shape (..., L, D)."""
-        links, axes = self.links, self.formation.dimension
-        return normal(self.seed, purpose, tick=tick, src=links.src, dst=links.dst, axes=axes)
+        src, dst = self.links.ends.values()
+        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=self.formation.dimension)
+
+    @property
+    def _numbers(self) -> Integers:
+        return self.links.own_number(np.arange(1, self.formation.agents + 1))
 
     @cached_property
     def _disturbances(self) -> Tape:
-        agents = np.arange(1, self.formation.agents + 1)
         return Tape(
             lambda ticks: (
                 self.disturbance
@@ -121,7 +123,7 @@ class World:
                     self.seed,
                     Purpose.PROCESS_NOISE,
                     tick=ticks[:, None],
-                    src=agents,
+                    src=self._numbers,
                     axes=self.formation.dimension,
                 )
             )
