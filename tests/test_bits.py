@@ -25,6 +25,14 @@ ESTIMATORS = {
     "conral": ConsensusLocalization(),
     "ga-rkf-ral": GeometryAwareFilter(geometry="ral"),
     "ga-rkf-conral": GeometryAwareFilter(geometry="conral"),
+    "ral-scaling": RelativeAffineLocalization("scaling"),
+    "ral-rotation": RelativeAffineLocalization("rotation"),
+    "ral-similarity": RelativeAffineLocalization("similarity"),
+    "conral-scaling": ConsensusLocalization(constraint="scaling"),
+    "conral-rotation": ConsensusLocalization(constraint="rotation"),
+    "conral-similarity": ConsensusLocalization(constraint="similarity"),
+    "ga-rkf-ral-rotation": GeometryAwareFilter(geometry="ral", constraint="rotation", penalty=False),
+    "ga-rkf-conral-similarity": GeometryAwareFilter(constraint="similarity"),
 }
 LAWS = {
     "static": Static(),
@@ -33,11 +41,12 @@ LAWS = {
     "estimated": VaryingVelocity(source="estimated"),
     "feed-forward": VaryingVelocity(source="feed-forward"),
 }
+PLAIN = ("none", "rkf", "ral", "conral", "ga-rkf-ral", "ga-rkf-conral")  # with every law; their variants with one
 PAIRS = [
     (estimator, law)
     for estimator in ESTIMATORS
     for law in LAWS
-    if law != "estimated" or estimator not in ("none", "ral", "conral")
+    if (law != "estimated" or "rkf" in estimator) and (estimator in PLAIN or law == "constant-velocity")
 ]
 
 # An octahedron with its diagonals, and a seventh agent tied to four of them.

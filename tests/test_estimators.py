@@ -9,6 +9,7 @@ from agents.brief import Brief
 from agents.estimators import geometry, kalman, small
 from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
+from agents.estimators.constraints import MAPS
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import THETA, RelativeAffineLocalization
@@ -19,6 +20,7 @@ from world.formation import PRESETS
 HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
 OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
 R = np.array([[0.01, 0.003], [0.003, 0.02]])
+AFFINE = MAPS["affine"]
 
 
 def brief(relative, covariance=None):
@@ -100,7 +102,7 @@ def test_ral_is_exact_on_affine_formations_wherever_it_is_feasible(relative, dat
 
 def test_ral_is_infeasible_when_the_neighbours_are_nominally_on_a_line_whatever_is_measured():
     on_a_line = [[1, 1], [2, 2], [-3, -3]]
-    fit = geometry.fit(np.array(on_a_line, float), np.array([[1.0, 0], [0, 1], [5, -2]]), np.ones(3, dtype=bool))
+    fit = AFFINE.fit(np.array(on_a_line, float), np.array([[1.0, 0], [0, 1], [5, -2]]), np.ones(3, dtype=bool))
     assert not fit.feasible
     np.testing.assert_array_equal(fit.theta, np.zeros((2, 2)))
 
@@ -108,21 +110,21 @@ def test_ral_is_infeasible_when_the_neighbours_are_nominally_on_a_line_whatever_
 def test_ral_is_infeasible_when_the_neighbours_are_nominally_in_a_plane_of_space():
     in_a_plane = np.array([[1.0, 0, 1], [0, 1, 1], [1, 1, 2], [2, -1, 1]])
     measured = np.random.default_rng(1).normal(size=(4, 3))
-    assert not geometry.fit(in_a_plane, measured, np.ones(4, dtype=bool)).feasible
+    assert not AFFINE.fit(in_a_plane, measured, np.ones(4, dtype=bool)).feasible
 
 
 def test_ral_is_feasible_when_the_formation_itself_has_collapsed_to_a_line():
     collapsed = np.array([[-1.375, -0.375], [0.0, 0.0]])
     seen = only(6, 1, 4)
-    fit = geometry.fit(HEXA4, np.where(seen[:, None], HEXA4 @ collapsed.T, 0.0), seen)
+    fit = AFFINE.fit(HEXA4, np.where(seen[:, None], HEXA4 @ collapsed.T, 0.0), seen)
     assert fit.feasible
     np.testing.assert_allclose(fit.theta, collapsed, atol=1e-12)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_feasibility_does_not_depend_on_the_size_of_the_formation(scale):
-    assert geometry.gram(scale * HEXA4, only(6, 0, 1))[1]
-    assert not geometry.gram(scale * HEXA4, only(6, 0, 3))[1]
+    assert geometry.regular(geometry.gram(scale * HEXA4, only(6, 0, 1)))
+    assert not geometry.regular(geometry.gram(scale * HEXA4, only(6, 0, 3)))
 
 
 def test_covariance_of_the_geometric_estimate_is_that_of_its_scatter():
@@ -131,8 +133,8 @@ def test_covariance_of_the_geometric_estimate_is_that_of_its_scatter():
     noise = rng.multivariate_normal([0, 0], R, size=(100_000, 3))
     measured = np.zeros((100_000, 6, 2))
     measured[:, seen] = HEXA4[seen] + noise
-    fit = geometry.fit(HEXA4, measured, np.broadcast_to(seen, (100_000, 6)))
-    said = geometry.covariance(HEXA4, fit.inverse_gram[0], R)
+    fit = AFFINE.fit(HEXA4, measured, np.broadcast_to(seen, (100_000, 6)))
+    said = AFFINE.covariance(geometry.Fit(*(part[0] for part in fit)), HEXA4, R)
     scatter = geometry.apply(fit.theta, HEXA4)[:, ~seen]
     for edge, expected in zip(range(3), said[~seen], strict=True):
         assert np.linalg.norm(np.cov(scatter[:, edge].T) - expected) < 0.03 * np.linalg.norm(expected)
@@ -140,8 +142,9 @@ def test_covariance_of_the_geometric_estimate_is_that_of_its_scatter():
 
 def test_covariance_of_the_geometric_estimate_by_hand():
     # H = [[1, 0], [0, 2]]: (H H^T)^-1 = diag(1, 1/4), so the edge (3, 2) has 9 + 1 times R.
-    inverse_gram, _ = geometry.gram(np.array([[1.0, 0.0], [0.0, 2.0]]), np.array([True, True]))
-    np.testing.assert_allclose(geometry.covariance(np.array([[3.0, 2.0]]), inverse_gram, R), [10 * R])
+    H = np.array([[1.0, 0.0], [0.0, 2.0]])
+    fit = AFFINE.fit(H, H, np.array([True, True]))
+    np.testing.assert_allclose(AFFINE.covariance(fit, np.array([[3.0, 2.0]]), R), [10 * R])
 
 
 def test_ral_keeps_measured_edges_as_measured():
@@ -444,6 +447,10 @@ ESTIMATORS = [
     ConsensusLocalization(),
     GeometryAwareFilter(geometry="ral"),
     GeometryAwareFilter(geometry="conral"),
+    RelativeAffineLocalization("scaling"),
+    RelativeAffineLocalization("similarity"),
+    ConsensusLocalization(constraint="rotation"),
+    GeometryAwareFilter(constraint="similarity", penalty=False),
 ]
 
 

@@ -59,6 +59,8 @@ class Estimate(NamedTuple):
         Convergence indicator (paper 000, eq. 16), shape (...), in square units of Theta; NaN where undefined.
     relative_velocity
         Estimated relative velocities, shape (..., n, D), in metres per second, by estimators that track them.
+    feasible
+        Whether the neighbours seen in this tick determine a local map, shape (...), by estimators that fit one.
     """
 
     relative: Array
@@ -66,6 +68,7 @@ class Estimate(NamedTuple):
     covariance: Array
     psi: Array
     relative_velocity: Array | None = None
+    feasible: Mask | None = None
 
     @property
     def spread(self) -> Array:

@@ -3,6 +3,9 @@
 An agent's consensus map starts from its first own fit, or from what its neighbours agree on if that comes first. Equation
 (12) gives no covariance for it; since it pools at least what all neighbours measure, (12) over the whole nominal neighbourhood
 stands in.
+
+Under a constraint the local fits keep to it, and (14) averages them as it stands, so that its bound on the step holds. A mean
+of rotations is none; the map in use, and in the indicator, is the nearest that keeps to the constraint.
 """
 
 from __future__ import annotations
@@ -16,16 +19,16 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
+from agents.estimators.constraints import MAPS, Constraint
 from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
 from netem.channels import THETA
 
 
 class Agreement(NamedTuple):
-    """What is perceived in this tick, the consensus map that outlasts it, and the covariance of its edges."""
+    """What is perceived in this tick, and the consensus map that outlasts it, with the H H^T of all nominal neighbours."""
 
     perceived: Perceived
     consensus: geometry.Fit
-    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -36,9 +39,12 @@ class ConsensusLocalization:
     ----------
     epsilon
         Step of the consensus (14); stable below 2 / (largest eigenvalue of the graph Laplacian + largest degree + 1).
+    constraint
+        The class of maps that the manoeuvre keeps to (Table III).
     """
 
     epsilon: float = 0.05
+    constraint: Constraint = "affine"
 
     def channels(self, dimension: int) -> Channels:
         """The local and the consensus map."""
@@ -48,16 +54,14 @@ class ConsensusLocalization:
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Agreement:
         """Nothing perceived, nothing agreed."""
         perceived = RelativeAffineLocalization().init(brief, batch)
-        inverse_gram, _ = geometry.gram(brief.relative, brief.present)
-        covariance = geometry.covariance(brief.relative, inverse_gram, brief.covariance)
-        shape = (*perceived.seen.shape, *brief.covariance.shape)
-        return Agreement(perceived, perceived.local, np.broadcast_to(covariance, shape))
+        nominal = np.broadcast_to(geometry.gram(brief.relative, brief.present), perceived.local.gram.shape)
+        return Agreement(perceived, perceived.local._replace(gram=nominal))
 
     def sense(
         self, brief: Brief, state: Agreement, measured: Array, seen: Mask
     ) -> tuple[Agreement, Mapping[str, Fields]]:
         """Fit the local map, and start the consensus from it if nothing was agreed yet."""
-        local = geometry.fit(brief.relative, measured, seen)
+        local = MAPS[self.constraint].fit(brief.relative, measured, seen)
         consensus = _start(state.consensus, local.theta, local.feasible)
         said = {
             "local": local.theta,
@@ -71,10 +75,16 @@ class ConsensusLocalization:
         """One step of consensus; complete the measurements by its map."""
         said = heard[THETA]
         voices = said.fresh & said.fields["started"]
-        psi = geometry.indicator(state.consensus, said.fields["consensus"], voices)
+        maps = MAPS[self.constraint]
+        psi = geometry.indicator(self._in_use(state.consensus), maps.nearest(said.fields["consensus"]), voices)
         consensus = self._step(state, said, voices)
-        estimate = complete(brief, state.perceived, consensus, state.covariance, psi)
-        return state._replace(consensus=consensus), estimate
+        shape = self._in_use(consensus)
+        covariance = maps.covariance(shape, brief.relative, brief.covariance)
+        return state._replace(consensus=consensus), complete(brief, state.perceived, shape, covariance, psi)
+
+    def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
+        nearest = MAPS[self.constraint].nearest(consensus.theta)
+        return consensus._replace(theta=np.where(consensus.feasible[..., None, None], nearest, 0.0))
 
     def _step(self, state: Agreement, said: Heard, voices: Mask) -> geometry.Fit:
         own, local = state.consensus, state.perceived.local

@@ -16,6 +16,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators.base import Channels, Estimate, Estimator, Fields, Heard
 from agents.estimators.conral import Agreement, ConsensusLocalization
+from agents.estimators.constraints import Constraint
 from agents.estimators.geometry import identity
 from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
@@ -38,10 +39,17 @@ class GeometryAwareFilter(EdgeFilters):
         Where the perceived shape comes from: the agent's own fit, or the consensus with its neighbours.
     epsilon
         Step of that consensus (14).
+    constraint
+        The class of maps that the manoeuvre keeps to (Table III).
+    penalty
+        Whether the covariance of the geometric estimate is widened by psi_i I (6). Without, an edge still waits until psi
+        is defined, so that this one thing differs.
     """
 
     geometry: Literal["ral", "conral"] = "conral"
     epsilon: float = 0.05
+    constraint: Constraint = "affine"
+    penalty: bool = True
 
     def channels(self, dimension: int) -> Channels:
         """What the geometry broadcasts."""
@@ -61,15 +69,19 @@ class GeometryAwareFilter(EdgeFilters):
         seen = _perceived(state.shape).seen
         shape, observed = self._shaper.fuse(brief, state.shape, heard)
         trusted = np.isfinite(observed.psi)
-        penalty = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
-        R = observed.covariance + penalty[..., None, None] * identity(brief.dimension)
+        R = observed.covariance
+        if self.penalty:
+            doubt = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
+            R = R + doubt[..., None, None] * identity(brief.dimension)
         usable = seen | (observed.known & trusted[..., None])
         tracks = self.advance(brief, state.tracks, observed.relative, R, usable)
-        return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)
+        return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)._replace(feasible=observed.feasible)
 
     @cached_property
     def _shaper(self) -> Estimator[Any]:
-        return RelativeAffineLocalization() if self.geometry == "ral" else ConsensusLocalization(self.epsilon)
+        if self.geometry == "ral":
+            return RelativeAffineLocalization(self.constraint)
+        return ConsensusLocalization(self.epsilon, self.constraint)
 
 
 def _perceived(shape: Perceived | Agreement) -> Perceived:

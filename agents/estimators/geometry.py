@@ -11,11 +11,11 @@ from agents.brief import Array, Mask
 from agents.estimators.small import determinant, inverse
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
-_SINGULAR = 1e-9
+SINGULAR = 1e-9
 
 
 class Fit(NamedTuple):
-    """A local affine map.
+    """A local map.
 
     Parameters
     ----------
@@ -23,17 +23,17 @@ class Fit(NamedTuple):
         Shape (..., D, D); 0 where not feasible.
     feasible
         Where enough neighbours are seen to determine it, shape (...).
-    inverse_gram
-        (H H^T)^-1 of the neighbours behind it, shape (..., D, D); the identity where not feasible.
+    gram
+        H H^T of the neighbours behind it, shape (..., D, D), in square metres.
     """
 
     theta: Array
     feasible: Mask
-    inverse_gram: Array
+    gram: Array
 
 
-def gram(relative: Array, seen: Mask) -> tuple[Array, Mask]:
-    """The inverse of H H^T over the edges seen, and where it exists: the rank test is on the nominal H, never on Y.
+def gram(relative: Array, seen: Mask) -> Array:
+    """H H^T over the edges seen, shape (..., D, D), in square metres.
 
     Parameters
     ----------
@@ -41,44 +41,23 @@ def gram(relative: Array, seen: Mask) -> tuple[Array, Mask]:
         Nominal relative positions p_ij, shape (..., n, D).
     seen
         Shape (..., n).
-
-    Returns
-    -------
-    inverse : Array
-        Shape (..., D, D); the identity where not feasible.
-    feasible : Mask
-        Whether rank H = D (Remark 1), shape (...).
     """
-    dimension = relative.shape[-1]
     H = np.where(seen[..., None], relative, 0.0)
-    HHt = np.swapaxes(H, -1, -2) @ H
-    scale = np.einsum("...ii", HHt) / dimension
-    feasible = determinant(HHt) > _SINGULAR * scale**dimension
-    return inverse(np.where(feasible[..., None, None], HHt, identity(dimension))), feasible
+    product: Array = np.swapaxes(H, -1, -2) @ H
+    return product
 
 
-def fit(relative: Array, measured: Array, seen: Mask) -> Fit:
-    """Least-squares affine map from the edges seen (eq. 10).
-
-    Parameters
-    ----------
-    relative, measured
-        p_ij and y_ij, shape (..., n, D); the latter 0 where not seen.
-    seen
-        Shape (..., n).
-    """
-    inverse_gram, feasible = gram(relative, seen)
-    theta = np.swapaxes(measured, -1, -2) @ relative @ inverse_gram
-    return Fit(np.where(feasible[..., None, None], theta, 0.0), feasible, inverse_gram)
+def regular(gram: Array) -> Mask:
+    """Whether rank H = D (Remark 1), shape (...): the test is on the nominal H, never on Y."""
+    dimension = gram.shape[-1]
+    scale = np.einsum("...ii", gram) / dimension
+    spans: Mask = determinant(gram) > SINGULAR * scale**dimension
+    return spans
 
 
-def covariance(relative: Array, inverse_gram: Array, R: Array) -> Array:
-    """Covariance of the geometric estimate Theta p_ij, shape (..., n, D, D) (eq. 12).
-
-    With one R for all edges, and an identity of size N_i,k as it must be, (12) is (p_ij^T (H H^T)^-1 p_ij) R.
-    """
-    leverage = (relative @ inverse_gram * relative).sum(axis=-1)
-    return leverage[..., None, None] * R
+def inverse_gram(gram: Array, feasible: Mask) -> Array:
+    """(H H^T)^-1, shape (..., D, D); the identity where not feasible."""
+    return inverse(np.where(feasible[..., None, None], gram, identity(gram.shape[-1])))
 
 
 def apply(theta: Array, relative: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
+from agents.estimators.constraints import MAPS, Constraint
 from netem.channels import THETA
 
 
@@ -28,7 +29,14 @@ class RelativeAffineLocalization:
 
     The printed Algorithm 2 replaces the measured edges instead; the input would then be Theta_i sum_j l_ij p_ij = 0 and the
     formation not controlled at all (errata).
+
+    Parameters
+    ----------
+    constraint
+        The class of maps that the manoeuvre keeps to (Table III).
     """
+
+    constraint: Constraint = "affine"
 
     def channels(self, dimension: int) -> Channels:
         """The local map, for the neighbours' convergence indicator."""
@@ -49,14 +57,14 @@ class RelativeAffineLocalization:
         seen: Mask,
     ) -> tuple[Perceived, Mapping[str, Fields]]:
         """Fit the local map."""
-        local = geometry.fit(brief.relative, measured, seen)
+        local = MAPS[self.constraint].fit(brief.relative, measured, seen)
         return Perceived(measured, seen, local), {THETA: {"local": local.theta, "feasible": local.feasible}}
 
     def fuse(self, brief: Brief, state: Perceived, heard: Mapping[str, Heard]) -> tuple[Perceived, Estimate]:
         """Complete the measurements by the local map."""
         said = heard[THETA]
         psi = geometry.indicator(state.local, said.fields["local"], said.fresh & said.fields["feasible"])
-        covariance = geometry.covariance(brief.relative, state.local.inverse_gram, brief.covariance)
+        covariance = MAPS[self.constraint].covariance(state.local, brief.relative, brief.covariance)
         return state, complete(brief, state, state.local, covariance, psi)
 
 
@@ -68,4 +76,5 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
     seen = perceived.seen
     relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))
     covariance = np.where(seen[..., None, None], brief.covariance, geometric)
-    return Estimate(relative, brief.present & (seen | shape.feasible[..., None]), covariance, psi)
+    known = brief.present & (seen | shape.feasible[..., None])
+    return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible)

@@ -1,4 +1,4 @@
-"""Determinant and inverse of stacks of D x D matrices: closed form in two dimensions, LAPACK in three.
+"""Determinant, inverse and nearest rotation of stacks of D x D matrices: closed form in two dimensions, LAPACK in three.
 
 At this size a call into LAPACK is mostly preparation; an agent makes two of each in every tick.
 """
@@ -27,6 +27,29 @@ def inverse(matrix: Array) -> Array:
     adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
     inverted: Array = adjugate / determinant(matrix)[..., None, None]
     return inverted
+
+
+def rotation(matrix: Array) -> Array:
+    """The rotations nearest to matrices (..., D, D): U V^T of their singular vectors, the determinant fixed to +1.
+
+    Where all are as near, as to 0, it is the identity.
+    """
+    if matrix.shape[-1] == 2:
+        return _turn(matrix[..., 0, 0] + matrix[..., 1, 1], matrix[..., 1, 0] - matrix[..., 0, 1])
+    # A swarm that diverges overflows at last: LAPACK would raise, and end the flight.
+    finite = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
+    U, _, Vt = np.linalg.svd(np.where(finite, matrix, 0.0))
+    U[..., -1] *= np.where(determinant(U @ Vt) < 0.0, -1.0, 1.0)[..., None]
+    nearest: Array = U @ Vt
+    return nearest
+
+
+def _turn(along: Array, across: Array) -> Array:
+    length = np.hypot(along, across)
+    somewhere = length > 0.0
+    size = np.where(somewhere, length, 1.0)
+    cosine, sine = np.where(somewhere, along, 1.0) / size, across / size
+    return np.stack([cosine, -sine, sine, cosine], axis=-1).reshape(*cosine.shape, 2, 2)
 
 
 def triangle(matrix: Array) -> Array:
