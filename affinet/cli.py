@@ -78,6 +78,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
         command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
     _add_hunt(commands)
+    _add_study(commands)
     run.set_defaults(command=_run)
     check.set_defaults(command=_check)
     replay.set_defaults(command=_replay)
@@ -149,6 +150,18 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     hunt.set_defaults(command=_hunt)
 
 
+def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    study = commands.add_parser(
+        "study",
+        help="fly a scenario over a grid of settings and many seeds; a figure, and a verdict on every claim",
+        description="Exit status 0 whatever the verdicts on the claims: that a claim does not hold is a finding.",
+    )
+    study.add_argument("study", help="a TOML file, or one of: paper-000-fig10, ...")
+    study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
+    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME")
+    study.set_defaults(command=_study)
+
+
 def _groups(text: str) -> tuple[tuple[int, ...], ...]:
     try:
         return tuple(tuple(int(agent) for agent in group.split(",")) for group in text.split("/"))
@@ -215,6 +228,20 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
             print(f"inprocess, then {runtime}: {difference}")  # noqa: T201
             return FAIL
     print(f"twice in process and once over processes: {len(flown[0]['error'])} ticks, the same bits")  # noqa: T201
+    return PASS
+
+
+def _study(parsed: argparse.Namespace) -> int:
+    from affinet import study as studies
+
+    study = studies.load(parsed.study)
+    out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
+    total = len(list(studies.cases(study, quick=parsed.quick)))
+    with show.Grid(study.title, total) as grid:
+        results = studies.run(study, quick=parsed.quick, watch=grid.see)
+    verdicts = studies.judge(study, results)
+    studies.save(out, study, results, verdicts)
+    show.claims(study, verdicts, out)
     return PASS
 
 

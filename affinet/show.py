@@ -18,7 +18,9 @@ from netem.control import Answer
 
 if TYPE_CHECKING:
     from affinet.hunt import Coverage, Quarry
+    from affinet.study import Result, Study
     from affinet.testing.strategies import Entries
+    from analysis.claims import Verdict
 
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
@@ -88,6 +90,43 @@ class Chase:
             self._bar.console.print(f"breaks: {verbs}", highlight=False)
         says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
         self._bar.update(self._task, completed=min(coverage.schedules, self._budget), says=says)
+
+
+class Grid:
+    """How far a study is, on standard error."""
+
+    def __init__(self, title: str, cases: int) -> None:
+        self._bar = bar.Progress(
+            bar.TextColumn("{task.description}"),
+            bar.BarColumn(),
+            bar.MofNCompleteColumn(),
+            bar.TextColumn("{task.fields[says]}"),
+            bar.TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task(title, total=cases, says="")
+
+    def __enter__(self) -> Grid:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def see(self, result: Result) -> None:
+        """Show that a case is done."""
+        self._bar.update(self._task, advance=1, says=", ".join(result.labels.values()))
+
+
+def claims(study: Study, verdicts: Sequence[Verdict], out: Path) -> None:
+    """What a study says of the claims it examines."""
+    table = Table("claim", "", "found", title=f"{study.title} ({study.source})")
+    for verdict in verdicts:
+        table.add_row(verdict.says, "[green]holds[/]" if verdict.holds else "[red]does not hold[/]", verdict.found)
+    console = Console()
+    console.print(table)
+    console.print(f"data and figure in {out}", highlight=False)
 
 
 def hunted(quarry: Quarry | None, coverage: Coverage) -> None:

@@ -1,0 +1,237 @@
+"""Studies: a scenario over a grid of settings and many seeds, a figure, and a verdict on every claim.
+
+A study is a TOML file in `affinet/studies/`: axes whose values are overrides of the scenario, and claims, each with the check
+that decides it (`analysis/claims.py`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import multiprocessing
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from affinet import plan as planning
+from affinet import scenario as scenarios
+from affinet.batch import Runs, fly_all
+from affinet.impairments import Section
+from affinet.plan import PlanError
+from affinet.sections import ScenarioError
+from analysis import claims
+from analysis.claims import Verdict
+from analysis.graph import adjacency
+from analysis.indicator import Bounds, bounds
+from netem.links import Mask
+from world.formation import Array
+
+Labels = dict[str, str]
+
+_KEPT = 600  # moments of a curve
+
+
+class Axis(Section):
+    """A setting that is varied: for each value its label, and the overrides it stands for."""
+
+    name: str
+    values: dict[str, list[str]]
+
+
+class Claim(Section):
+    """What a paper says, and the check that decides it over the cases selected by their labels."""
+
+    says: str
+    check: Literal["flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower"]
+    of: Labels
+    to: Labels | None = None
+    level: float | None = None
+    since: float = 0.0
+    until: float | None = None
+
+
+class Size(Section):
+    """How large the study is: runs of each case, and overrides for all of them."""
+
+    runs: Annotated[int, Field(ge=1)]
+    set: list[str] = Field(default_factory=list)
+
+
+class Study(Section):
+    """A study."""
+
+    title: str
+    source: str
+    figure: Literal["curves", "sweep", "indicator"]
+    scenario: str
+    set: list[str] = Field(default_factory=list)
+    full: Size
+    quick: Size
+    axes: list[Axis]
+    along: str | None = None
+    claims: list[Claim]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setting of a study: its label on every axis, and the runs of it."""
+
+    labels: Labels
+    overrides: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A case, and what came of its runs; `bounds` are those of the indicator (18)."""
+
+    labels: Labels
+    runs: Runs
+    bounds: Bounds
+    followers: Mask
+
+
+def shipped() -> list[str]:
+    """Names of the studies that come with affinet."""
+    folder = resources.files("affinet") / "studies"
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load(name: str) -> Study:
+    """The study in a file, or one that is shipped.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none, or something in it is wrong.
+    """
+    path = Path(name)
+    if name in shipped():
+        text = (resources.files("affinet") / "studies" / f"{name}.toml").read_text(encoding="utf-8")
+    elif path.suffix == ".toml" and path.is_file():
+        text = path.read_text(encoding="utf-8")
+    else:
+        raise ScenarioError(f"{name}: no such file, and no such study; shipped are {', '.join(shipped())}")
+    try:
+        return Study.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{name}: not TOML: {error}") from error
+    except ValidationError as error:
+        wrong = [f"{name}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
+        raise ScenarioError("\n".join(wrong)) from error
+
+
+def cases(study: Study, *, quick: bool) -> Iterator[Case]:
+    """Every setting of its grid."""
+    size = study.quick if quick else study.full
+    for labels in itertools.product(*(axis.values for axis in study.axes)):
+        chosen = [axis.values[label] for axis, label in zip(study.axes, labels, strict=True)]
+        overrides = (*study.set, *size.set, *itertools.chain.from_iterable(chosen))
+        yield Case(dict(zip((axis.name for axis in study.axes), labels, strict=True)), overrides)
+
+
+def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[Result]:
+    """All its cases, two at a time; `watch` sees each as it is done.
+
+    Raises
+    ------
+    ScenarioError, PlanError
+        When a case cannot fly.
+    """
+    size = study.quick if quick else study.full
+    todo = list(cases(study, quick=quick))
+    context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
+    with ProcessPoolExecutor(mp_context=context) as pool:
+        waiting = [pool.submit(_fly, study.scenario, case, size.runs) for case in todo]
+        results = []
+        for one in waiting:
+            results.append(one.result())
+            watch(results[-1])
+    return results
+
+
+def _fly(name: str, case: Case, runs: int) -> Result:
+    try:
+        plan = planning.make(scenarios.load(name, case.overrides))
+    except (ScenarioError, PlanError) as error:
+        raise ScenarioError(f"case {case.labels}: {error}") from error
+    every = max(1, plan.world.ticks // _KEPT)
+    first = plan.scenario.seed
+    flown = fly_all(plan, range(first, first + runs), every)
+    links = plan.world.links
+    heard = adjacency(np.ones(len(links), dtype=bool), links.src, links.dst, links.agents)
+    limits = bounds(plan.world.formation.nominal, heard, plan.world.covariance)
+    return Result(case.labels, flown, limits, ~plan.world.formation.is_leader)
+
+
+def judge(study: Study, results: list[Result]) -> list[Verdict]:
+    """The verdict on each of its claims."""
+    return [_judge(claim, results) for claim in study.claims]
+
+
+def _judge(claim: Claim, results: list[Result]) -> Verdict:
+    chosen = [one for one in results if _selected(one, claim.of)]
+    if not chosen:
+        raise ScenarioError(f"claim {claim.says!r}: no case has the labels {claim.of}")
+    span = (claim.since, claim.until)
+    match claim.check:
+        case "flat":
+            return claims.flat(claim.says, _means(chosen), claim.level or 2.0)
+        case "approaches":
+            other = [one for one in results if _selected(one, claim.to or {})]
+            return claims.approaches(claim.says, _means(chosen), _means(other), claim.level or 0.5)
+        case "lower":
+            other = [one for one in results if _selected(one, claim.to or {})]
+            return claims.lower(claim.says, _means(chosen), _means(other))
+        case "stays_below":
+            return claims.stays_below(claim.says, *_curves(chosen), claim.level or 1.0, span)
+        case "leaves":
+            return claims.leaves(claim.says, *_curves(chosen), claim.level or 1.0, span)
+        case "indicator_below_error":
+            (one,) = chosen
+            return claims.below_in_mean(claim.says, one.runs.seconds, _corrected(one), one.runs.error[..., None])
+
+
+def _corrected(one: Result) -> Array:
+    """The followers' indicators less their offset, over their slope: (psi - b) / c of (18), shape (R, T, F)."""
+    limits = one.bounds
+    corrected: Array = ((one.runs.psi - limits.offset) / limits.slope)[:, :, one.followers]
+    return corrected
+
+
+def _selected(result: Result, labels: Mapping[str, str]) -> bool:
+    return all(result.labels[name] == label for name, label in labels.items())
+
+
+def _means(results: list[Result]) -> Array:
+    return np.array([one.runs.mean_error for one in results])
+
+
+def _curves(results: list[Result]) -> tuple[Array, Array]:
+    return results[0].runs.seconds, np.concatenate([one.runs.error for one in results])
+
+
+def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
+    """Write data, figure and verdicts into a directory."""
+    from affinet import study_tables  # pyarrow and matplotlib take a while to import
+    from analysis import figures
+
+    out.mkdir(parents=True, exist_ok=True)
+    study_tables.write(out, results)
+    (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+    curves = [figures.Curve(one.labels, one.runs.seconds, one.runs.error, one.runs.mean_error) for one in results]
+    if study.figure == "curves":
+        figures.curves(out / "figure.png", study.title, curves, [axis.name for axis in study.axes])
+    elif study.figure == "sweep":
+        figures.sweep(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], study.along or "")
+    else:
+        (one,) = results
+        numbers = (np.flatnonzero(one.followers) + 1).tolist()
+        path = out / "figure.png"
+        figures.indicator(path, study.title, one.runs.seconds, one.runs.error, _corrected(one), numbers)

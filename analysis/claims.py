@@ -1,0 +1,92 @@
+"""Verdicts on what papers claim, from the numbers of many runs: each says what was found, whichever way it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Span = tuple[float, float | None]
+
+_STANDARD_ERRORS = 3.0
+_MOST = 0.9  # of the runs
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a claim holds at the settings of a study, and the figures that decided it."""
+
+    says: str
+    holds: bool
+    found: str
+
+
+def flat(says: str, mean_errors: Array, factor: float) -> Verdict:
+    """Over the cases (S, R), the mean over the runs varies by no more than a factor."""
+    means = _mean(mean_errors)
+    ratio = float(means.max() / means.min())
+    return Verdict(says, ratio <= factor, f"largest over smallest {ratio:.2f} (allowed {factor:g}): {_list(means)} m²")
+
+
+def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Verdict:
+    """From the last case to the first of (S, R), the mean comes to at least a share of the other's, from a smaller one."""
+    ratio = _mean(mean_errors) / _mean(others)
+    holds = bool(ratio[0] >= share and ratio[0] > ratio[-1])
+    return Verdict(says, holds, f"ratio to the other {_list(ratio)}, from the first case to the last")
+
+
+def lower(says: str, mean_errors: Array, others: Array) -> Verdict:
+    """In every case (S, R), the mean is below the other's by three standard errors; runs are paired by their draws."""
+    difference = others - mean_errors
+    mean, error = _mean(difference), difference.std(axis=1, ddof=1) / np.sqrt(difference.shape[1])
+    return Verdict(
+        says, bool((mean > _STANDARD_ERRORS * error).all()), f"lower by {_list(mean)} m² (one s.e. {_list(error)})"
+    )
+
+
+def stays_below(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
+    """In most runs (R, T) the error stays below a level all through a span of seconds."""
+    within = _within(seconds, span)
+    below = (error[:, within] < level).all(axis=1)
+    return Verdict(says, bool(below.mean() >= _MOST), f"{below.mean():.0%} of the runs stay below {level:g} m²")
+
+
+def leaves(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
+    """In most runs (R, T) the error comes above a level at some time in a span of seconds, or is no number any more."""
+    within = _within(seconds, span)
+    above = ~(error[:, within] < level).all(axis=1)
+    return Verdict(says, bool(above.mean() >= _MOST), f"{above.mean():.0%} of the runs come above {level:g} m²")
+
+
+def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Verdict:
+    """Values (R, T, N) lie below a bound (R, T, 1) in the mean over the runs at all times, within three standard errors."""
+    excess = values - bound
+    mean = excess.mean(axis=0)
+    error = excess.std(axis=0, ddof=1) / np.sqrt(len(excess))
+    above = np.argwhere(mean > _STANDARD_ERRORS * error)
+    if not len(above):
+        return Verdict(
+            says, True, f"at all of {len(seconds)} moments, for all {values.shape[-1]}; closest {mean.max():.3g} m²"
+        )
+    tick, which = above[0]
+    share = len(above) / mean.size
+    return Verdict(
+        says, False, f"above at {share:.1%} of the moments, first at {seconds[tick]:g} s by {mean[tick, which]:.3g} m²"
+    )
+
+
+def _mean(runs: Array) -> Array:
+    with np.errstate(invalid="ignore", over="ignore"):
+        means: Array = np.where(np.isfinite(runs).all(axis=1), runs.mean(axis=1), np.inf)
+    return means
+
+
+def _within(seconds: Array, span: Span) -> NDArray[np.bool_]:
+    since, until = span
+    return (seconds >= since) & (seconds <= (np.inf if until is None else until))
+
+
+def _list(values: Array) -> str:
+    return ", ".join(f"{value:.3g}" for value in values.tolist())

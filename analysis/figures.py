@@ -1,0 +1,105 @@
+"""Figures like those of the papers: mean and one standard deviation over the runs, logarithmic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
+_LINE_STYLES = ("-", "--", ":", "-.")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The error of many runs of one case: labels, moments (T,), error (R, T), and the mean error of each run (R,)."""
+
+    labels: Mapping[str, str]
+    seconds: Array
+    error: Array
+    mean_error: Array
+
+
+def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) -> None:
+    """Error over time: a panel for each label of the first axis and each of the second, a curve for each of the third."""
+    across, down, each = axes
+    columns, rows = _labels(cases, across), _labels(cases, down)
+    figure = Figure(figsize=(3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
+    panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    for case in cases:
+        panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
+        _draw(panel, case, case.labels[each])
+        panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
+    _finish(figure, panels, title, "time (s)", "tracking error (m²)", each)
+    figure.savefig(path)
+
+
+def sweep(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], along: str) -> None:
+    """Mean error along one axis: a panel for each label of the first other axis, a curve for each of the second."""
+    across, each = [name for name in axes if name != along]
+    columns = _labels(cases, across)
+    figure = Figure(figsize=(3.6 * len(columns), 3.0), layout="constrained", dpi=160)
+    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)
+    for panel, column in zip(panels[0], columns, strict=True):
+        for label in _labels(cases, each):
+            chosen = [one for one in cases if one.labels[across] == column and one.labels[each] == label]
+            where = [float(one.labels[along]) for one in chosen]
+            runs = np.array([_finite(one.mean_error) for one in chosen])
+            panel.errorbar(where, runs.mean(axis=1), yerr=runs.std(axis=1), label=label, marker="o", ms=3, capsize=2)
+        panel.set_title(column)
+    _finish(figure, panels, title, along, "mean tracking error (m²)", each)
+    figure.savefig(path)
+
+
+def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: Array, numbers: Sequence[int]) -> None:
+    """Mean tracking error (R, T), and mean corrected indicators (R, T, F) of the followers with these numbers."""
+    figure = Figure(figsize=(4.6, 3.0), layout="constrained", dpi=160)
+    panel = figure.subplots()
+    for place, number in enumerate(numbers):
+        panel.plot(seconds, _positive(corrected[:, :, place].mean(axis=0)), lw=0.8, label=f"agent {number}")
+    panel.plot(seconds, error.mean(axis=0), color="black", lw=1.2, label="tracking error")
+    _finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
+    figure.savefig(path)
+
+
+def _draw(panel: Axes, case: Curve, label: str) -> None:
+    error = _finite(case.error)
+    mean, deviation = error.mean(axis=0), error.std(axis=0)
+    (line,) = panel.plot(case.seconds, mean, lw=1.0, label=label)
+    panel.fill_between(
+        case.seconds, _positive(mean - deviation), mean + deviation, color=line.get_color(), alpha=0.15, lw=0
+    )
+
+
+def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
+    figure.suptitle(title)
+    for panel in panels.ravel():
+        panel.set_yscale("log")
+    for panel in panels[-1]:
+        panel.set_xlabel(x)
+    for panel in panels[:, 0]:
+        panel.set_ylabel(y)
+    panels[0, -1].legend(title=legend, fontsize=7)
+
+
+def _labels(cases: Sequence[Curve], axis: str) -> list[str]:
+    return list(dict.fromkeys(case.labels[axis] for case in cases))
+
+
+def _finite(values: Array) -> Array:
+    """What can be drawn: a run that has diverged leaves at the top."""
+    return np.nan_to_num(np.minimum(values, 1e12), nan=1e12)
+
+
+def _positive(values: Array) -> Array:
+    """What a logarithmic axis can show: nothing below zero."""
+    shown: Array = np.where(values > 0.0, values, np.nan)
+    return shown
