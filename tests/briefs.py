@@ -1,0 +1,46 @@
+"""Agents without a swarm: their briefs, and what they hear."""
+
+import numpy as np
+
+from agents.brief import Brief
+from agents.estimators.base import Heard
+from netem.channels import THETA
+from netem.links import Links
+
+HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
+OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
+
+
+def brief(relative, covariance=None):
+    """An agent with neighbours at these nominal relative positions; with leading axes, many."""
+    relative = np.asarray(relative, dtype=float)
+    return Brief(
+        dt=0.1,
+        nominal=np.zeros((*relative.shape[:-2], relative.shape[-1])),
+        relative=relative,
+        present=(relative != 0).any(axis=-1),
+        stress=np.ones(relative.shape[:-1]),
+        covariance=0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance,
+        leader=np.zeros(relative.shape[:-2], dtype=bool),
+        mission=None,
+    )
+
+
+def swarm(formation):
+    """Every agent of a formation, and the rows of its neighbours."""
+    links = Links.both_ways(formation.agents, formation.edges)
+    relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
+    return brief(np.where(links.present[..., None], relative, 0.0)), links
+
+
+def hears(who, **fields):
+    return {THETA: Heard({name: np.asarray(value) for name, value in fields.items()}, np.asarray(who))}
+
+
+def silence(n, dimension=2):
+    nothing, no = np.zeros((n, dimension, dimension)), np.zeros(n, dtype=bool)
+    return hears(no, local=nothing, feasible=no, consensus=nothing, started=no)
+
+
+def only(n, *rows):
+    return np.isin(np.arange(n), rows)
