@@ -12,6 +12,7 @@ from agents.controllers import ConstantVelocity, Static, VaryingVelocity
 from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.estimators.imm import InteractingMultipleModel
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
@@ -33,6 +34,9 @@ ESTIMATORS = {
     "conral-similarity": ConsensusLocalization(constraint="similarity"),
     "ga-rkf-ral-rotation": GeometryAwareFilter(geometry="ral", constraint="rotation", penalty=False),
     "ga-rkf-conral-similarity": GeometryAwareFilter(constraint="similarity"),
+    "rkf-constant-velocity": RelativeKalmanFilter(model="constant-velocity"),
+    "ga-rkf-conral-random-walk": GeometryAwareFilter(model="random-walk"),
+    "imm": InteractingMultipleModel(),
 }
 LAWS = {
     "static": Static(),

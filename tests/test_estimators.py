@@ -2,60 +2,22 @@
 
 import numpy as np
 import pytest
+from briefs import HEXA4, OCTAHEDRON, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.brief import Brief
 from agents.estimators import geometry, kalman, small
-from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.constraints import MAPS
 from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.estimators.imm import InteractingMultipleModel
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import THETA, RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
-from netem.links import Links
 from world.formation import PRESETS
 
-HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
-OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
 R = np.array([[0.01, 0.003], [0.003, 0.02]])
 AFFINE = MAPS["affine"]
-
-
-def brief(relative, covariance=None):
-    """An agent with neighbours at these nominal relative positions; with leading axes, many."""
-    relative = np.asarray(relative, dtype=float)
-    return Brief(
-        dt=0.1,
-        nominal=np.zeros((*relative.shape[:-2], relative.shape[-1])),
-        relative=relative,
-        present=(relative != 0).any(axis=-1),
-        stress=np.ones(relative.shape[:-1]),
-        covariance=0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance,
-        leader=np.zeros(relative.shape[:-2], dtype=bool),
-        mission=None,
-    )
-
-
-def swarm(formation):
-    """Every agent of a formation, and the rows of its neighbours."""
-    links = Links.both_ways(formation.agents, formation.edges)
-    relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
-    return brief(np.where(links.present[..., None], relative, 0.0)), links
-
-
-def hears(who, **fields):
-    return {THETA: Heard({name: np.asarray(value) for name, value in fields.items()}, np.asarray(who))}
-
-
-def silence(n, dimension=2):
-    nothing, no = np.zeros((n, dimension, dimension)), np.zeros(n, dtype=bool)
-    return hears(no, local=nothing, feasible=no, consensus=nothing, started=no)
-
-
-def only(n, *rows):
-    return np.isin(np.arange(n), rows)
 
 
 # No estimator
@@ -343,7 +305,7 @@ def test_rkf_is_the_textbook_filter(dimension):
 
 
 def test_transition_and_process_noise_are_those_of_eqs_20_and_21_axis_by_axis():
-    F, Q = kalman.constant_acceleration(2, 0.1, 3.0)
+    F, Q = kalman.motion("constant-acceleration", 2, 0.1, 3.0)
     x = [0, 2, 4]  # of the first axis: position, velocity, acceleration
     np.testing.assert_allclose(F[np.ix_(x, x)], [[1, 0.1, 0.005], [0, 1, 0.1], [0, 0, 1]])
     np.testing.assert_allclose(Q[np.ix_(x, x)], 9 * np.array([[25e-6, 5e-4, 5e-3], [5e-4, 0.01, 0.1], [5e-3, 0.1, 1]]))
@@ -451,6 +413,8 @@ ESTIMATORS = [
     RelativeAffineLocalization("similarity"),
     ConsensusLocalization(constraint="rotation"),
     GeometryAwareFilter(constraint="similarity", penalty=False),
+    RelativeKalmanFilter(model="random-walk"),
+    InteractingMultipleModel(),
 ]
 
 

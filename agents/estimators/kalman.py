@@ -1,42 +1,69 @@
 """The Kalman core: predict and correct, over stacks of independent filters.
 
-The state of one relative edge stacks position, velocity and acceleration, D numbers each, so that the observed position is
-its first D entries. Sums run in `matmul`, matrix by matrix: a stack of filters gives the bits of each alone.
+The state of one relative edge stacks position, velocity and acceleration, D numbers each, as far as the model of motion has
+them, so that the observed position is its first D entries. Sums run in `matmul`, matrix by matrix: a stack of filters gives
+the bits of each alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from agents.brief import Array, Mask
 from agents.estimators.small import inverse
 
+Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
+
+# How many of position, velocity and acceleration are in the state.
+ORDER: Mapping[Model, int] = {"random-walk": 1, "constant-velocity": 2, "constant-acceleration": 3}
+
 
 @cache
-def constant_acceleration(dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
-    """Transition F and process covariance Q of the constant-acceleration model (paper 000, eqs. 20-21).
+def motion(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
+    """Transition F and process covariance Q of a model of motion.
+
+    The model of paper 000, (20)-(21), is "constant-acceleration". The others end the Taylor series earlier: what drives them is
+    a white acceleration or a white velocity, held for a tick.
 
     Parameters
     ----------
+    model
+        Which.
     dimension
         D.
     dt
         Tick, in seconds.
     sigma_w
-        Standard deviation of the acceleration, in metres per second squared.
+        Standard deviation of what drives it: of the acceleration, in metres per second squared, with constant acceleration
+        (its step from tick to tick) and with constant velocity; of the velocity, in metres per second, with a random walk.
 
     Returns
     -------
     tuple of Array
-        Both (3 D, 3 D), ordered (position, velocity, acceleration).
+        Both (S, S), with S = 3 D, 2 D or D; ordered (position, velocity, acceleration).
     """
-    identity = np.eye(dimension)
-    transition = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-    deflection = np.array([dt**2 / 2, dt, 1.0])
-    F = np.kron(transition, identity)
-    Q = sigma_w**2 * np.kron(np.outer(deflection, deflection), identity)
+    F, Q = embedded(model, dimension, dt, sigma_w)
+    size = ORDER[model] * dimension
+    return F[:size, :size], Q[:size, :size]
+
+
+@cache
+def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
+    """A model of motion in a state of three derivatives, whichever it has itself: F and Q, both (3 D, 3 D).
+
+    The first derivative that the model leaves out is the noise that drives it, a fresh one in every tick; those beyond are 0.
+    The rest moves exactly as in `motion`.
+    """
+    order = ORDER[model]
+    taylor = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    transition = np.where(np.arange(3) < order, taylor, 0.0)
+    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt**2 / 2, dt, 1.0])
+    axes = np.eye(dimension)
+    F, Q = np.kron(transition, axes), sigma_w**2 * np.kron(np.outer(deflection, deflection), axes)
     return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
 
 

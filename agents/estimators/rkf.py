@@ -17,7 +17,7 @@ from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicat
 
 
 class Tracks(NamedTuple):
-    """The edge filters: mean (..., n, 3 D), covariance (..., n, 3 D, 3 D), and whether ever corrected (..., n)."""
+    """The edge filters: mean (..., n, S), covariance (..., n, S, S), and whether ever corrected (..., n)."""
 
     mean: Array
     covariance: Array
@@ -26,43 +26,49 @@ class Tracks(NamedTuple):
 
 @dataclass(frozen=True)
 class EdgeFilters:
-    """A constant-acceleration filter for every edge (19)-(21).
+    """A filter for every edge: constant acceleration (19)-(21), or another model of its motion.
 
     Parameters
     ----------
     sigma_w
-        Standard deviation of the acceleration in the model, in metres per second squared.
+        Standard deviation of the noise that drives the model: of the acceleration, in metres per second squared; with a random
+        walk of the velocity, in metres per second.
     prior_position, prior_velocity, prior_acceleration
-        Standard deviations before the first measurement, in SI units.
+        Standard deviations before the first measurement, in SI units, as far as the model has them.
+    model
+        How a relative position moves (`kalman.motion`).
     """
 
     sigma_w: float = 0.5
     prior_position: float = 10.0
     prior_velocity: float = 2.0
     prior_acceleration: float = 1.0
+    model: kalman.Model = "constant-acceleration"
 
     def unknown(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
         """All edges unknown."""
         shape = (*batch, brief.relative.shape[-2])
-        prior = np.repeat([self.prior_position, self.prior_velocity, self.prior_acceleration], brief.dimension)
+        deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
+        prior = np.repeat(deviations[: kalman.ORDER[self.model]], brief.dimension)
         covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
         return Tracks(np.zeros((*shape, len(prior))), covariance, np.zeros(shape, dtype=bool))
 
     def advance(self, brief: Brief, tracks: Tracks, position: Array, R: Array, usable: Mask) -> Tracks:
         """All filters one tick ahead, corrected by positions (..., n, D) with covariances R (..., n, D, D) where usable."""
-        F, Q = kalman.constant_acceleration(brief.dimension, brief.dt, self.sigma_w)
+        F, Q = kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
         predicted = kalman.predict(tracks.mean, tracks.covariance, F, Q)
         return Tracks(*kalman.correct(*predicted, position, R, usable), tracks.known | usable)
 
     def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
         """What the filters say."""
         dimension = brief.dimension
+        moves = kalman.ORDER[self.model] > 1
         return Estimate(
             relative=tracks.mean[..., :dimension],
             known=tracks.known,
             covariance=tracks.covariance[..., :dimension, :dimension],
             psi=psi,
-            relative_velocity=tracks.mean[..., dimension : 2 * dimension],
+            relative_velocity=tracks.mean[..., dimension : 2 * dimension] if moves else None,
         )
 
 

@@ -1,0 +1,155 @@
+"""Interacting multiple models (named in paper 000, section VI-A): three ways to move, weighed by how well they predict.
+
+The estimator is the one of Blom and Bar-Shalom (1988). All models share a state of position, velocity and acceleration
+(`kalman.embedded`), so that mixing compares like with like. Each filter starts at zero with a wide prior, so the first
+measurement sets it; before that, its edge is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask
+from agents.estimators import kalman
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.small import determinant, inverse
+
+
+class Modes(NamedTuple):
+    """The filters of every edge, one a model.
+
+    Their means (..., n, 3, S) and covariances (..., n, 3, S, S), how probable each model is (..., n, 3), and which edges were
+    ever corrected (..., n). S = 3 D.
+    """
+
+    mean: Array
+    covariance: Array
+    probability: Array
+    known: Mask
+
+
+@dataclass(frozen=True)
+class InteractingMultipleModel:
+    """IMM over constant acceleration, constant velocity and a random walk, in this order.
+
+    Parameters
+    ----------
+    stay
+        Probability that an edge moves by the same model in the next tick, in (0, 1); the other two share the rest.
+    sigma_constant_acceleration, sigma_constant_velocity
+        Standard deviations of the acceleration that drives these models, in metres per second squared.
+    sigma_random_walk
+        Of the velocity that drives this one, in metres per second.
+    prior_position, prior_velocity, prior_acceleration
+        Standard deviations before the first measurement, in SI units.
+    """
+
+    stay: float = 0.98
+    sigma_constant_acceleration: float = 0.5
+    sigma_constant_velocity: float = 0.5
+    sigma_random_walk: float = 1.0
+    prior_position: float = 10.0
+    prior_velocity: float = 2.0
+    prior_acceleration: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.stay < 1.0:
+            raise ValueError(f"stay is a probability strictly between 0 and 1, not {self.stay}")
+
+    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+        """Nothing: a neighbour's measurements of others say nothing of this edge."""
+        return {}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Modes:
+        """All edges unknown, all models as probable."""
+        shape = (*batch, brief.relative.shape[-2])
+        prior = np.repeat([self.prior_position, self.prior_velocity, self.prior_acceleration], brief.dimension)
+        covariance = np.broadcast_to(np.diag(prior**2), (*shape, 3, len(prior), len(prior))).copy()
+        mean, probability = np.zeros((*shape, 3, len(prior))), np.full((*shape, 3), 1.0 / 3.0)
+        return Modes(mean, covariance, probability, np.zeros(shape, dtype=bool))
+
+    def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
+        """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""
+        F, Q, chain = self._models(brief.dimension, brief.dt)
+        expected = (state.probability[..., None, :] @ chain)[..., 0, :]
+        weights = chain * state.probability[..., :, None] / expected[..., None, :]
+        mean, covariance = _mix(state.mean, state.covariance, weights)
+        mean, covariance = (F @ mean[..., None])[..., 0], F @ covariance @ np.swapaxes(F, -1, -2) + Q
+        observed, usable = measured[..., None, :], seen[..., None]
+        surprise = _surprise(mean, covariance, observed, brief.covariance)
+        mean, covariance = kalman.correct(mean, covariance, observed, brief.covariance, usable)
+        probability = np.where(usable, _weighed(expected, surprise), expected)
+        return Modes(mean, covariance, probability, state.known | seen), {}
+
+    def fuse(
+        self,
+        brief: Brief,
+        state: Modes,
+        heard: Mapping[str, Heard],  # noqa: ARG002
+    ) -> tuple[Modes, Estimate]:
+        """The mean over the models, and the covariance about it."""
+        mixed = _mix(state.mean, state.covariance, state.probability[..., :, None])
+        mean, covariance = mixed[0][..., 0, :], mixed[1][..., 0, :, :]
+        dimension = brief.dimension
+        return state, Estimate(
+            relative=mean[..., :dimension],
+            known=state.known,
+            covariance=covariance[..., :dimension, :dimension],
+            psi=no_indicator(state.known),
+            relative_velocity=mean[..., dimension : 2 * dimension],
+        )
+
+    def _models(self, dimension: int, dt: float) -> tuple[Array, Array, Array]:
+        sigmas = (self.sigma_constant_acceleration, self.sigma_constant_velocity, self.sigma_random_walk)
+        return _stacked(dimension, dt, sigmas, self.stay)
+
+
+@cache
+def _stacked(dimension: int, dt: float, sigmas: tuple[float, float, float], stay: float) -> tuple[Array, Array, Array]:
+    """F and Q of all models, (3, S, S) each, and the Markov chain (3, 3) between them, from the row to the column."""
+    names: tuple[kalman.Model, ...] = ("constant-acceleration", "constant-velocity", "random-walk")
+    pairs = [kalman.embedded(name, dimension, dt, sigma) for name, sigma in zip(names, sigmas, strict=True)]
+    chain = np.full((3, 3), (1.0 - stay) / 2) + (stay - (1.0 - stay) / 2) * np.eye(3)
+    return np.stack([F for F, _ in pairs]), np.stack([Q for _, Q in pairs]), chain
+
+
+def _mix(mean: Array, covariance: Array, weights: Array) -> tuple[Array, Array]:
+    """Means (..., m, S) and covariances (..., m, S, S) of m mixtures of the filters.
+
+    Parameters
+    ----------
+    mean, covariance
+        Of the filters, shapes (..., 3, S) and (..., 3, S, S).
+    weights
+        Shape (..., 3, m).
+    """
+    size = mean.shape[-1]
+    columns = np.swapaxes(weights, -1, -2)
+    centre = columns @ mean
+    within = (columns @ covariance.reshape(*covariance.shape[:-2], size * size)).reshape(*centre.shape, size)
+    apart = mean[..., None, :, :] - centre[..., :, None, :]
+    between = np.swapaxes(apart, -1, -2) @ (columns[..., None] * apart)
+    return centre, within + between
+
+
+def _surprise(mean: Array, covariance: Array, observed: Array, R: Array) -> Array:
+    """Twice the negative log-likelihood of a position under each filter, shape (..., 3), up to a constant."""
+    dimension = observed.shape[-1]
+    S = covariance[..., :dimension, :dimension] + R
+    innovation = observed - mean[..., :dimension]
+    squared = (innovation * (inverse(S) @ innovation[..., None])[..., 0]).sum(axis=-1)
+    surprise: Array = squared + np.log(determinant(S))
+    return surprise
+
+
+def _weighed(expected: Array, surprise: Array) -> Array:
+    # Against the least surprised, so that a measurement far from all of them does not underflow to 0 / 0.
+    likelihood = np.exp(-0.5 * (surprise - surprise.min(axis=-1, keepdims=True)))
+    weighed = expected * likelihood
+    probability: Array = weighed / weighed.sum(axis=-1, keepdims=True)
+    return probability
