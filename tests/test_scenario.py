@@ -267,7 +267,7 @@ WRONG_OVERRIDES = [
     ("seed=", "seed", "valid integer"),
     ("time.dt=0.007", "time", "duration 1 s is not a whole number of ticks of 0.007 s"),
     ("formation.preset=zhao8", "formation", "there are zhao7, hexa10"),
-    ("agents.estimator=kalman", "agents.estimator", "there are conral, ga-rkf, none, ral, rkf"),
+    ("agents.estimator=kalman", "agents.estimator", "there are conral, ga-rkf, imm, none, ral, rkf"),
     ("agents.parameters.rkf.sigma=1", "agents.parameters.rkf.sigma", "rkf has sigma_w"),
     ("formation.leaders=[1, 2, 9]", "formation.leaders", "agents are 1 to 7"),
     ("network.availability", "network.availability", "write it as key=value, like network.availability=0.5"),
@@ -354,7 +354,7 @@ WRONG = [
         "must be symmetric and positive definite, in m2",
     ),
     # agents
-    ('"rkf"', '"kalman"', "agents.estimator", "no 'kalman'; there are conral, ga-rkf, none, ral, rkf, or give"),
+    ('"rkf"', '"kalman"', "agents.estimator", "no 'kalman'; there are conral, ga-rkf, imm, none, ral, rkf, or give"),
     ('"rkf"', '"no.such:Thing"', "agents.estimator", "cannot load no.such:Thing"),
     ('"static"', '"statik"', "agents.law", "no 'statik'; there are constant-velocity, static, varying-velocity"),
     ("sigma_w = 0.5", "sigma = 0.5", "agents.parameters.rkf.sigma", "rkf has sigma_w, prior_position"),
