@@ -70,6 +70,9 @@ class GeometryAwareFilter(EdgeFilters):
         shape, observed = self._shaper.fuse(brief, state.shape, heard)
         trusted = np.isfinite(observed.psi)
         R = observed.covariance
+        if self.constraint != "affine":
+            # What lies outside its class a constrained map cannot see: alone it would be believed absolutely there.
+            R = R + np.where(seen[..., None, None], 0.0, brief.covariance)
         if self.penalty:
             doubt = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
             R = R + doubt[..., None, None] * identity(brief.dimension)
