@@ -187,8 +187,13 @@ def _run(parsed: argparse.Namespace) -> int:
 
 def _replay(parsed: argparse.Namespace) -> int:
     overrides = _overrides(parsed)
+    from netem.journal import JournalError  # pyarrow takes a while to import
+
     plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts)
-    status = _fly(plan, "replay", parsed)
+    try:
+        status = _fly(plan, "replay", parsed)
+    except JournalError as error:
+        raise ScenarioError(f"{parsed.directory}: {error}") from error
     flown, again = parsed.directory / history.FILE, parsed.out / history.FILE
     if overrides or not flown.exists() or not again.exists():
         return status  # it was to be another run, or one of the two left nothing to compare

@@ -573,9 +573,9 @@ def test_a_fault_holds_its_links_and_all_links_of_its_agents():
         (Fault(Verb.PAUSE, 0, 1, agents=(1, 3)), "pause 1,3", "resume 1,3"),
         (Fault(Verb.DELAY, 0, 1, pairs=((1, 2),), seconds=0.3), "delay 0.3 s on 1->2", "heal: delay 0.3 s on 1->2"),
         (
-            Fault(Verb.DEGRADE, 0, 1, pairs=((1, 2),), profile=2),
-            "degrade to profile 2 on 1->2",
-            "heal: degrade to profile 2 on 1->2",
+            Fault(Verb.DEGRADE, 0, 1, pairs=((1, 2),), profile=2, profile_name="lora"),
+            "degrade to 'lora' on 1->2",
+            "heal: degrade to 'lora' on 1->2",
         ),
         (Fault(Verb.CLOCK, 0, 1, agents=(1,), rate=0.5), "clock +0.5 s/s of 1", "heal: clock +0.5 s/s of 1"),
         (

@@ -272,7 +272,6 @@ def test_what_is_hidden_by_another_fault_changes_nothing(name, flown):
     assert flown(*entries, over=over).outcome.digest == flown(*entries[:-1], over=over).outcome.digest
 
 
-@pytest.mark.xfail(reason="bites count messages that another fault, or the network itself, took hold of", strict=True)
 @pytest.mark.parametrize("name", UNNOTICED)
 def test_what_touches_nothing_beside_another_fault_makes_the_run_vacuous(name, flown):
     entries, over = UNNOTICED[name]

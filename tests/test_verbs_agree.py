@@ -117,7 +117,6 @@ def test_a_run_over_processes_is_flown_again_under_its_verdicts(twice, tmp_path)
     assert flown(planning.again(out, (), verdicts=True), "inprocess", tmp_path / "again").digest == many.digest
 
 
-@pytest.mark.xfail(reason="the medium judges the tick after the last, of which no journal speaks", strict=True)
 def test_under_its_verdicts_another_seed_meets_the_same_air_in_both_runtimes(tmp_path):
     """No trigger waits for an error, which depends on the noise, and nobody is drawn by lot."""
     overrides, script = SCRIPTS["a tick late"]
@@ -149,7 +148,6 @@ NOTHING_TO_REMEMBER = {
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="a process that did nothing yet leaves no checkpoint, or that of the one before", strict=True)
 @pytest.mark.parametrize("name", NOTHING_TO_REMEMBER)
 def test_who_did_nothing_yet_comes_back_warm_with_nothing_in_both_runtimes(name, tmp_path):
     plan = plan_of("corridor", "time.duration=1", *COARSE, timeline(*NOTHING_TO_REMEMBER[name]))
