@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -174,13 +175,15 @@ def main() -> None:
     brief = supervisor.brief(WorldBrief)
     with zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
-        with Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook:
+        with (
+            ExitStack() as last,
+            Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook,
+        ):
             theatre.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")
-            try:
-                with supervisor.confessing():
-                    theatre.run(logbook)
-            finally:
-                theatre.history.save(Path(brief.out) / ARRAYS)
+            # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
+            last.callback(theatre.history.save, Path(brief.out) / ARRAYS)
+            with supervisor.confessing():
+                theatre.run(logbook)
         supervisor.tell("done", uninstructed=theatre.uninstructed)
