@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import zenoh
@@ -21,8 +22,10 @@ from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
 from world.history import History, Moment, Vigil, gather
-from world.logbook import Logbook
 from world.world import Scene
+
+if TYPE_CHECKING:
+    from world.logbook import Logbook
 
 
 class Theatre:
@@ -173,6 +176,8 @@ def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
     brief = supervisor.brief(WorldBrief)
+    from world.logbook import Logbook  # takes a second to import: the lifeline is to be watched by then
+
     with zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
         with (
