@@ -51,7 +51,7 @@ def test_a_liar_moves_those_who_believe_and_not_those_who_measure(swarm):
 
 
 def test_a_leader_whose_clock_gains_is_followed_and_comes_back(swarm):
-    """Leaders fly by the clock: one that lost its satellites runs ahead, and bends the formation until it is set right."""
+    """Leaders fly by the clock: one that lost its satellites runs ahead, and bends the formation until set right."""
     run = swarm("corridor", COARSE, "time.duration=16.5").fault("clock", agents=[1], rate=0.2, at=8, until=12)
     run.fly().check(recovers(0.2, within=4), bounded(2))
 
