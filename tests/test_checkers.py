@@ -103,9 +103,9 @@ GUST = {"verb": "gust", "at": 1.0, "lasts": 0.5, "agents": [7], "velocity": [3.0
 
 
 def test_recovers_passes_after_a_gust_that_the_law_makes_good():
-    run = evidence(timeline(GUST), "formation.spread=0.0", "time.duration=8")
-    assert run.error[20:30].max() > 0.1
-    found = checkers.recovers(0.1, within=4.0)(run)
+    run = evidence(timeline(GUST), "formation.spread=0.0", "time.duration=4")
+    assert run.error[20:30].max() > 0.3
+    found = checkers.recovers(0.3, within=2.0)(run)
     assert verdict(found) == ("pass", None)
     assert found.says == "after 1 faults"
 
@@ -163,7 +163,6 @@ def test_recovers_is_vacuous_when_no_fault_lifted_the_error():
     assert verdict(checkers.recovers(1.0, within=1.0)(with_error(under(CUT), 0.5))) == ("vacuous", None)
 
 
-@pytest.mark.xfail(reason="a fault that begins in the very tick in which the other ends is overlooked")
 def test_recovers_does_not_look_at_a_fault_whose_end_is_the_beginning_of_the_next():
     entries = CUT | {"until": 1.5}, CUT | {"at": 1.5, "until": 3.5}
     found = checkers.recovers(1.0, within=1.0)(with_error(under(*entries), lifted(75)))
@@ -174,7 +173,7 @@ def test_recovers_fails_after_the_first_fault_that_is_not_made_good():
     entries = CUT | {"at": 0.5, "until": 1.0}, CUT | {"at": 2.0, "until": 2.5}
     error = np.where(np.arange(TICKS) < 25, 0.01, 5.0)
     error[15] = 5.0
-    assert verdict(checkers.recovers(1.0, within=0.5)(with_error(under(*entries), error))) == ("fail", 60)
+    assert verdict(checkers.recovers(1.0, within=0.5)(with_error(under(*entries), error))) == ("fail", 30)
 
 
 PARTITION = {"verb": "partition", "at": 1.0, "until": 2.0, "groups": [[1, 2, 3], [4, 5, 6, 7]]}
@@ -287,7 +286,6 @@ def test_a_filter_is_judged_as_by_hand():
     assert found.says.startswith(f"{1 - outside.mean():.1%} of the ticks inside the band")
 
 
-@pytest.mark.xfail(reason="of the ticks of an honest sensor 99 % are inside the band, so every other run has fewer")
 @pytest.mark.parametrize("level", [0.9, 0.99])
 def test_an_honest_sensor_is_consistent_whatever_the_seed(level):
     verdicts = [checkers.consistent(level)(evidence(*HONEST, f"seed={seed}")).verdict for seed in range(1, 13)]
@@ -360,7 +358,6 @@ def test_a_position_that_is_no_number_is_not_free_of_collisions():
     assert verdict(checkers.collision_free(0.2)(broken)) == ("fail", 17)
 
 
-@pytest.mark.xfail(reason="numbers of a diverged run overflow in the checker, and that warns", raises=RuntimeWarning)
 @pytest.mark.parametrize("checker", [checkers.energy(1.0), checkers.collision_free(0.2)], ids=lambda c: c.name)
 def test_a_run_that_diverged_is_judged_without_warnings(checker):
     run = evidence()

@@ -119,7 +119,6 @@ def test_the_same_seed_hunts_the_same_and_another_does_not():
     assert chases[0] != chases[2]
 
 
-@pytest.mark.xfail(reason="Hypothesis cannot delete one fault before the last, so needless ones stay")
 def test_no_fault_that_is_found_can_be_left_out():
     given_to = scenario.load("corridor", ("time.dt=0.05", "time.duration=2", 'agents.estimator="rkf"'))
     quarry, _ = hunt.hunt(
