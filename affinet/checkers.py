@@ -14,7 +14,7 @@ import numpy as np
 
 from affinet.evidence import Evidence
 from analysis import consistency
-from netem.fault import Verb
+from netem.fault import Fault, Verb
 from netem.links import Integers, Mask
 from world import sensors
 from world.formation import Array
@@ -149,9 +149,7 @@ def recovers(level: float, within: float) -> Checker:
         faults = [bite.fault for bite in evidence.bites if bite.at is not None]
         spent = 0
         for fault in sorted(faults, key=lambda fault: fault.end or evidence.ticks):
-            if fault.end is None or any(
-                other is not fault and other.start < fault.end and other.active(fault.end) for other in faults
-            ):
+            if fault.end is None or _others_hold(faults, fault, fault.end):
                 continue
             deadline = fault.end + evidence.tick(within)
             following = [other.start for other in faults if other is not fault and other.start >= fault.end]
@@ -289,6 +287,10 @@ def summed_up(evidence: Evidence, findings: Sequence[Finding]) -> Verdict:
     verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
     ranked: tuple[Verdict, ...] = ("fail", "vacuous", "pass")
     return next(verdict for verdict in ranked if verdict in verdicts)
+
+
+def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:
+    return any(other is not fault and other.start < tick and other.active(tick) for other in faults)
 
 
 def _joined(sign: str, one: Checker, other: Checker, worst: tuple[Verdict, ...]) -> Checker:

@@ -479,4 +479,7 @@ def test_a_failure_outweighs_what_proved_nothing_and_that_outweighs_a_pass(run, 
 
 def test_a_finding_says_its_checker_verdict_and_reason():
     found = checkers.bounded(1e-9)(evidence())
-    assert str(found) == f"bounded(1e-09): fail: at 0 s (tick 0) the tracking error is {evidence().error[0]:.4g} m²"
+    assert (
+        str(found)
+        == f"bounded(1e-09): fail: at 0 s (tick 0) it does not hold; the error is {evidence().error[0]:.4g} m²"
+    )
