@@ -10,7 +10,7 @@ demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
 
 test: lint types imports ## everything that must hold, in minutes
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2
 
 test-all: lint types imports ## and the slow proofs
 	$(BIN)/pytest -m "slow or not slow" --timeout 1800

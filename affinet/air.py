@@ -76,7 +76,10 @@ def degraded(given: Scenario, formation: Formation, links: Links, message_bits: 
     with said_at(key):
         impairments.resolve(name, given.network.profiles)
     network = given.network.model_copy(update={"profile": name, "links": []})
-    return plan(given.model_copy(update={"network": network}), formation, links, message_bits)[0]
+    try:
+        return plan(given.model_copy(update={"network": network}), formation, links, message_bits)[0]
+    except ScenarioError as error:
+        raise ScenarioError(f"{key}: {error}") from error
 
 
 def message_bits(names: Sequence[str], spoken: Channels, links: Links, dimension: int) -> Array:

@@ -9,9 +9,10 @@ import numpy as np
 
 from affinet.plan import Plan
 from netem import lie
-from netem.fate import FATE_OF, Fate
+from netem.fate import FATE_OF, Fate, Fates
 from netem.fault import Fault, Verb
 from netem.links import Mask
+from netem.medium import Medium
 from netem.timeline import Timeline
 from world.history import Arrays
 
@@ -80,17 +81,19 @@ def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tup
         case Verb.CLOCK:
             wrong = lambda tick: plan.told_mission & ~timeline.at(tick).idle & (timeline.clock(tick) != tick)  # noqa: E731
             return _agent_ticks(span, fault, wrong), "ticks of agents that fly by the clock"
-        case Verb.BIAS | Verb.FREEZE:
+        case Verb.FREEZE:
             return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
+        case Verb.BIAS:
+            return int((_working(timeline, span, fates) & held).sum()), "measurements"
         case Verb.OUTLIER:
-            seen = fates[:, 0] == Fate.DELIVERED
-            hits = [
-                plan.world.outliers(tick, timeline.at(tick)) & held & here
-                for tick, here in zip(span, seen, strict=True)
-            ]
-            return int(np.sum(hits)), "measurements"
+            hits = np.reshape(
+                [plan.world.outliers(tick, timeline.at(tick)) & held for tick in span], (len(span), len(held))
+            )
+            return int((_working(timeline, span, fates) & hits.astype(bool)).sum()), "measurements"
         case Verb.LIE:
             return _told(plan, fault, fates), "messages"
+        case Verb.LOSE | Verb.DROPOUT | Verb.DELAY | Verb.DEGRADE if plan.journal is None:
+            return _otherwise(plan, timeline, number, arrays), "messages"
         case Verb.DEGRADE:
             return int((fates[:, :, held] > Fate.DELIVERED).sum()), "messages"
     return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
@@ -99,6 +102,32 @@ def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tup
 def _agent_ticks(span: range, fault: Fault, which: Any) -> int:
     agents = np.array(fault.agents) - 1
     return sum(int(which(tick)[agents].sum()) for tick in span)
+
+
+def _working(timeline: Timeline, span: range, fates: Fates) -> Mask:
+    """Measurements that arrived, and are not those of a sensor that repeats itself, shape (T, L)."""
+    frozen = [timeline.at(tick).frozen for tick in span]
+    working: Mask = (fates[:, 0] == Fate.DELIVERED) & ~np.reshape(frozen, fates[:, 0].shape).astype(bool)
+    return working
+
+
+def _otherwise(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> int:
+    """How many messages would have fared otherwise without a fault: by judging all of them again, with it and without."""
+    fault, faults = timeline.faults[number], timeline.faults
+    without = Timeline(
+        timeline.links, [other for place, other in enumerate(faults) if place != number], timeline.triggers
+    )
+    media = [Medium(plan.scenario.seed, plan.channels, plan.profiles, each) for each in (timeline, without)]
+    airs, changed = [medium.begin() for medium in media], 0
+    last = len(arrays["fates"]) if fault.end is None else min(fault.end, len(arrays["fates"]))
+    for tick in range(last):
+        offered, fared = arrays["fates"][tick] != Fate.SILENT, []
+        for place, medium in enumerate(media):
+            air, verdicts = medium.judge(airs[place], tick, offered, arrays["position"][tick])
+            airs[place], _ = medium.deliver(air, tick, verdicts)
+            fared.append(np.where(verdicts.fate <= Fate.DELAYED, verdicts.due, -1))
+        changed += int((fared[0] != fared[1]).sum()) if tick >= fault.start else 0
+    return changed
 
 
 def _told(plan: Plan, fault: Fault, fates: Any) -> int:

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -124,6 +125,12 @@ def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     inject.set_defaults(command=_inject)
 
 
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
+    return int(text)
+
+
 def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     hunt = commands.add_parser(
         "hunt",
@@ -140,7 +147,9 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         metavar="CHECKER",
         help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'",
     )
-    hunt.add_argument("--budget", type=int, default=100, metavar="N", help="schedules to draw (default: %(default)s)")
+    hunt.add_argument(
+        "--budget", type=_count, default=100, metavar="N", help="schedules to draw (default: %(default)s)"
+    )
     hunt.add_argument(
         "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
     )
@@ -200,8 +209,13 @@ def _run(parsed: argparse.Namespace) -> int:
 
 def _replay(parsed: argparse.Namespace) -> int:
     overrides = _overrides(parsed)
+    from netem.journal import JournalError  # pyarrow takes a while to import
+
     plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts)
-    status = _fly(plan, "replay", parsed)
+    try:
+        status = _fly(plan, "replay", parsed)
+    except JournalError as error:
+        raise ScenarioError(f"{parsed.directory}: {error}") from error
     flown, again = parsed.directory / history.FILE, parsed.out / history.FILE
     if overrides or not flown.exists() or not again.exists():
         return status  # it was to be another run, or one of the two left nothing to compare
@@ -254,17 +268,23 @@ def _hunt(parsed: argparse.Namespace) -> int:
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
         raise ScenarioError(f"--verbs {','.join(strangers)}: there are {', '.join(strategies.VERBS)}")
+    file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
+    if not file.parent.is_dir():
+        raise ScenarioError(f"--out {file}: there is no directory {file.parent}")
     with show.Chase(parsed.budget) as chase:
         quarry, coverage = hunt.hunt(
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
         )
-    if quarry is None:
-        show.hunted(None, coverage)
-        return PASS
-    file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
-    file.write_text(scenario.to_toml(quarry.scenario))
+    if quarry is not None:
+        file.write_text(scenario.to_toml(quarry.scenario))
     show.hunted(quarry, coverage)
-    return _confirm(quarry, invariant, file)
+    status = PASS if quarry is None else _confirm(quarry, invariant, file)
+    if parsed.json:
+        found = (
+            None if quarry is None else {"scenario": str(file), "finding": str(quarry.finding), "digest": quarry.digest}
+        )
+        print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
+    return status
 
 
 def _confirm(quarry: Quarry, invariant: Checker, file: Path) -> int:

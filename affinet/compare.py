@@ -81,9 +81,10 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
 
 def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:
     common = min(len(one), len(other))
-    unlike = _unlike(one[:common], other[:common]).reshape(common, -1).any(axis=-1)
-    if unlike.any():
-        return int(np.argmax(unlike))
+    unlike = _unlike(one[:common], other[:common])
+    in_tick = np.logical_or.reduce(unlike, axis=tuple(range(1, unlike.ndim)))
+    if in_tick.any():
+        return int(np.argmax(in_tick))
     return None if len(one) == len(other) else common
 
 

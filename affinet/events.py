@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, PlainValidator, model_validator
 
 from affinet import selectors
 from affinet.impairments import NotNegative, Positive, Probability, Section
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Links = Annotated[str, AfterValidator(selectors.check)]
-Whom = Annotated[list[int | Annotated[str, AfterValidator(selectors.check_agents)]], Field(min_length=1)]
+Whom = Annotated[list[Annotated[int | str, PlainValidator(selectors.agent_or_word)]], Field(min_length=1)]
 On = Annotated[list[Links], Field(min_length=1)]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 InFlight = Literal["drop", "deliver", "hold"]
@@ -88,7 +88,7 @@ class Partition(Lasting):
     """Groups between which nothing passes: lists of agents, or how to split the swarm in two."""
 
     verb: Literal["partition"] = "partition"
-    groups: Annotated[list[list[int]], Field(min_length=2)] | Literal["halves", "leaders", "min-cut"]
+    groups: Annotated[list[list[int]] | str, PlainValidator(selectors.groups_or_word)]
     in_flight: InFlight = "drop"
 
 
@@ -131,10 +131,10 @@ class Kill(Event):
 
 
 class Restart(Event):
-    """Killed agents that come back as fresh processes: cold, knowing nothing, or warm, with their own last state."""
+    """Killed agents, or all of them, that come back as new processes: cold, knowing nothing, or warm, with their last state."""
 
     verb: Literal["restart"] = "restart"
-    agents: Whom
+    agents: Whom | None = None
     state: Literal["cold", "warm"] = "cold"
 
 
@@ -147,10 +147,10 @@ class Pause(Lasting):
 
 
 class Resume(Event):
-    """Paused agents that go on (SIGCONT)."""
+    """Paused agents, or all of them, that go on (SIGCONT)."""
 
     verb: Literal["resume"] = "resume"
-    agents: Whom
+    agents: Whom | None = None
 
 
 class Clock(Lasting):
@@ -176,10 +176,10 @@ class Depart(Lasting):
 
 
 class Rejoin(Event):
-    """Departed agents that take part again."""
+    """Departed agents, or all of them, that take part again."""
 
     verb: Literal["rejoin"] = "rejoin"
-    agents: Whom
+    agents: Whom | None = None
 
 
 class Gust(Lasting):

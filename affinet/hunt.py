@@ -101,14 +101,19 @@ def hunt(
     undisturbed = invariant(_flown(given))
     if undisturbed.verdict == "fail":
         raise ScenarioError(f"{undisturbed}; it fails with no fault at all, and there is nothing to hunt for")
-    coverage, known = Coverage(), dict[str, bool]()
+    coverage, known = Coverage(), dict[str, bool | None]()
 
-    def breaks(entries: Entries) -> bool:
+    def breaks(faults: list[Entries]) -> bool | None:
+        entries = [entry for fault in faults for entry in fault]
         key = json.dumps(entries)
         if key not in known:
             known[key] = _breaks(given, invariant, entries, coverage)
             watch(coverage, entries if known[key] else None)
         return known[key]
+
+    def breaks_or_is_none(faults: list[Entries]) -> bool:
+        answer = breaks(faults)
+        return reject() if answer is None else answer
 
     patient = settings(
         max_examples=budget,
@@ -118,19 +123,30 @@ def hunt(
         phases=[Phase.generate, Phase.shrink],
     )
     try:
-        smallest = find(strategies.schedules(given, verbs), breaks, settings=patient, random=Random(seed))
+        found = find(strategies.timelines(given, verbs), breaks_or_is_none, settings=patient, random=Random(seed))
     except NoSuchExample:
         return None, coverage
-    broken = extended(given, smallest)
+    smallest = _without_the_needless(found, breaks)
+    broken = extended(given, [entry for fault in smallest for entry in fault])
     evidence = _flown(broken)
     return Quarry(broken, invariant(evidence), str(evidence.outcome.digest)), coverage
 
 
-def _breaks(given: Scenario, invariant: Checker, entries: Entries, coverage: Coverage) -> bool:
+def _without_the_needless(faults: list[Entries], breaks: Callable[[list[Entries]], bool | None]) -> list[Entries]:
+    """The faults without which it would not break; Hypothesis leaves some before the last that it cannot delete."""
+    for place in range(len(faults) - 1, -1, -1):
+        fewer = faults[:place] + faults[place + 1 :]
+        if fewer and breaks(fewer):
+            faults = fewer
+    return faults
+
+
+def _breaks(given: Scenario, invariant: Checker, entries: Entries, coverage: Coverage) -> bool | None:
+    """Whether a schedule breaks it; None where it is no schedule of this scenario: a selector matches nothing."""
     try:
         evidence = _flown(extended(given, entries))
     except (ScenarioError, PlanError):
-        reject()  # a selector that matches nothing here: no schedule of this scenario
+        return None
     coverage.add(entries)
     found = invariant(evidence).verdict
     untold = evidence.outcome.verdict == "vacuous" or found == "vacuous"

@@ -58,9 +58,10 @@ class Swarm:
         world = self._plan.world
         agents = np.arange(1, self._links.agents + 1)
         fresh = self._agents.init(agents.shape)
-        scene, state, vigil = world.start(), fresh, Vigil(world)
+        vigil = Vigil(world)
         moments: list[Moment] = []
         with np.errstate(over="ignore", invalid="ignore"):
+            scene, state = world.start(), fresh
             for tick in range(world.ticks):
                 self._fire(tick, vigil)
                 timeline = self.timeline

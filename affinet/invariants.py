@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Callable
-from typing import Any
 
 from affinet import checkers
 from affinet.checkers import Checker
@@ -35,8 +34,8 @@ def parse(text: str) -> Checker:
         When it says none: which words there are.
     """
     try:
-        return _built(ast.parse(text, mode="eval").body)
-    except (SyntaxError, TypeError, ValueError) as error:
+        return _built(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         known = ", ".join(f"{name}{_parameters(made)}" for name, made in NAMED.items())
         raise ScenarioError(f"invariant {text!r}: {error}; there are {known}, and & | ~ between them") from error
 
@@ -50,9 +49,15 @@ def _built(node: ast.expr) -> Checker:
         case ast.UnaryOp(ast.Invert(), operand):
             return ~_built(operand)
         case ast.Call(ast.Name(name), given, named) if name in NAMED:
-            numbers: list[Any] = [ast.literal_eval(value) for value in given]
-            return NAMED[name](*numbers, **{str(one.arg): ast.literal_eval(one.value) for one in named})
+            return NAMED[name](*map(_number, given), **{str(one.arg): _number(one.value) for one in named})
     raise ValueError(f"{ast.unparse(node)} is no checker")
+
+
+def _number(node: ast.expr) -> float:
+    value = ast.literal_eval(node)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise ValueError(f"{ast.unparse(node)} is no number")
+    return float(value)
 
 
 def _parameters(made: Callable[..., Checker]) -> str:

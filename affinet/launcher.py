@@ -101,6 +101,7 @@ class Launcher:
             except RunFailed as failure:
                 self.flight.failure = str(failure)
         self.flight.processes = [child.report() for child in crew.children]
+        _remove_unwritten(self._out)
         return self.flight
 
     def _start(self, crew: Crew) -> None:
@@ -223,3 +224,10 @@ class Launcher:
             checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
             remembers=remembers,
         )
+
+
+def _remove_unwritten(out: Path) -> None:
+    # A world that is killed before its first batch leaves tables without even a schema, which nothing can read.
+    for table in out.glob("*.arrows"):
+        if not table.stat().st_size:
+            table.unlink()

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 _START_S = 10.0
+_NOTHING_IN_IT = b"no data recording found"
 
 
 class NoViewer(RuntimeError):
@@ -19,19 +20,19 @@ class NoViewer(RuntimeError):
 def mend(recording: Path) -> None:
     """Give a recording whose writer was killed the ending it lacks, so that every tool reads it.
 
+    Where the writer had not come to say what it records there is nothing to read, and the file is removed.
+
     Raises
     ------
     subprocess.CalledProcessError
         When it cannot be mended.
     """
     mended = recording.with_suffix(".mended.rrd")
-    subprocess.run(
-        [_command(), "rrd", "merge", "-o", str(mended), str(recording)],
-        check=True,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-    )
+    _rrd("merge", "-o", str(mended), str(recording)).check_returncode()
     mended.replace(recording)
+    # The command asks in a tenth of the time in which its library is imported, and a run that failed is to end soon.
+    if _NOTHING_IN_IT in _rrd("compare", str(recording), str(recording)).stderr:
+        recording.unlink()
 
 
 def open_viewer() -> str:
@@ -67,6 +68,11 @@ def _command() -> str:
     if command is None:
         raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
     return command
+
+
+def _rrd(*arguments: str) -> subprocess.CompletedProcess[bytes]:
+    command = [_command(), "rrd", *arguments]
+    return subprocess.run(command, check=False, stdin=subprocess.DEVNULL, capture_output=True)
 
 
 def _free_port() -> int:

@@ -140,7 +140,7 @@ def _occurrences(draft: _Draft, number: int, entry: Event) -> Iterator[tuple[Mom
     first, again = draft.begins[number], 0
     while again == 0 or (entry.every is not None and again < (entry.times or again + 1)):
         seconds = first.seconds + again * (entry.every or 0.0)
-        if again and seconds >= draft.given.time.duration:
+        if again and draft.ticks(seconds) >= draft.given.time.ticks:
             return
         end = None
         if isinstance(entry, Lasting) and (entry.lasts is not None or entry.until is not None):
@@ -188,7 +188,8 @@ def _shapes(draft: _Draft, number: int, entry: Any, key: str) -> list[Fault]:
         case events.Delay():
             return [Fault(verb, 0, None, pairs=on(), seconds=entry.delay)]
         case events.Degrade():
-            return [Fault(verb, 0, None, pairs=on(), profile=_profile(draft, entry.profile, f"{key}.profile"))]
+            number_of = _profile(draft, entry.profile, f"{key}.profile")
+            return [Fault(verb, 0, None, pairs=on(), profile=number_of, profile_name=entry.profile)]
         case events.Bias():
             return [Fault(verb, 0, None, pairs=on(), vector=vector("by"))]
         case events.Outlier():
@@ -229,7 +230,7 @@ def _end(draft: _Draft, number: int, entry: Any) -> None:
             _heal(draft, entry, moment, tick)
             continue
         verb = _ENDED_BY[entry.verb]
-        for agent in selectors.agents(entry.agents, draft.formation, Lot(draft.given.seed, number + 1)):
+        for agent in _whose(draft, number, entry, verb, moment.frame, tick):
             begun = [
                 place
                 for place, (_, fault) in enumerate(draft.faults)
@@ -242,6 +243,16 @@ def _end(draft: _Draft, number: int, entry: Any) -> None:
             warm = isinstance(entry, events.Restart) and entry.state == "warm"
             for place in begun:
                 _close(draft, place, tick, warm)
+
+
+def _whose(draft: _Draft, number: int, entry: Any, verb: Verb, frame: int | None, tick: int) -> tuple[int, ...]:
+    if entry.agents is None:
+        under = {fault.agents[0] for _, fault in draft.faults if fault.verb is verb and _open(fault, frame, tick)}
+        if not under:
+            raise ValueError(f"nobody is under {verb} then, in the same frame of time, that this could end")
+        return tuple(sorted(under))
+    with said_at(f"timeline.{number + 1}.agents"):
+        return selectors.agents(entry.agents, draft.formation, Lot(draft.given.seed, number + 1))
 
 
 def _heal(draft: _Draft, entry: events.Heal, moment: Moment, tick: int) -> None:

@@ -30,6 +30,7 @@ _RANDOM = re.compile(r"random (\d+)")
 _RANDOM_AGENTS = re.compile(rf"random (\d+)(?: ({_ROLE}))?")
 _OF_GRAPH = ("ring", "bridges", "min-cut", "critical")
 _AGENTS_OF_GRAPH = ("cut-vertices", "critical")
+_SPLITS = ("halves", "leaders", "min-cut")
 _SAY = (
     "write '2->4' for what 4 hears of 2, '2-4' for both ways, 'leaders->followers', 'leaders', 'all', "
     f"'random 3' or {', '.join(_OF_GRAPH)}"
@@ -74,6 +75,36 @@ def check_agents(selector: str) -> str:
     if not (re.fullmatch(_ROLE, selector) or _RANDOM_AGENTS.fullmatch(selector) or selector in _AGENTS_OF_GRAPH):
         raise ValueError(f"{selector!r} selects no agents; {_SAY_AGENTS}")
     return selector
+
+
+def agent_or_word(given: object) -> int | str:
+    """A selector of agents: a number, or a word.
+
+    Raises
+    ------
+    ValueError
+        When it is neither.
+    """
+    if isinstance(given, int) and not isinstance(given, bool):
+        return given
+    return check_agents(str(given))
+
+
+def groups_or_word(given: object) -> list[list[int]] | str:
+    """Groups of agents, or the word for a way to split the swarm in two.
+
+    Raises
+    ------
+    ValueError
+        When it is neither.
+    """
+    if isinstance(given, str) and given in _SPLITS:
+        return given
+    if isinstance(given, list) and len(given) > 1 and all(isinstance(group, list) for group in given):
+        if strangers := [agent for group in given for agent in group if type(agent) is not int]:
+            raise ValueError(f"groups hold numbers of agents, got {strangers[0]!r}")
+        return given
+    raise ValueError(f"give at least two lists of agents, or {', '.join(map(repr, _SPLITS))}, got {given!r}")
 
 
 def edge(text: str) -> tuple[int, int]:

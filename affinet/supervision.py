@@ -12,6 +12,7 @@ import selectors
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -65,15 +66,12 @@ class Child:
 
     def order(self, order: str) -> None:
         """Give it an order; a child that is gone cannot take it, and its end of file will say so."""
-        with suppress(BrokenPipeError):
-            self._stdin.write(f"{order}\n".encode())
-            self._stdin.flush()
+        self._write(f"{order}\n".encode())
 
     def brief(self, brief: Any) -> None:
-        """Give it its brief."""
-        with suppress(BrokenPipeError):
-            self._stdin.write(brief_bytes(brief))
-            self._stdin.flush()
+        """Give it its brief, which it reads when it has come that far."""
+        # Longer than a pipe holds: to wait for one that imports, or is frozen, would keep a death of another from being seen.
+        threading.Thread(target=self._write, args=(brief_bytes(brief),), daemon=True).start()
 
     def pause(self) -> None:
         """Stop it, as the script says."""
@@ -106,9 +104,11 @@ class Child:
             "exit": self.process.returncode,
         }
 
-    @property
-    def _stdin(self) -> Any:
-        return self.process.stdin
+    def _write(self, data: bytes) -> None:
+        stdin: Any = self.process.stdin
+        with suppress(BrokenPipeError, ValueError):  # it is gone, or the run is over and the pipe closed
+            stdin.write(data)
+            stdin.flush()
 
 
 def module(package: str) -> list[str]:

@@ -76,6 +76,8 @@ class Node:
         self._state: AgentState = self._agent.init(())
         if self._checkpoint and brief.remembers:
             self._state = checkpoint.load(self._checkpoint, like=self._state)
+        elif self._checkpoint:  # it may die before it has acted, and what a predecessor wrote is not its own
+            checkpoint.save(self._checkpoint, self._state)
         self._heard = 0
         self._numbers = Numbering()
         self._inboxes = Sequences("the medium's")

@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 
 
 def nees(error: Array, covariance: Array) -> Array:
-    """Normalised estimation errors squared, e^T P^-1 e, shape (...).
+    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular.
 
     Parameters
     ----------
@@ -23,8 +23,9 @@ def nees(error: Array, covariance: Array) -> Array:
     whole = np.zeros((*error.shape, dimension))
     rows, columns = np.triu_indices(dimension)
     whole[..., rows, columns] = whole[..., columns, rows] = covariance
-    normalised: Array = (error * np.linalg.solve(whole, error[..., None])[..., 0]).sum(axis=-1)
-    return normalised
+    singular = np.linalg.det(whole) == 0.0
+    solved = np.linalg.solve(np.where(singular[..., None, None], np.eye(dimension), whole), error[..., None])[..., 0]
+    return np.where(singular, np.inf, (error * solved).sum(axis=-1))
 
 
 def band(level: float, dimension: int, number: int) -> tuple[float, float]:

@@ -74,8 +74,8 @@ def medium(
 
 def fly(air: Medium, ticks: int, offered: Mask | None = None, position: Array | None = None) -> Verdicts:
     """The verdicts of many ticks, shape (T, C, L), on messages offered (T, C, L); without `offered`, on all."""
-    channels, links = len(air.profile.message_bits), len(air.timeline.links)
-    state, always, each = air.begin(), np.ones((channels, links), dtype=bool), []
+    state, each = air.begin(), []
+    always = np.ones_like(state.spoke)
     for tick in range(ticks):
         state, verdicts = air.judge(state, tick, always if offered is None else offered[tick], position)
         each.append(verdicts)

@@ -70,7 +70,7 @@ def _delay(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     law, against = _law(links, case), Against(f"delay, {case.law}", case.parameters)
     air = flown.medium(seed, links, delays=(law,))
-    forecast = Forecast(seed, links, air.profile, np.array([0]), np.array([False]))
+    forecast = Forecast(seed, links, flown.profile(links, delays=(law,)), np.array([0]), np.array([False]))
     seconds = np.stack([forecast.at(tick).delay_s[0] for tick in range(ticks)])
     wait = flown.fly(air, ticks).due[:, 0] - np.arange(ticks)[:, None]
     early, late = wait < seconds / flown.DT - 1e-6, wait >= seconds / flown.DT + 1.0

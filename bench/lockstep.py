@@ -45,13 +45,20 @@ def sizes(plan: Plan) -> dict[str, int]:
     broadcasts = [wire.pack(wire.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
     messages = {
         "sense": wire.pack(
-            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)))
+            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), [])
         ),
         "seen": wire.pack(
-            wire.SenseInbox(500, HUB, 500, wire.Phase.SENSE, [1] * heard, number(size=(heard, 2)).tolist(), None)
+            wire.SenseInbox(500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None)
         ),
         "heard": wire.pack_exchange(500, 500, broadcasts * heard),
-        "act": wire.pack(wire.Act(500, 1, 500, number(size=2), number(size=(degree, 2)), [True] * degree, 0.1, 500)),
+        "act": wire.pack(
+            wire.Act(
+                *(500, 1, 500, number(size=dimension), number(size=(degree, dimension)), [True] * degree),
+                covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
+                psi=0.1,
+                heard=500,
+            )
+        ),
         "journal": wire.pack(
             wire.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [], [], 0, [], [], [9] * agents, None)
         ),

@@ -81,8 +81,8 @@ class Fault:
         What BIAS adds to a measurement, in metres; how fast GUST pushes, in metres per second.
     matrix
         Of LIE: rows of the matrix by which every map that is told is multiplied from the left.
-    profile
-        Number of the profile that DEGRADE puts in place of the links' own, from 1.
+    profile, profile_name
+        Number and name of the profile that DEGRADE puts in place of the links' own, from 1.
     """
 
     verb: Verb
@@ -102,6 +102,7 @@ class Fault:
     vector: tuple[float, ...] = ()
     matrix: tuple[tuple[float, ...], ...] = ()
     profile: int = 0
+    profile_name: str = ""
 
     def active(self, tick: int) -> bool:
         """Whether it holds in this tick."""
@@ -122,7 +123,7 @@ class Fault:
             case Verb.DELAY:
                 return f"delay {self.seconds:g} s on {self._links()}"
             case Verb.DEGRADE:
-                return f"degrade to profile {self.profile} on {self._links()}"
+                return f"degrade to {self.profile_name!r} on {self._links()}"
             case Verb.BIAS:
                 return f"bias {_numbers(self.vector)} m on {self._links()}"
             case Verb.GUST:

@@ -146,9 +146,9 @@ class Medium:
     @property
     def ahead(self) -> bool:
         """Whether a tick can be judged before it is known where the agents are."""
-        if self.timeline.pending:
+        if self.timeline.pending or self._recorded:  # a journal ends with its run: nothing is known of the tick after
             return False
-        return bool(self._recorded) or not any(climate.profile.spatial for climate in self._climates)
+        return not any(climate.profile.spatial for climate in self._climates)
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""

@@ -30,7 +30,7 @@ T = TypeVar("T")
 _LENGTH = struct.Struct("<I")
 _STDIN, _STDOUT, _STDERR = 0, 1, 2
 _PR_SET_PDEATHSIG = 1
-_LAST_RESORT_S = 3.0
+_LAST_RESORT_S = 2.0
 
 
 class Stalled(RuntimeError):

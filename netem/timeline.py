@@ -20,6 +20,9 @@ from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Integers, Links, Mask
 from netem.trigger import Trigger
 
+# What a clock gains is a whole number of ticks again and again, and floats fall a little short of that.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Conditions:
@@ -182,7 +185,7 @@ class Timeline:
         """What each agent's clock says in this tick, in ticks, shape (N,)."""
         reading = np.full(self.links.agents, tick)
         for fault, mask in self._acting(tick, Verb.CLOCK, self._agent_masks):
-            reading += mask * int(np.floor(fault.rate * (tick - fault.start)))
+            reading += mask * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
         return np.maximum(reading, 0)
 
     def held(self, fault: int) -> Mask:

@@ -12,7 +12,7 @@ from netem.air import Air, Delivery, Verdicts
 from netem.chain import Chain, ChainLayer
 from netem.channels import SENSE
 from netem.delay import Delay, Law
-from netem.fault import Fault, UnderWay, Verb
+from netem.fault import Body, Fault, UnderWay, Verb
 from netem.jamming import Zone
 from netem.links import Links
 from netem.loss import bernoulli
@@ -236,7 +236,7 @@ def edges_of(agents):
 
 
 def faults_over(links, ticks):
-    """A fault of any kind over these links, at any time of a run of so many ticks."""
+    """A fault of any verb over these links, at any time of a run of so many ticks; degraded links have profile 1."""
     times = st.builds(_interval, st.integers(0, ticks - 1), st.none() | st.integers(1, 15))
     pairs = st.lists(st.sampled_from(list(links.index)), min_size=1, max_size=4).map(tuple)
     agents = st.integers(1, links.agents)
@@ -253,9 +253,49 @@ def faults_over(links, ticks):
         st.builds(
             lambda t, p, loss: Fault(Verb.LOSE, *t, pairs=p, probability=loss), times, pairs, st.floats(0.0, 1.0)
         ),
+        st.builds(
+            lambda t, p, seconds: Fault(Verb.DELAY, *t, pairs=p, seconds=seconds), times, pairs, st.floats(0.0, 0.5)
+        ),
+        st.builds(lambda t, p: Fault(Verb.DEGRADE, *t, pairs=p, profile=1), times, pairs),
+        st.builds(
+            lambda t, p, miss: Fault(Verb.DROPOUT, *t, pairs=p, probability=miss), times, pairs, st.floats(0.0, 1.0)
+        ),
         st.builds(lambda t, agent: Fault(Verb.KILL, *t, agents=(agent,)), times, agents),
-        st.builds(lambda t, agent: Fault(Verb.DEPART, *t, agents=(agent,)), times, agents),
+        st.builds(
+            lambda t, agent, body: Fault(Verb.DEPART, *t, agents=(agent,), body=body),
+            times,
+            agents,
+            st.sampled_from(Body),
+        ),
+        st.builds(
+            lambda t, agent, u: Fault(Verb.PAUSE, *t, agents=(agent,), under_way=u),
+            times,
+            agents,
+            st.sampled_from([UnderWay.DROP, UnderWay.HOLD]),
+        ),
+        st.builds(
+            lambda t, p, what: replace(what, start=t[0], end=t[1], pairs=p), times, pairs, st.sampled_from(OF_SENSORS)
+        ),
+        st.builds(
+            lambda t, agent, what: replace(what, start=t[0], end=t[1], agents=(agent,)),
+            times,
+            agents,
+            st.sampled_from(OF_AGENTS),
+        ),
     )
+
+
+# What is none of the medium's business: what sensors say of what they see, and what agents and their bodies do.
+OF_SENSORS = (
+    Fault(Verb.BIAS, 0, None, vector=(1.0, -0.5)),
+    Fault(Verb.OUTLIER, 0, None, probability=0.5, deviation=3.0),
+    Fault(Verb.FREEZE, 0, None),
+)
+OF_AGENTS = (
+    Fault(Verb.CLOCK, 0, None, rate=-0.5),
+    Fault(Verb.GUST, 0, None, vector=(1.0, -0.5)),
+    Fault(Verb.LIE, 0, None, matrix=((0.0, 1.0), (-1.0, 0.0))),
+)
 
 
 def _interval(start, length):
@@ -306,9 +346,12 @@ def cases(draw, ticks, without=frozenset()):
 def fly_case(case, channels, ticks):
     """The timeline of a case, what is offered, and every tick."""
     links, timeline = case.links, Timeline(case.links, case.faults)
-    profile = mixture(case.mix, case.has, links, channels, coupled=case.coupled, least_delay=case.least_delay)
+    profiles = [
+        mixture(mix, case.has, links, channels, coupled=case.coupled, least_delay=case.least_delay)
+        for mix in (case.mix, case.mix + 1)
+    ]
     offered = chatter(case.mix, channels, links, ticks, case.talk)
-    medium = Medium(case.seed, channels, [profile], timeline)
+    medium = Medium(case.seed, channels, profiles, timeline)
     return timeline, offered, fly(medium, offered, roaming(case.mix, case.agents, ticks))
 
 

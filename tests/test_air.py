@@ -531,7 +531,10 @@ def test_every_message_under_way_arrives_once_when_it_is_due_or_meets_a_fault_th
     number, flying = np.zeros(offered.shape[1:], dtype=int), []
     for tick, (verdicts, delivery, air) in enumerate(flown):
         on = [severing(timeline, tick, link) for link in range(len(timeline.links))]
-        policies = [{fault.under_way for fault in faults} for faults in on]
+        policies = [
+            {fault.under_way for fault in (*faults, *pausing(timeline, tick, int(agent)))}
+            for faults, agent in zip(on, timeline.links.dst, strict=True)
+        ]
         gone = [absent(timeline, tick, int(agent)) for agent in timeline.links.dst]
         flying += under_way_of(tick, verdicts, number)
         dropped = [m for m in flying if gone[m[3]] or UnderWay.DROP in policies[m[3]]]
@@ -573,10 +576,19 @@ def severing(timeline, tick, link):
     return [f for n, f in enumerate(timeline.faults) if f.verb in severed and f.active(tick) and timeline.held(n)[link]]
 
 
+def pausing(timeline, tick, agent):
+    """The faults that pause an agent."""
+    return [f for f in timeline.faults if f.verb is Verb.PAUSE and f.active(tick) and agent in f.agents]
+
+
 def absent(timeline, tick, agent):
-    """Why an agent takes no part, if so."""
+    """Why nothing more reaches an agent, if so."""
     verbs = {fault.verb for fault in timeline.faults if fault.active(tick) and agent in fault.agents}
-    return Fate.DEAD if Verb.KILL in verbs else Fate.DEPARTED if Verb.DEPART in verbs else None
+    if Verb.KILL in verbs:
+        return Fate.DEAD
+    if any(fault.under_way is UnderWay.DROP for fault in pausing(timeline, tick, agent)):
+        return Fate.PAUSED
+    return Fate.DEPARTED if Verb.DEPART in verbs else None
 
 
 def test_the_mixtures_have_everything_in_them():
@@ -587,6 +599,9 @@ def test_the_mixtures_have_everything_in_them():
         Fault(Verb.PARTITION, 65, 70, groups=((1, 2), (3, 4, 5))),
         Fault(Verb.KILL, 75, 80, agents=(2,)),
         Fault(Verb.DEPART, 85, 90, agents=(3,)),
+        Fault(Verb.PAUSE, 10, 14, agents=(4,), under_way=UnderWay.DROP),
+        Fault(Verb.DELAY, 34, 38, pairs=((1, 2), (2, 3)), seconds=0.3),
+        Fault(Verb.DROPOUT, 0, None, pairs=tuple(links.index), probability=0.05),
         Fault(Verb.LOSE, 0, None, pairs=tuple(links.index), probability=0.05),
     ]
     fates, marks, under_way, released, copies = Counter(), Counter(), Counter(), 0, 0
@@ -603,7 +618,7 @@ def test_the_mixtures_have_everything_in_them():
             copies += int((verdicts.copy_due >= 0).sum())
     assert set(fates) == set(Fate)
     assert set(marks) == set(Mark)
-    assert set(under_way) == {Fate.DEAD, Fate.DEPARTED, Fate.CUT, Fate.PARTITION}
+    assert set(under_way) == {Fate.DEAD, Fate.PAUSED, Fate.DEPARTED, Fate.CUT, Fate.PARTITION}
     assert released > 0
     assert copies > 0
     assert set(REASONS) <= set(fates)

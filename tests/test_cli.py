@@ -96,7 +96,7 @@ def test_the_readme_tells_the_truth(tmp_path):
     assert len(README) >= 5
     for command in README:
         _, *arguments = command.split()
-        coarse = ["--set", "time.dt=0.1"] if "partition" in arguments else ["--duration", "1"]
+        coarse = ["--set", "time.dt=0.05"] if "partition" in arguments else ["--duration", "1"]
         short = coarse if arguments[0] == "run" and "--duration" not in arguments else []
         done = affinet(*arguments, *short, cwd=tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr

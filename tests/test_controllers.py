@@ -209,3 +209,39 @@ def test_leaders_follow_the_pilot_and_followers_the_law(zhao7):
     np.testing.assert_allclose(action.velocity[3:], -2.0 * stress_force(zhao7, action.estimate)[3:])
     _, said = agent.sense(state, measured, zhao7.present)
     np.testing.assert_array_equal(said[INPUT]["velocity"], action.velocity)
+
+
+CLOCKS = np.array([5200, 5200, 5150, 5200, 5199, 5300, 0])
+
+
+def test_a_leader_flies_by_its_own_clock(zhao7):
+    position = np.random.default_rng(1).normal(size=(7, 2))
+    together = pilot(zhao7, zhao7.mission, 3.0, CLOCKS, position)
+    for agent, tick in enumerate(CLOCKS.tolist()):
+        alone = pilot(zhao7.of(agent), zhao7.mission, 3.0, tick, position[agent])
+        assert together[agent].tobytes() == alone.tobytes()
+    right = pilot(zhao7, zhao7.mission, 3.0, 5200, position)
+    assert (together != right).any(axis=1).tolist() == [False, False, True, False, True, True, True]
+
+
+def test_feed_forward_flies_by_the_clock_of_the_agent_for_all_its_neighbours(zhao7):
+    law, silence = VaryingVelocity(source="feed-forward"), Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)
+    estimate = affine(zhao7, np.eye(2))
+
+    def commanded(tick):
+        return law.command(zhao7, law.init(zhao7, (7,)), tick, np.zeros((7, 2)), estimate, silence)[1]
+
+    together = commanded(CLOCKS)
+    for agent, tick in enumerate(CLOCKS.tolist()):
+        np.testing.assert_array_equal(together[agent], commanded(tick)[agent])
+    assert (together != commanded(5200)).any(axis=1).tolist() == [False, False, True, False, True, True, True]
+
+
+def test_everybody_rests_when_the_clock_is_past_the_manoeuvre(zhao7):
+    late, law = len(zhao7.mission.theta) + 100, VaryingVelocity(source="feed-forward")
+    position = zhao7.mission.target(late, zhao7.nominal)
+    np.testing.assert_array_equal(pilot(zhao7, zhao7.mission, 3.0, late, position), 0.0)
+    silence = Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)
+    estimate = affine(zhao7, np.eye(2))
+    _, u = law.command(zhao7, law.init(zhao7, (7,)), late, np.zeros((7, 2)), estimate, silence)
+    np.testing.assert_allclose(u, 0.0, atol=1e-12)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import resources
 
 import psutil
 import pytest
@@ -17,8 +18,9 @@ PATIENCE = 30.0
 class Running:
     """A long run in a process of its own, flying when the block begins; nothing of it is left when it ends."""
 
-    def __init__(self, out):
+    def __init__(self, out, scenario="corridor"):
         self.out = out
+        self.scenario = scenario
 
     def __enter__(self):
         # A shell that runs the tests in the background has them ignore SIGINT, and a child inherits that.
@@ -29,7 +31,7 @@ class Running:
                 "-m",
                 "affinet.cli",
                 "run",
-                "corridor",
+                str(self.scenario),
                 "--duration",
                 "60",
                 "--json",
@@ -40,7 +42,12 @@ class Running:
             stderr=subprocess.PIPE,
             text=True,
         )
-        await_true(lambda: self.recorded() > 100_000, "the run never got going")
+        self.children = []
+        try:
+            await_true(lambda: self.recorded() > 100_000, "the run never got going")
+        except AssertionError:
+            self.__exit__()
+            raise
         self.children = psutil.Process(self.launcher.pid).children()
         return self
 
@@ -56,6 +63,9 @@ class Running:
 
     def child(self, package):
         return next(c for c in self.children if c.cmdline()[-2:] == ["-m", package])
+
+    def stopped(self):
+        return [child for child in self.children if child.status() == psutil.STATUS_STOPPED]
 
     def ends(self):
         began = time.monotonic()
@@ -108,6 +118,33 @@ def test_a_killed_launcher_leaves_no_orphan_and_a_readable_recording(out):
         took, _, _ = run.ends()
     assert took < 5
     assert moments(out / "run.rrd") > 10
+
+
+@pytest.fixture
+def pausing(tmp_path):
+    path = tmp_path / "pausing.toml"
+    pause = '[[timeline]]\nverb = "pause"\nat = 0.1\nuntil = 59.0\nagents = [3, 4, 5]\n'
+    path.write_text((resources.files("affinet") / "scenarios" / "corridor.toml").read_text() + pause)
+    return path
+
+
+def test_who_is_paused_leaves_with_a_killed_launcher(out, pausing):
+    with Running(out, pausing) as run:
+        await_true(lambda: len(run.stopped()) == 3, "nobody was paused")
+        run.launcher.kill()
+        took, _, _ = run.ends()
+    assert took < 5
+    assert moments(out / "run.rrd") > 10
+
+
+def test_the_death_of_a_paused_agent_ends_the_run_with_its_reason(out, pausing):
+    with Running(out, pausing) as run:
+        await_true(lambda: len(run.stopped()) == 3, "nobody was paused")
+        victim = run.stopped()[0]
+        victim.kill()
+        took, said, _ = run.ends()
+    assert took < 5
+    assert f"(pid {victim.pid}) was killed by SIGKILL" in json.loads(said.splitlines()[-1])["reasons"][0]
 
 
 def test_ctrl_c_leaves_in_order(out):

@@ -1,9 +1,13 @@
 """What an agent, a link, a channel or a fault more does to the others: nothing. Rate limits aside, for a queue is shared."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from airs import (
     IMPAIRMENTS,
+    OF_AGENTS,
+    OF_SENSORS,
     Case,
     cases,
     edges_of,
@@ -20,7 +24,7 @@ from netem import channels as channel_names
 from netem.chain import Chain, ChainLayer
 from netem.corrupt import Mark
 from netem.fate import Fate
-from netem.fault import Fault, UnderWay, Verb
+from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Links
 from netem.medium import Medium
 from netem.timeline import Timeline
@@ -90,21 +94,41 @@ def test_a_fault_more_changes_nothing_on_other_links_and_nothing_while_it_does_n
     assert_elsewhere_unchanged(case, data.draw(faults_over(case.links, TICKS)))
 
 
+CHAINS = {"chains", "chains of one class"}
 RING = ((1, 2), (2, 3), (3, 4), (4, 1), (1, 3))
 ONE_OF_EACH = [
     *(Fault(Verb.CUT, 9, 14, pairs=((1, 2), (4, 3)), under_way=policy) for policy in UnderWay),
     *(Fault(Verb.PARTITION, 9, 14, groups=((1, 2), (3, 4)), under_way=policy) for policy in UnderWay),
     Fault(Verb.LOSE, 9, 14, pairs=((1, 2), (4, 3)), probability=0.7),
+    Fault(Verb.DELAY, 9, 14, pairs=((1, 2), (4, 3)), seconds=0.35),
+    Fault(Verb.DEGRADE, 9, 14, pairs=((1, 2), (4, 3)), profile=1),
+    Fault(Verb.DROPOUT, 9, 14, pairs=((1, 2), (4, 3)), probability=0.7),
+    *(Fault(Verb.PAUSE, 9, 14, agents=(2,), under_way=policy) for policy in (UnderWay.DROP, UnderWay.HOLD)),
     Fault(Verb.KILL, 9, 14, agents=(2,)),
-    Fault(Verb.DEPART, 9, 14, agents=(2,)),
+    *(Fault(Verb.DEPART, 9, 14, agents=(2,), body=body) for body in Body),
+    *(replace(what, start=9, end=14, pairs=((1, 2), (4, 3))) for what in OF_SENSORS),
+    *(replace(what, start=9, end=14, agents=(2,)) for what in OF_AGENTS),
 ]
 
 
-@pytest.mark.parametrize("fault", ONE_OF_EACH, ids=lambda fault: f"{fault.verb}, {fault.under_way}")
+def test_there_is_a_fault_of_every_verb():
+    assert {fault.verb for fault in ONE_OF_EACH} == set(Verb)
+
+
+@pytest.mark.parametrize("fault", ONE_OF_EACH, ids=lambda fault: f"{fault.verb}, {fault.under_way}, {fault.body}")
 @pytest.mark.parametrize("mix", [0, 2])
 def test_a_fault_changes_nothing_on_other_links_that_delay_double_and_corrupt_all_they_carry(fault, mix):
     has = frozenset({"delays", "ordered", "duplicate", "reorder", "corrupt"})
     assert_elsewhere_unchanged(Case(3, 4, RING, mix, has, mix < 2, least_delay=0, faults=(), talk=1.0), fault)
+
+
+@pytest.mark.parametrize("fault", ONE_OF_EACH, ids=lambda fault: f"{fault.verb}, {fault.under_way}, {fault.body}")
+def test_a_fault_changes_verdicts_where_it_holds_if_it_is_one_of_the_air(fault):
+    case = Case(3, 4, RING, 0, frozenset({"delays"}), True, least_delay=0, faults=(), talk=1.0)
+    held = Timeline(case.links, [fault]).held(0)
+    before, after = verdicts(case), verdicts(case._replace(faults=(fault,)))
+    changed = (after[9:14, :, held] != before[9:14, :, held]).any()
+    assert changed == (fault.verb in OF_THE_MEDIUM)
 
 
 def assert_elsewhere_unchanged(case, another):
@@ -118,25 +142,57 @@ def assert_elsewhere_unchanged(case, another):
         np.testing.assert_array_equal(here[~held[here[:, 1]]], there[~held[there[:, 1]]])
         if tick >= another.start:
             old, new = before[tick][:, held], after[tick][:, held]
-            while_it_holds(another, old, new) if another.active(tick) else when_it_is_over(case, old, new)
+            toward = np.isin(case.links.dst[held], another.agents)
+            while_it_holds(another, old, new, toward) if another.active(tick) else when_it_is_over(
+                case, another, old, new
+            )
 
 
-def while_it_holds(fault, old, new):
-    """It holds back what is offered, whatever else does; a scripted loss, some of it."""
+SEVERING = {Verb.CUT, Verb.PARTITION, Verb.KILL, Verb.DEPART}
+OF_THE_MEDIUM = SEVERING | {Verb.LOSE, Verb.DELAY, Verb.DEGRADE, Verb.DROPOUT, Verb.PAUSE}
+
+
+def while_it_holds(fault, old, new, toward):
+    """Old and new verdicts on the links it takes hold of, those `toward` its agents among them."""
     silent = old[..., FATE] == Fate.SILENT
     assert (silent == (new[..., FATE] == Fate.SILENT)).all()
+    if fault.verb is Verb.DEGRADE:
+        return
     struck = new[..., FATE] >= Fate.DEAD
-    if fault.verb is Verb.LOSE:
-        assert (new[..., FATE][struck & passed(old)] == Fate.SCRIPTED).all()
-        assert not (passed(new) & ~passed(old)).any()
-    else:
-        assert (struck | silent).all()
+    assert not (passed(new) & ~passed(old)).any()
     assert (new[..., MARK][passed(new)] == old[..., MARK][passed(new)]).all()
+    match fault.verb:
+        case Verb.LOSE:
+            assert (new[..., FATE][struck & passed(old)] == Fate.SCRIPTED).all()
+        case Verb.DROPOUT:
+            np.testing.assert_array_equal(new[1:], old[1:])
+            assert (new[..., FATE][struck & passed(old)] == Fate.DROPOUT).all()
+        case Verb.DELAY:
+            assert (passed(new) == passed(old)).all()
+            np.testing.assert_array_equal(new[0], old[0])
+            np.testing.assert_array_equal(new[~passed(new)], old[~passed(old)])
+            assert (new[..., DUE] >= old[..., DUE]).all()
+        case Verb.PAUSE:
+            np.testing.assert_array_equal(new[:, ~toward], old[:, ~toward])
+            assert (new[0, toward, FATE] >= Fate.DEAD).all()
+            heard, before = new[1:, toward], old[1:, toward]
+            if fault.under_way is UnderWay.DROP:
+                assert not passed(heard).any()
+            else:
+                assert (heard[passed(before), FATE] == Fate.DELAYED).all()
+                np.testing.assert_array_equal(heard[~passed(before)], before[~passed(before)])
+                np.testing.assert_array_equal(heard[..., DUE:], before[..., DUE:])
+        case verb if verb in SEVERING:
+            assert (struck | silent).all()
+        case _:
+            np.testing.assert_array_equal(new, old)
 
 
-def when_it_is_over(case, old, new):
+def when_it_is_over(case, fault, old, new):
     """All is as if it had not been, but that no message waits for those it held back on an ordered link."""
-    if "ordered" not in case.has:
+    if fault.verb is Verb.DEGRADE and CHAINS & case.has:
+        return  # its own chains stood still where they step with messages
+    if fault.verb not in OF_THE_MEDIUM or "ordered" not in case.has:
         np.testing.assert_array_equal(new, old)
     assert (passed(new) == passed(old)).all()
     np.testing.assert_array_equal(new[..., FATE][~passed(new)], old[..., FATE][~passed(old)])

@@ -54,10 +54,12 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
     assert "can be injected" in refused.refused
     assert cut.k < lose.k < shown.k < healed.k
 
-    faults = {fault["fault"].split()[0]: fault for fault in flight.outcome.faults}
-    assert faults["cut"]["messages"] > 0
-    assert faults["lose"]["messages"] > 0
-    assert faults["cut"]["at"] == pytest.approx(cut.k * 0.01)
+    faults = {fault["fault"].split()[0]: fault for fault in flight.outcome.to_json()["faults"]}
+    assert all(fault.keys() == {"fault", "at", "touched", "what"} for fault in faults.values())
+    assert all((fault["touched"] > 0, fault["what"]) == (True, "messages") for fault in faults.values())
+    assert {name: fault["at"] for name, fault in faults.items()} == pytest.approx(
+        {"cut": cut.k * 0.01, "lose": lose.k * 0.01}
+    )
     recorded = journal.injected(journal.read(out / journal.FILE))
     assert [(fault.verb, fault.start) for fault in recorded] == [(Verb.CUT, cut.k), (Verb.LOSE, lose.k)]
     assert recorded[1].end == healed.k

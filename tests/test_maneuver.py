@@ -106,3 +106,32 @@ def test_velocity_carries_the_target_of_this_tick_to_the_next():
     flown = corridor(np.arange(0.0, 60.0, 0.5))
     arrived = flown.target(40, NOMINAL) + 0.5 * flown.velocity(40, NOMINAL, 0.5)
     np.testing.assert_allclose(arrived, flown.target(41, NOMINAL), atol=1e-12)
+
+
+FLOWN = keyframes(np.arange(0.0, 21.0, 0.5), TIMES, THETA, OFFSET)
+LAST = len(FLOWN.theta) - 1
+
+
+def test_after_its_last_tick_a_manoeuvre_rests():
+    arrived = FLOWN.target(LAST, NOMINAL)
+    assert (arrived != FLOWN.target(LAST - 4, NOMINAL)).any()
+    for late in (LAST + 1, LAST + 1000):
+        np.testing.assert_array_equal(FLOWN.target(late, NOMINAL), arrived)
+        np.testing.assert_array_equal(FLOWN.velocity(late, NOMINAL, 0.5), 0.0)
+
+
+def test_the_last_step_is_flown_and_the_next_is_none():
+    moving = corridor(np.arange(0.0, 30.0, 0.5))
+    last = len(moving.theta) - 1
+    assert (moving.velocity(last - 1, NOMINAL, 0.5) != 0.0).any()
+    np.testing.assert_array_equal(moving.velocity(last, NOMINAL, 0.5), 0.0)
+
+
+def test_agents_whose_clocks_differ_have_the_targets_of_their_own_ticks():
+    reading = np.array([0, 3, 20, LAST - 1, LAST, LAST + 5, 7])
+    target, velocity = FLOWN.target(reading, NOMINAL), FLOWN.velocity(reading, NOMINAL, 0.5)
+    assert target.shape == velocity.shape == NOMINAL.shape
+    for agent, tick in enumerate(reading.tolist()):
+        assert target[agent].tobytes() == FLOWN.target(tick, NOMINAL[agent]).tobytes()
+        assert velocity[agent].tobytes() == FLOWN.velocity(tick, NOMINAL[agent], 0.5).tobytes()
+    assert (target != FLOWN.target(3, NOMINAL)).any(axis=1).tolist() == [False, False, True, True, True, True, True]

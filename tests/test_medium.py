@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from airs import DT, constant, fates_of, fly, losing, quiet_profile, taking
+from airs import BITS, DT, IMPAIRMENTS, constant, fates_of, fly, losing, mixture, quiet_profile, roaming, taking
 from airs import everything as everything_on
 
 from netem.fate import REASONS, Fate, Ledger
-from netem.fault import Fault, Verb
+from netem.fault import Fault, UnderWay, Verb
 from netem.jamming import Zone
 from netem.links import Links
 from netem.medium import Medium
@@ -17,6 +17,7 @@ from netem.reach import Law, Reach
 from netem.schedule import Schedule
 from netem.timeline import Timeline
 from netem.trace import Trace
+from netem.trigger import Trigger
 
 LINKS = Links.both_ways(5, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (1, 3)])
 CHANNELS = ("sense", "input", "theta")
@@ -38,8 +39,8 @@ def always(ticks):
     return [everything()] * ticks
 
 
-def medium(standing, faults=(), seed=1):
-    return Medium(seed, CHANNELS, [standing], Timeline(LINKS, faults))
+def medium(standing, faults=(), seed=1, degraded=()):
+    return Medium(seed, CHANNELS, [standing, *degraded], Timeline(LINKS, faults))
 
 
 def judged(standing, faults=(), seed=1, offered=None, position=None):
@@ -105,10 +106,12 @@ def with_no_queue(standing):
 
 HOLDING_LINK_1_2 = [
     (Fate.DEAD, Fault(Verb.KILL, 0, None, agents=(2,))),
+    (Fate.PAUSED, Fault(Verb.PAUSE, 0, None, agents=(2,))),
     (Fate.DEPARTED, Fault(Verb.DEPART, 0, None, agents=(2,))),
     (Fate.CUT, Fault(Verb.CUT, 0, None, pairs=((1, 2),))),
     (Fate.PARTITION, Fault(Verb.PARTITION, 0, None, groups=((1,), (2,)))),
     (Fate.SCRIPTED, Fault(Verb.LOSE, 0, None, pairs=((1, 2),), probability=1.0)),
+    (Fate.DROPOUT, Fault(Verb.DROPOUT, 0, None, pairs=((1, 2),), probability=1.0)),
     (Fate.CLOSED, with_closed),
     (Fate.RANGE, with_nothing_in_range),
     (Fate.JAMMED, with_all_jammed),
@@ -131,7 +134,8 @@ def test_a_message_is_booked_under_the_strongest_layer_that_holds_it(hidden, ord
         standing = standing if isinstance(impair, Fault) else impair(standing)
     strongest, _ = HOLDING_LINK_1_2[hidden]
     fates = judged(standing, faults, position=STANDING)[:, ROW]
-    assert (fates[1:] == strongest).all()
+    heard, _ = HOLDING_LINK_1_2[hidden + (strongest == Fate.DROPOUT)]  # only sensors drop out
+    assert (fates[1:] == heard).all()
     assert fates[0] == (Fate.DELIVERED if strongest == Fate.OVERFLOW else strongest)  # sensing has no queue
 
 
@@ -154,7 +158,9 @@ def test_layers_are_independent():
         Fault(Verb.PARTITION, 10, 30, groups=((1, 2), (3, 4, 5))),
         Fault(Verb.DEPART, 15, 35, agents=(3,)),
         Fault(Verb.KILL, 20, 28, agents=(2,)),
+        Fault(Verb.PAUSE, 18, 26, agents=(5,)),
         Fault(Verb.LOSE, 3, 37, pairs=((1, 2), (1, 3), (5, 1)), probability=0.5),
+        Fault(Verb.DROPOUT, 3, 37, pairs=((1, 2), (5, 4)), probability=0.5),
     ]
     trace = Trace(np.array([0]), np.full((1, SIZE), 0.8), sensing=True, comms=True)
     duty = Schedule(np.full(SIZE, 7), np.arange(SIZE) % 7, np.full(SIZE, 5), sensing=True, comms=True)
@@ -313,6 +319,259 @@ def test_what_is_under_way_when_the_run_ends_is_in_flight():
     assert flown[9].air.in_flight == 3 * 2 * SIZE
     assert [tick.delivery.late for tick in flown[10:]] == [2 * SIZE] * 3
     assert flown[-1].air.in_flight == 0
+
+
+# ---- scripted delay
+
+
+def late(seconds, *pairs, start=0, end=None):
+    return Fault(Verb.DELAY, start, end, pairs=pairs, seconds=seconds)
+
+
+def test_a_scripted_delay_delays_what_is_said_on_its_links_while_it_lasts_and_no_sensing():
+    flown = fly(medium(profile(), [late(0.25, (1, 2), start=5, end=8)]), always(12))
+    waits = np.array([tick.verdicts.due - k for k, tick in enumerate(flown)])
+    expected = np.zeros((12, len(CHANNELS), SIZE), dtype=int)
+    expected[5:8, 1:, ROW] = 3  # 2.5 ticks: the exchange after
+    np.testing.assert_array_equal(waits, expected)
+    fates = np.array([tick.verdicts.fate for tick in flown])
+    np.testing.assert_array_equal(fates, np.where(expected > 0, Fate.DELAYED, Fate.DELIVERED))
+
+
+def test_scripted_delays_add_up_with_each_other_and_with_those_of_the_air():
+    faults = [late(0.14, (1, 2)), late(0.14, (1, 2), (2, 1))]
+    flown = fly(medium(profile(delay_ticks=1), faults), always(1))
+    assert flown[0].verdicts.due[1:, ROW].tolist() == [4, 4]  # 1 + 1.4 + 1.4
+    assert flown[0].verdicts.due[1:, LINKS.index[2, 1]].tolist() == [3, 3]
+    assert flown[0].verdicts.due[1:, LINKS.index[3, 4]].tolist() == [1, 1]
+
+
+def test_a_scripted_delay_is_counted_with_the_wait_in_the_queue():
+    rate = Rate(np.full(SIZE, BITS / DT / 0.3), np.full(SIZE, 0.0), np.full(SIZE, 9e9))
+    alone, together = (
+        fly(medium(profile(rate=rate), faults), always(1))[0].verdicts.due[1:, ROW].tolist()
+        for faults in ([], [late(0.05, (1, 2))])
+    )
+    assert alone == [1, 1]  # 0.3 and 0.6 ticks of sending
+    assert together == [1, 2]  # 0.8 and 1.1
+
+
+def test_a_copy_is_delayed_as_its_message_is():
+    doubled = medium(profile(duplicate=np.ones(SIZE)), [late(0.25, (1, 2))])
+    verdicts = fly(doubled, always(1))[0].verdicts
+    assert verdicts.copy_due[1:, ROW].tolist() == verdicts.due[1:, ROW].tolist() == [3, 3]
+    assert (verdicts.copy_due[0] == -1).all()
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_what_is_sent_when_a_scripted_delay_is_over_overtakes_only_where_order_is_not_kept(ordered):
+    here = constant(0.0, np.ones(SIZE, dtype=bool), ordered=ordered)
+    standing = quiet_profile(LINKS, CHANNELS, delays=(here,))
+    flown = fly(medium(standing, [late(0.3, (1, 2), start=2, end=3)]), always(7))
+    due = [int(tick.verdicts.due[1, ROW]) for tick in flown]
+    assert due == ([0, 1, 5, 5, 5, 5, 6] if ordered else [0, 1, 5, 3, 4, 5, 6])
+
+
+# ---- links that are degraded
+
+
+MIXED = [mixture(mix, IMPAIRMENTS, LINKS, CHANNELS, coupled=False) for mix in (3, 4)]
+DEGRADED = Fault(Verb.DEGRADE, 10, 25, pairs=((1, 2), (4, 3)), profile=1)
+RULED = np.isin(np.arange(SIZE), [LINKS.index[pair] for pair in DEGRADED.pairs])
+
+
+def whole(flown):
+    """All of the verdicts, shape (ticks, 4, C, L)."""
+    return np.array([[field.astype(np.int64) for field in tick.verdicts] for tick in flown])
+
+
+@pytest.fixture(scope="module")
+def flights():
+    """A flight where two links are degraded for a while, and flights under either profile alone."""
+    position = roaming(3, 5, TICKS)
+    mixed = fly(medium(MIXED[0], [DEGRADED], degraded=MIXED[1:]), always(TICKS), position)
+    return whole(mixed), *(whole(fly(medium(alone), always(TICKS), position)) for alone in MIXED)
+
+
+def test_links_that_are_not_degraded_do_not_change_by_a_bit(flights):
+    mixed, own, _ = flights
+    np.testing.assert_array_equal(mixed[..., ~RULED], own[..., ~RULED])
+    np.testing.assert_array_equal(mixed[:10], own[:10])
+    assert (mixed[10:25][..., RULED] != own[10:25][..., RULED]).any()
+
+
+def test_a_degraded_link_has_the_verdicts_of_the_other_profile_for_as_long_as_it_lasts():
+    apart = [name for name in IMPAIRMENTS if name not in ("chains", "chains of one class", "ordered", "rate")]
+    own, other = (mixture(mix, apart, LINKS, CHANNELS, coupled=False) for mix in (3, 4))
+    position = roaming(3, 5, TICKS)
+    mixed, before, during = (
+        whole(fly(flying, always(TICKS), position))
+        for flying in (medium(own, [DEGRADED], degraded=[other]), medium(own), medium(other))
+    )
+    np.testing.assert_array_equal(mixed[10:25][..., RULED], during[10:25][..., RULED])
+    np.testing.assert_array_equal(mixed[25:], before[25:])
+    assert (before[10:25][..., RULED] != during[10:25][..., RULED]).any()
+
+
+def test_a_link_that_is_degraded_to_its_own_profile_does_not_change_by_a_bit_where_nothing_remembers():
+    by_time = [name for name in IMPAIRMENTS if name not in ("chains", "chains of one class", "rate")]
+    own, position = mixture(3, by_time, LINKS, CHANNELS, coupled=False), roaming(3, 5, TICKS)
+    flights = [whole(fly(medium(own, faults, degraded=[own]), always(TICKS), position)) for faults in ([], [DEGRADED])]
+    np.testing.assert_array_equal(*flights)
+
+
+def test_the_queue_of_a_degraded_link_empties_while_another_profile_rules_it():
+    queued = Rate(np.full(SIZE, BITS / DT), np.zeros(SIZE), np.full(SIZE, 9e9))  # a tick for a message, two are sent
+    faults = [Fault(Verb.DEGRADE, 4, 7, pairs=((1, 2),), profile=1)]
+    flown = fly(medium(profile(rate=queued), faults, degraded=[profile()]), always(9))
+    wait = np.array([tick.verdicts.due[2] - k for k, tick in enumerate(flown)])
+    assert wait[:, ROW].tolist() == [2, 3, 4, 5, 0, 0, 0, 3, 4]  # 5 owed in tick 3, 4 ticks later 1
+    assert wait[:, LINKS.index[2, 1]].tolist() == [2, 3, 4, 5, 6, 7, 8, 9, 10]
+
+
+def test_the_profile_of_the_higher_number_rules_a_link_that_is_degraded_twice():
+    degraded = [profile(delay_ticks=wait) for wait in (2, 4)]
+    faults = [Fault(Verb.DEGRADE, 0, None, pairs=((1, 2),), profile=number) for number in (2, 1)]
+    flown = fly(medium(profile(), [*faults, replace(faults[1], pairs=((2, 1),))], degraded=degraded), always(1))
+    due = flown[0].verdicts.due[1]
+    assert (due[ROW], due[LINKS.index[2, 1]], due[LINKS.index[3, 4]]) == (4, 2, 0)
+
+
+def test_messages_keep_their_order_where_the_profile_that_rules_them_keeps_it():
+    rows = np.ones(SIZE, dtype=bool)
+    ordered = quiet_profile(LINKS, CHANNELS, delays=(constant(0.0, rows, ordered=True),))
+    slow = quiet_profile(LINKS, CHANNELS, delays=(constant(0.4, rows),))
+    back = fly(medium(ordered, [Fault(Verb.DEGRADE, 2, 3, pairs=((1, 2),), profile=1)], degraded=[slow]), always(7))
+    assert [int(tick.verdicts.due[1, ROW]) for tick in back] == [0, 1, 6, 6, 6, 6, 6]
+
+
+def test_a_bias_is_that_of_the_profile_that_ruled_the_link_when_the_message_was_sent():
+    own, other = (profile(bias=np.full(SIZE, bias)) for bias in (1.0, 2.0))
+    flying = medium(own, [DEGRADED], degraded=[other])
+    content, link = np.array([9, 10, 24, 25, 12]), np.array([ROW, ROW, ROW, ROW, LINKS.index[2, 1]])
+    assert flying.bias(content, link).tolist() == [1.0, 2.0, 2.0, 1.0, 1.0]
+
+
+def test_a_run_that_may_be_degraded_to_a_profile_of_places_needs_positions():
+    assert not medium(profile(), degraded=[with_all_jammed(profile())]).ahead
+    assert medium(profile(), degraded=[profile()]).ahead
+
+
+def test_a_run_that_waits_for_a_trigger_cannot_be_judged_ahead():
+    waiting = Timeline(LINKS, [replace(DEGRADED, trigger=0)], [Trigger(1.0, above=True, ticks=1)])
+    assert not Medium(1, CHANNELS, MIXED[:1], waiting).ahead
+    flying = Medium(1, CHANNELS, [profile(), profile()], waiting)
+    flying.timeline = waiting.fired([0], 3)
+    assert flying.ahead
+
+
+# ---- agents that are paused
+
+TOWARD_2 = LINKS.dst == 2
+
+
+def paused(policy):
+    return [Fault(Verb.PAUSE, 5, 8, agents=(2,), under_way=policy)]
+
+
+def arrivals(flown, row=ROW, channel=1):
+    """(tick, content tick) of what arrives on a link and channel."""
+    return [
+        (tick, content)
+        for tick, (_, delivery, _) in enumerate(flown)
+        for content in [
+            *(here[0] for here in delivery.apart.tolist() if here[1:3] == [row, channel]),
+            *([tick] if delivery.plain[channel, row] else []),
+        ]
+    ]
+
+
+def test_what_is_sent_to_a_paused_agent_waits_and_arrives_in_order_when_it_goes_on():
+    flown = fly(medium(profile(), paused(UnderWay.HOLD)), always(10))
+    assert arrivals(flown) == [*((k, k) for k in range(5)), (8, 5), (8, 6), (8, 7), (8, 8), (9, 9)]
+    assert [tick.air.in_flight for tick in flown] == [0] * 5 + [2 * TOWARD_2.sum() * n for n in (1, 2, 3)] + [0, 0]
+    released = flown[8].delivery.released
+    assert {(sent, link) for sent, _, link, _ in released.tolist()} == {
+        (sent, link) for sent in (5, 6, 7) for link in np.flatnonzero(TOWARD_2).tolist()
+    }
+
+
+@pytest.mark.parametrize("policy", [UnderWay.HOLD, UnderWay.DROP])
+def test_a_paused_agent_measures_nothing_and_is_measured_and_heard_by_others(policy):
+    fates = np.array([tick.verdicts.fate for tick in fly(medium(profile(), paused(policy)), always(10))])
+    heard = {UnderWay.HOLD: Fate.DELAYED, UnderWay.DROP: Fate.PAUSED}[policy]
+    assert (fates[5:8, 0][:, TOWARD_2] == Fate.PAUSED).all()
+    assert (fates[5:8, 1:][..., TOWARD_2] == heard).all()
+    assert (fates[..., ~TOWARD_2] == Fate.DELIVERED).all()
+    assert (fates[[0, 4, 8, 9]] == Fate.DELIVERED).all()
+
+
+@pytest.mark.parametrize("policy", [UnderWay.HOLD, UnderWay.DROP])
+def test_what_is_under_way_to_an_agent_when_it_is_paused_waits_with_the_rest_or_is_dropped_with_it(policy):
+    flown = fly(medium(profile(delay_ticks=2), paused(policy)), always(12))
+    before, after = [(2, 0), (3, 1), (4, 2)], [(10, 8), (11, 9)]
+    if policy is UnderWay.HOLD:
+        assert arrivals(flown) == [*before, (8, 3), (8, 4), (8, 5), (8, 6), (9, 7), *after]
+        assert not any(len(tick.delivery.dropped) for tick in flown)
+    else:
+        assert arrivals(flown) == [*before, *after]
+        dropped = flown[5].delivery.dropped
+        assert set(dropped[:, 4]) == {Fate.PAUSED}
+        assert len(dropped) == 2 * 2 * TOWARD_2.sum()
+        assert set(dropped[:, 2]) == set(np.flatnonzero(TOWARD_2))
+
+
+def test_what_waits_for_a_paused_agent_that_dies_is_dropped_for_its_death():
+    faults = [*paused(UnderWay.HOLD), Fault(Verb.KILL, 7, None, agents=(2,))]
+    flown = fly(medium(profile(), faults), always(10))
+    assert set(flown[7].delivery.dropped[:, 4]) == {Fate.DEAD}
+    assert len(flown[7].delivery.dropped) == 2 * 2 * TOWARD_2.sum()
+    assert flown[-1].air.in_flight == 0
+
+
+def test_of_two_pauses_one_that_drops_takes_what_the_other_holds():
+    faults = [*paused(UnderWay.HOLD), Fault(Verb.PAUSE, 6, 7, agents=(2,))]
+    flown = fly(medium(profile(), faults), always(10))
+    assert arrivals(flown) == [*((k, k) for k in range(5)), (8, 7), (8, 8), (9, 9)]
+    assert {(sent, fate) for sent, *_, fate in flown[6].delivery.dropped.tolist()} == {(5, Fate.PAUSED)}
+
+
+def test_what_is_lost_on_its_way_to_a_paused_agent_does_not_wait_for_it():
+    flown = fly(medium(profile(availability=0.5), paused(UnderWay.HOLD)), always(10))
+    alone = fly(medium(profile(availability=0.5)), always(10))
+    assert arrivals(flown, ROW) == [(max(k, 8) if 5 <= k < 8 else k, k) for k, _ in arrivals(alone, ROW)]
+    assert 0 < sum(5 <= k < 8 for k, _ in arrivals(alone, ROW)) < 3
+
+
+# ---- sensors that drop out
+
+
+def test_only_sensing_drops_out_on_its_links_as_often_as_asked_for():
+    fault = Fault(Verb.DROPOUT, 0, None, pairs=((1, 2), (2, 3)), probability=0.3)
+    fates = verdicts(profile(coupled=False), 2000, [fault], seed=3)
+    struck = np.isin(np.arange(SIZE), [ROW, LINKS.index[2, 3]])
+    assert (fates[:, 1:] == Fate.DELIVERED).all()
+    assert (fates[:, 0, ~struck] == Fate.DELIVERED).all()
+    assert set(np.unique(fates[:, 0, struck])) == {Fate.DELIVERED, Fate.DROPOUT}
+    for row in np.flatnonzero(struck):
+        assert abs((fates[:, 0, row] == Fate.DROPOUT).sum() - 600) < 3 * np.sqrt(2000 * 0.3 * 0.7)
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+def test_a_sensor_that_drops_out_takes_no_word_with_it(coupled):
+    everywhere = Fault(Verb.DROPOUT, 0, None, pairs=tuple(LINKS.index), probability=1.0)
+    fates = judged(profile(coupled=coupled), [everywhere])
+    assert (fates[0] == Fate.DROPOUT).all()
+    assert (fates[1:] == Fate.DELIVERED).all()
+
+
+def test_dropouts_are_independent_of_scripted_losses_and_of_each_other():
+    everywhere = {"pairs": tuple(LINKS.index), "probability": 0.5}
+    drop, lose = (Fault(verb, 0, None, **everywhere) for verb in (Verb.DROPOUT, Verb.LOSE))
+    missing = verdicts(profile(), 500, [drop, drop], seed=3)[:, 0] == Fate.DROPOUT
+    lost = verdicts(profile(), 500, [lose], seed=3)[:, 0] == Fate.SCRIPTED
+    assert missing.mean() == pytest.approx(0.75, abs=0.02)
+    assert (missing & lost).mean() == pytest.approx(0.375, abs=0.02)
 
 
 # ---- accounts

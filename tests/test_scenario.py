@@ -95,12 +95,13 @@ def test_a_scenario_flies_as_it_is_written(file):
     row = links.index[1, 2]
     assert (made.world.dt, made.world.ticks, made.world.seed) == (0.01, 100, 1)
     assert made.estimator.build().sigma_w == 0.5
-    (layer,), (delay,) = made.profile.chains, made.profile.delays
+    (air,) = made.profiles
+    (layer,), (delay,) = air.chains, air.delays
     other = np.arange(len(links)) != row
     assert layer.loss[row, 0] == 0.5
     assert layer.loss[other, 0] == pytest.approx(0.3)
     assert (delay.mean, delay.rows.tolist()) == (pytest.approx(0.03), (~other).tolist())
-    assert made.profile.coupled
+    assert air.coupled
     assert made.faults == (
         Fault(Verb.CUT, 10, 30, pairs=((2, 4), (2, 1), (1, 2))),
         Fault(Verb.KILL, 40, 50, agents=(5,)),
@@ -147,7 +148,8 @@ def test_a_formation_of_ones_own_flies(file):
 @pytest.mark.parametrize(("exchange", "least"), [("same-tick", 0), ("next-tick", 1)])
 def test_next_tick_exchange_delays_every_message_by_a_tick(file, exchange, least):
     file.write_text(GOOD)
-    assert plan.make(scenario.load(str(file), [f"time.exchange={exchange}"])).profile.least_delay == least
+    (air,) = plan.make(scenario.load(str(file), [f"time.exchange={exchange}"])).profiles
+    assert air.least_delay == least
 
 
 def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
@@ -292,6 +294,10 @@ def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_ri
 # ---- what is wrong in a file
 
 
+VERBS = (
+    "cut, partition, lose, delay, degrade, heal, kill, restart, pause, resume, clock, depart, rejoin, "
+    "gust, bias, outlier, dropout, freeze, lie"
+)
 WRONG = [
     # keys
     ("availability = 0.7", "availabilty = 0.7", "network.availabilty", "did you mean 'availability'? known here: "),
@@ -299,7 +305,12 @@ WRONG = [
     ("[network]", "[netwrok]", "netwrok", "did you mean 'network'?"),
     ("until = 0.3", "untill = 0.3", "timeline.1.untill", "did you mean 'until'?"),
     ("delay_ticks = 3", "delay = 3", "network.links.1.delay", "did you mean 'delay_ticks'?"),
-    ("at = 0.4\n", "at = 0.4\nuntil = 0.5\n", "timeline.2.until", "known here: agents, at, verb"),
+    (
+        "at = 0.4\n",
+        "at = 0.4\nuntil = 0.5\n",
+        "timeline.2.until",
+        "known here: after, agents, at, every, name, times, verb, when",
+    ),
     ("dt = 0.01\n", "", "time.dt", "is missing; it has no default"),
     # types
     ("dt = 0.01", 'dt = "fast"', "time.dt", "valid number"),
@@ -370,23 +381,28 @@ WRONG = [
     ('"1-2"]', '"1-2"]\nin_flight = "keep"', "timeline.1.in_flight", "'drop', 'deliver' or 'hold', got 'keep'"),
     ('verb = "cut"', 'verb = "lose"', "timeline.1.loss", "is missing; it has no default"),
     ('verb = "cut"', 'verb = "lose"\nloss = 1.5', "timeline.1.loss", "less than or equal to 1, got 1.5"),
-    ('verb = "cut"', 'verb = "lose"\nloss = 1.0\nin_flight = "hold"', "timeline.1.in_flight", "known here: at, links"),
+    (
+        'verb = "cut"',
+        'verb = "lose"\nloss = 1.0\nin_flight = "hold"',
+        "timeline.1.in_flight",
+        "known here: after, at, every, lasts, links, loss, ",
+    ),
     ("until = 0.3", "until = 0.05", "timeline.1", "ends at 0.05 s, but begins at 0.1 s; until must be later"),
     (
         'verb = "kill"',
         'verb = "depart"',
         "timeline.3",
-        "agent 5 is not dead then; name its kill before its restart",
+        "agent 5 is under no kill then, in the same frame of time, that this could end",
     ),
-    ("at = 0.5", "at = 0.4", "timeline.3", "agent 5 is not dead then"),
+    ("at = 0.5", "at = 0.4", "timeline.3", "agent 5 is under no kill then"),
     (
         'verb = "kill"',
         'verb = "explode"',
         "timeline.2",
-        "needs a verb among cut, partition, lose, depart, kill, restart",
+        f"needs a verb among {VERBS}",
     ),
-    ('verb = "kill"\n', "", "timeline.2", "needs a verb among cut, partition, lose, depart, kill, restart"),
-    ("agents = [5]", "agents = [9]", "timeline.2", "agent 9 does not exist: agents are 1 to 7"),
+    ('verb = "kill"\n', "", "timeline.2", f"needs a verb among {VERBS}"),
+    ("agents = [5]", "agents = [9]", "timeline.2.agents", "agent 9 does not exist: agents are 1 to 7"),
     ('links = ["2->4", "1-2"]', "links = []", "timeline.1.links", "at least 1 item"),
     (
         'verb = "kill"\nat = 0.4\nagents = [5]\n\n[[timeline]]\nverb = "restart"\nat = 0.5\nagents = [5]',

@@ -10,14 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.brief import Brief
+from agents.process import AgentBrief, Choice
 from analysis.affine import Manoeuvre
 from netem import wire
 from netem.delay import Law
-from netem.fault import Fault, UnderWay, Verb
+from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Links
 from netem.plain import PlainError, from_plain, plainly
 from netem.process import MediumBrief
 from netem.session import Login
+from netem.trigger import Trigger
 from netem.wire import Phase, WireError
 
 
@@ -26,12 +28,26 @@ def name(message):
 
 
 MESSAGES = [
-    wire.Sense(k=7, src="world", seq=7, last=False, measured=[[0.5, -1.0]], position=[[1.0, 2.0], [0.5, 3.0]]),
-    wire.SenseInbox(k=7, src="netem", seq=14, phase=Phase.SENSE, neighbours=[2], measured=[[0.5, 1.0]], position=None),
+    wire.Sense(
+        k=7, src="world", seq=7, last=False, measured=[[0.5, -1.0]], position=[[1.0, 2.0], [0.5, 3.0]], fired=[1]
+    ),
+    wire.SenseInbox(
+        k=7, src="netem", seq=14, phase=Phase.SENSE, clock=9, neighbours=[2], measured=[[0.5, 1.0]], position=None
+    ),
     wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
     wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
     wire.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
-    wire.Act(k=7, src=3, seq=7, velocity=[1.0, 2.0], estimate=[[1.0, 0.0]], known=[True], psi=0.25, heard=12),
+    wire.Act(
+        k=7,
+        src=3,
+        seq=7,
+        velocity=[1.0, 2.0],
+        estimate=[[1.0, 0.0]],
+        known=[True],
+        covariance=[[0.5, 0.0, 0.5]],
+        psi=0.25,
+        heard=12,
+    ),
     wire.Journal(
         k=7,
         src="netem",
@@ -260,6 +276,7 @@ BRIEF = Brief(
 )
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 PROFILE = mixture(3, frozenset(IMPAIRMENTS), LINKS, ("sense", "theta"), coupled=False, least_delay=1)
+DEGRADED = mixture(4, frozenset({"delays", "listed"}), LINKS, ("sense", "theta"), coupled=False, least_delay=1)
 MEDIUM = MediumBrief(
     run="r1",
     login=Login("tcp/127.0.0.1:7447", "netem", "secret"),
@@ -267,17 +284,43 @@ MEDIUM = MediumBrief(
     seed=2**64 - 1,
     links=LINKS,
     channels=("sense", "theta"),
-    profile=PROFILE,
+    profiles=(PROFILE, DEGRADED),
     faults=(
         Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1)), under_way=UnderWay.HOLD),
         Fault(Verb.LOSE, 3, 6, pairs=((1, 2),), probability=0.25),
         Fault(Verb.PARTITION, 3, None, groups=((1,), (2, 3))),
-        Fault(Verb.KILL, 9, None, agents=(3,)),
+        Fault(Verb.KILL, 9, None, agents=(3,), warm=True),
+        Fault(Verb.DELAY, 3, 6, trigger=1, pairs=((1, 2),), seconds=0.3),
+        Fault(Verb.DEGRADE, 3, 6, pairs=((1, 2),), profile=1),
+        Fault(Verb.PAUSE, 3, 6, agents=(2,), under_way=UnderWay.HOLD),
+        Fault(Verb.CLOCK, 3, 6, agents=(2,), rate=-0.5),
+        Fault(Verb.DEPART, 3, 6, agents=(2,), body=Body.DRIFT),
+        Fault(Verb.GUST, 3, 6, agents=(2,), vector=(1.0, -0.5)),
+        Fault(Verb.BIAS, 3, 6, pairs=((1, 2),), vector=(1.0, -0.5)),
+        Fault(Verb.OUTLIER, 3, 6, pairs=((1, 2),), probability=0.1, deviation=3.0),
+        Fault(Verb.DROPOUT, 3, 6, pairs=((1, 2),), probability=0.5),
+        Fault(Verb.FREEZE, 3, 6, pairs=((1, 2),)),
+        Fault(Verb.LIE, 3, 6, agents=(2,), matrix=((0.0, 1.0), (-1.0, 0.5))),
     ),
+    triggers=(Trigger(level=2.0, above=True, ticks=4), Trigger(level=0.1, above=False, ticks=1)),
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     leaders=np.array([True, False, False]),
     patience_s=10.0,
+)
+
+
+AGENT = AgentBrief(
+    run="r1",
+    login=Login("tcp/127.0.0.1:7447", "agent-2", "secret"),
+    agent=2,
+    neighbours=(1, 3),
+    estimator=Choice("agents.estimators.none:NoEstimator", {}),
+    law=Choice("agents.controllers:Static", {"alpha": 2.0}),
+    leader_gain=1.0,
+    brief=BRIEF,
+    checkpoint="/tmp/agent-2.npz",
+    remembers=True,
 )
 
 
@@ -287,13 +330,20 @@ def plain_of(brief):
 
 @pytest.mark.parametrize(
     "brief",
-    [BRIEF, replace(BRIEF, mission=None), MEDIUM, *MEDIUM.faults],
-    ids=["agent", "no mission", "medium", "cut", "lose", "partition", "kill"],
+    [
+        *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, checkpoint=None, remembers=False)),
+        *(MEDIUM, *MEDIUM.faults, *MEDIUM.triggers),
+    ],
+    ids=["place", "no mission", "agent", "no checkpoint", "medium", *(f.verb for f in MEDIUM.faults), "above", "below"],
 )
 def test_a_brief_survives_the_trip(brief):
     arrived = from_plain(type(brief), plain_of(brief))
     assert type(arrived) is type(brief)
     np.testing.assert_equal(asdict(arrived), asdict(brief))
+
+
+def test_every_verb_travels():
+    assert {fault.verb for fault in MEDIUM.faults} == set(Verb)
 
 
 def test_arrays_of_a_brief_keep_their_types_and_shapes():
@@ -302,9 +352,9 @@ def test_arrays_of_a_brief_keep_their_types_and_shapes():
     assert arrived.present.dtype == np.bool_
     assert arrived.leader.shape == ()
     assert medium.links.src.dtype == np.int64
-    assert medium.profile.listed.dtype == medium.profile.schedules[0].period.dtype == np.int64
-    assert medium.profile.delays[0].rows.dtype == np.bool_
-    assert medium.profile.chains[0].cumulative.shape == PROFILE.chains[0].cumulative.shape
+    assert medium.profiles[0].listed.dtype == medium.profiles[0].schedules[0].period.dtype == np.int64
+    assert medium.profiles[0].delays[0].rows.dtype == np.bool_
+    assert medium.profiles[0].chains[0].cumulative.shape == PROFILE.chains[0].cumulative.shape
     assert arrived.mission.theta.shape == (4, 2, 2)
 
 
@@ -313,10 +363,15 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
     assert arrived.faults == MEDIUM.faults
     assert arrived.faults[0].verb is Verb.CUT
     assert arrived.faults[0].under_way is UnderWay.HOLD
-    assert arrived.profile.delays[0].law is Law.CONSTANT
-    assert {len(layers) > 0 for layers in (arrived.profile.traces, arrived.profile.reaches, arrived.profile.zones)} == {
-        True
-    }
+    assert arrived.profiles[0].delays[0].law is Law.CONSTANT
+    own = arrived.profiles[0]
+    assert all(len(layers) > 0 for layers in (own.traces, own.reaches, own.zones))
+    assert not arrived.profiles[1].traces
+    assert arrived.triggers == MEDIUM.triggers
+    assert arrived.faults[0].trigger is None
+    assert arrived.faults[4].trigger == 1
+    assert [fault.body for fault in arrived.faults[:1] + arrived.faults[8:9]] == [Body.HOLD, Body.DRIFT]
+    assert arrived.faults[-1].matrix == ((0.0, 1.0), (-1.0, 0.5))
     assert arrived.login == MEDIUM.login
     assert arrived.channels == ("sense", "theta")
 
@@ -340,13 +395,19 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
         ({"leaders": [1, 0, 2]}, r"^leaders: .*bool.*2"),
         ({"leaders": ["no"]}, r"^leaders: .*bool.*'no'"),
         (
-            {"profile": asdict(PROFILE) | {"duplicate": [None]}},
-            r"^profile\.duplicate: .*float64.*None",
+            {"profiles": [asdict(PROFILE), asdict(PROFILE) | {"duplicate": [None]}]},
+            r"^profiles\[\]\.duplicate: .*float64.*None",
         ),
         (
-            {"profile": asdict(PROFILE) | {"duplicate": ["1"]}},
-            r"^profile\.duplicate: .*float64.*'1'",
+            {"profiles": [asdict(PROFILE) | {"duplicate": ["1"]}]},
+            r"^profiles\[\]\.duplicate: .*float64.*'1'",
         ),
+        ({"profiles": asdict(PROFILE)}, r"^profiles: expected a list"),
+        (
+            {"triggers": [{"level": 1.0, "above": 1, "ticks": 2}]},
+            r"^triggers\[\]\.above: expected true or false, got 1",
+        ),
+        ({"triggers": [{"level": 1.0, "above": True}]}, r"^triggers\[\]: Trigger has .*missing \['ticks'\]"),
     ],
 )
 def test_what_does_not_fit_a_brief_is_named_by_its_path(wrong, match):

@@ -1,17 +1,43 @@
 """The world: what is sensed, and where the agents are in the next tick."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Links
+from netem.timeline import Timeline
+from world import sensors
 from world.formation import PRESETS, Formation
 from world.maneuver import corridor, hover
-from world.world import World
+from world.world import Scene, World
 
 ZHAO7 = PRESETS["zhao7"]
-NOBODY = np.zeros(7, dtype=bool)
+SEVEN = Links.both_ways(7, ZHAO7.edges)
+REST = np.zeros((7, 2))
+UNSEEN = np.zeros((len(SEVEN), 2))
+BEFORE = np.full((len(SEVEN), 2), 77.0)
+GONE = (4, 7)
+ABSENT = np.isin(np.arange(1, 8), GONE)
+
+
+def under(*faults, links=SEVEN):
+    """The conditions of the first tick."""
+    return Timeline(links, faults).at(0)
+
+
+QUIET = under()
+
+
+def scene(position, velocity=REST, measured=UNSEEN):
+    return Scene(position, velocity, measured)
+
+
+def moved(world, tick, position, flown, *faults):
+    """Where agents are a tick later."""
+    return world.step(tick, scene(position), UNSEEN, flown, under(*faults)).position
 
 
 @pytest.fixture
@@ -21,7 +47,7 @@ def world():
         dt=0.01,
         ticks=6000,
         formation=ZHAO7,
-        links=Links.both_ways(7, ZHAO7.edges),
+        links=SEVEN,
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
         covariance=0.01 * np.eye(2),
         disturbance=0.0,
@@ -32,7 +58,7 @@ def world():
 def noise_of(world, ticks):
     z = ZHAO7.nominal
     true = z[world.links.dst - 1] - z[world.links.src - 1]
-    return np.concatenate([world.measure(tick, z) - true for tick in ticks])
+    return np.concatenate([world.measure(tick, scene(z), QUIET) - true for tick in ticks])
 
 
 @pytest.mark.parametrize("R", [[[0.01, 0.0], [0.0, 0.01]], [[0.01, 0.003], [0.003, 0.01]], [[4.0, -1.0], [-1.0, 0.5]]])
@@ -54,28 +80,29 @@ def test_measured_is_the_position_relative_to_the_neighbour(world):
     exact = replace(world, covariance=1e-24 * np.eye(2))
     z = np.random.default_rng(1).normal(size=(7, 2))
     row = exact.links.index[4, 2]  # what 2 sees of 4
-    np.testing.assert_allclose(exact.measure(0, z)[row], z[1] - z[3], atol=1e-10)
+    np.testing.assert_allclose(exact.measure(0, scene(z), QUIET)[row], z[1] - z[3], atol=1e-10)
 
 
 def test_noise_is_added_to_what_is_sensed_wherever_the_agents_are(world):
     z = np.random.default_rng(1).normal(size=(7, 2))
-    moved = world.measure(3, z) - world.measure(3, np.zeros((7, 2)))
-    np.testing.assert_allclose(moved, z[world.links.dst - 1] - z[world.links.src - 1], atol=1e-12)
+    apart = world.measure(3, scene(z), QUIET) - world.measure(3, scene(REST), QUIET)
+    np.testing.assert_allclose(apart, z[world.links.dst - 1] - z[world.links.src - 1], atol=1e-12)
 
 
 def test_noise_of_a_link_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges))
+    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2))), under(links=small.links)
     for tick in (0, 1, 64, 5000):
-        large_noise, small_noise = world.measure(tick, np.zeros((7, 2))), small.measure(tick, np.zeros((3, 2)))
+        large_noise, small_noise = world.measure(tick, scene(REST), QUIET), small.measure(tick, three, nothing)
         for link, row in small.links.index.items():
             assert small_noise[row].tobytes() == large_noise[world.links.index[link]].tobytes()
 
 
 def test_noise_is_the_same_in_whatever_order_the_ticks_are_asked_for(world):
-    z = ZHAO7.nominal
-    forwards = {tick: world.measure(tick, z).tobytes() for tick in (0, 5, 70, 200)}
-    backwards = {tick: replace(world).measure(tick, z).tobytes() for tick in (200, 70, 5, 0)}
+    here = scene(ZHAO7.nominal)
+    forwards = {tick: world.measure(tick, here, QUIET).tobytes() for tick in (0, 5, 70, 200)}
+    backwards = {tick: replace(world).measure(tick, here, QUIET).tobytes() for tick in (200, 70, 5, 0)}
     assert forwards == backwards
     assert len(set(forwards.values())) == 4
 
@@ -86,27 +113,104 @@ def test_another_seed_is_another_noise(world):
 
 def test_step_integrates_the_velocity(world):
     z, u = np.random.default_rng(1).normal(size=(2, 7, 2))
-    np.testing.assert_allclose(world.step(0, z, u, NOBODY), z + 0.01 * u, atol=1e-15)
+    np.testing.assert_allclose(moved(world, 0, z, u), z + 0.01 * u, atol=1e-15)
 
 
-def test_absent_agents_hold_still(world):
+def test_step_remembers_what_was_flown_and_measured(world):
     z, u = np.random.default_rng(1).normal(size=(2, 7, 2))
-    absent = np.array([0, 0, 0, 1, 0, 0, 1], dtype=bool)
-    after = world.step(0, z, u, absent)
-    np.testing.assert_array_equal(after[absent], z[absent])
-    np.testing.assert_allclose(after[~absent], (z + 0.01 * u)[~absent], atol=1e-15)
+    measured = np.random.default_rng(2).normal(size=(len(SEVEN), 2))
+    after = world.step(0, scene(z), measured, u, QUIET)
+    np.testing.assert_array_equal(after.velocity, u)
+    np.testing.assert_array_equal(after.measured, measured)
 
 
-def test_absent_agents_hold_still_under_disturbance_too(world):
+HOLDING = [
+    Fault(Verb.KILL, 0, None, agents=GONE),
+    Fault(Verb.DEPART, 0, None, agents=GONE),
+    Fault(Verb.DEPART, 0, None, agents=GONE, body=Body.VANISH),
+]
+HELD = pytest.mark.parametrize("fault", HOLDING, ids=lambda fault: f"{fault.verb}, {fault.body}")
+
+
+@HELD
+def test_absent_agents_hold_still(world, fault):
+    z, u = np.random.default_rng(1).normal(size=(2, 7, 2))
+    flown = world.flown(scene(z, velocity=-u), u, under(fault))
+    after = moved(world, 0, z, flown, fault)
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+    np.testing.assert_array_equal(after[ABSENT], z[ABSENT])
+    np.testing.assert_allclose(after[~ABSENT], (z + 0.01 * u)[~ABSENT], atol=1e-15)
+
+
+@HELD
+def test_absent_agents_hold_still_under_disturbance_and_gusts_too(world, fault):
+    gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
     z = ZHAO7.nominal
-    absent = np.array([0, 0, 0, 1, 0, 0, 1], dtype=bool)
-    after = replace(world, disturbance=0.1).step(0, z, np.zeros((7, 2)), absent)
-    np.testing.assert_array_equal(after[absent], z[absent])
+    after = moved(replace(world, disturbance=0.1), 0, z, REST, fault, gust)
+    np.testing.assert_array_equal(after[ABSENT], z[ABSENT])
+    assert (after[~ABSENT] != z[~ABSENT]).all()
+
+
+COASTING = [
+    Fault(Verb.PAUSE, 0, None, agents=GONE, under_way=UnderWay.HOLD),
+    Fault(Verb.DEPART, 0, None, agents=GONE, body=Body.DRIFT),
+]
+
+
+@pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
+def test_paused_and_drifting_bodies_fly_on_as_they_did_whatever_is_commanded(world, fault):
+    before, u = np.random.default_rng(1).normal(size=(2, 7, 2))
+    flown = world.flown(scene(ZHAO7.nominal, velocity=before), u, under(fault))
+    np.testing.assert_array_equal(flown[ABSENT], before[ABSENT])
+    np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
+    np.testing.assert_allclose(moved(world, 0, ZHAO7.nominal, flown, fault), ZHAO7.nominal + 0.01 * flown, atol=1e-15)
+
+
+def test_a_body_flies_on_for_as_long_as_its_agent_is_paused(world):
+    timeline = Timeline(SEVEN, [Fault(Verb.PAUSE, 2, 5, agents=(4,), under_way=UnderWay.HOLD)])
+    here, flown = scene(ZHAO7.nominal), []
+    for tick in range(7):
+        now, commanded = timeline.at(tick), np.full((7, 2), float(tick + 1))
+        flown.append(world.flown(here, commanded, now))
+        here = world.step(tick, here, here.measured, flown[-1], now)
+    assert [each[3, 0] for each in flown] == [1, 2, 2, 2, 2, 6, 7]
+    assert [each[4, 0] for each in flown] == [1, 2, 3, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
+def test_a_body_that_coasts_holds_when_its_agent_dies(world, fault):
+    u = np.ones((7, 2))
+    flown = world.flown(scene(ZHAO7.nominal, velocity=u), u, under(fault, Fault(Verb.KILL, 0, None, agents=(4,))))
+    assert flown[:, 0].tolist() == [1, 1, 1, 0, 1, 1, 1]
+
+
+def test_an_agent_that_departs_while_paused_holds(world):
+    u = np.ones((7, 2))
+    flown = world.flown(scene(ZHAO7.nominal, velocity=u), u, under(COASTING[0], HOLDING[1]))
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+
+
+def test_gusts_carry_their_agents_on_top_of_what_they_fly(world):
+    z, u = np.random.default_rng(1).normal(size=(2, 7, 2))
+    one, two = (
+        Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)),
+        Fault(Verb.GUST, 0, None, agents=(5,), vector=(0.0, 4.0)),
+    )
+    push = np.zeros((7, 2))
+    push[1], push[4] = (3.0, -1.0), (3.0, 3.0)
+    np.testing.assert_allclose(moved(world, 0, z, u, one, two), z + 0.01 * (u + push), atol=1e-15)
+
+
+def test_a_gust_is_no_input_of_its_agent(world):
+    gust = under(Fault(Verb.GUST, 0, None, agents=(2,), vector=(3.0, -1.0)))
+    u = world.flown(scene(ZHAO7.nominal), np.ones((7, 2)), gust)
+    np.testing.assert_array_equal(u, 1.0)
+    np.testing.assert_array_equal(world.step(0, scene(ZHAO7.nominal), UNSEEN, u, gust).velocity, 1.0)
 
 
 def test_disturbance_is_a_displacement_per_tick_of_the_deviation_asked_for(world):
-    gusty, origin = replace(world, disturbance=0.2), np.zeros((7, 2))
-    drawn = np.array([gusty.step(tick, origin, origin, NOBODY) for tick in range(5000)])
+    gusty = replace(world, disturbance=0.2)
+    drawn = np.array([moved(gusty, tick, REST, REST) for tick in range(5000)])
     assert drawn.std() == pytest.approx(0.2, rel=0.02)
     np.testing.assert_allclose(np.corrcoef(drawn.reshape(5000, 14).T), np.eye(14), atol=0.06)
 
@@ -114,15 +218,15 @@ def test_disturbance_is_a_displacement_per_tick_of_the_deviation_asked_for(world
 def test_disturbance_of_an_agent_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges), disturbance=0.2)
-    large = replace(world, disturbance=0.2)
-    seven = large.step(9, np.zeros((7, 2)), np.zeros((7, 2)), NOBODY)
-    three = small.step(9, np.zeros((3, 2)), np.zeros((3, 2)), NOBODY[:3])
-    assert three.tobytes() == seven[:3].tobytes()
+    seven = moved(replace(world, disturbance=0.2), 9, REST, REST)
+    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)))
+    after = small.step(9, three, nothing, REST[:3], under(links=small.links))
+    assert after.position.tobytes() == seven[:3].tobytes()
 
 
 def test_leaders_start_on_their_targets_and_followers_about_theirs(world):
     flying = replace(world, manoeuvre=corridor(np.arange(6001) * 0.01), spread=0.5)
-    starts = np.array([replace(flying, seed=seed).start() for seed in range(500)])
+    starts = np.array([replace(flying, seed=seed).start().position for seed in range(500)])
     offset = starts - flying.target(0)
     np.testing.assert_array_equal(offset[:, :3], 0.0)
     assert offset[:, 3:].std() == pytest.approx(0.5, rel=0.05)
@@ -130,4 +234,92 @@ def test_leaders_start_on_their_targets_and_followers_about_theirs(world):
 
 
 def test_spread_zero_starts_everybody_on_target(world):
-    np.testing.assert_array_equal(replace(world, spread=0.0).start(), ZHAO7.nominal)
+    np.testing.assert_array_equal(replace(world, spread=0.0).start().position, ZHAO7.nominal)
+
+
+def test_everybody_starts_at_rest_with_a_true_picture(world):
+    begun = world.start()
+    np.testing.assert_array_equal(begun.velocity, REST)
+    np.testing.assert_array_equal(begun.measured, begun.position[SEVEN.dst - 1] - begun.position[SEVEN.src - 1])
+
+
+# ---- sensors that fail
+
+BIASED, OTHERS = SEVEN.index[4, 2], np.arange(len(SEVEN)) != SEVEN.index[4, 2]
+
+
+def failing(world, *faults, tick=3):
+    """What sensors say, and what they would say if they worked."""
+    here = scene(ZHAO7.nominal, measured=BEFORE)
+    return world.measure(tick, here, under(*faults)), world.measure(tick, here, QUIET)
+
+
+def test_biases_are_added_to_the_measurements_of_their_links(world):
+    one = Fault(Verb.BIAS, 0, None, pairs=((4, 2), (1, 2)), vector=(0.5, -1.0))
+    said, right = failing(world, one, replace(one, pairs=((4, 2),), vector=(1.0, 0.0)))
+    np.testing.assert_allclose(said[BIASED] - right[BIASED], [1.5, -1.0], atol=1e-14)
+    np.testing.assert_allclose(said[SEVEN.index[1, 2]] - right[SEVEN.index[1, 2]], [0.5, -1.0], atol=1e-14)
+    assert (said != right).any(axis=1).sum() == 2
+
+
+def test_a_frozen_sensor_says_what_it_said_in_the_tick_before(world):
+    said, right = failing(world, Fault(Verb.FREEZE, 0, None, pairs=((4, 2),)))
+    np.testing.assert_array_equal(said[BIASED], 77.0)
+    np.testing.assert_array_equal(said[OTHERS], right[OTHERS])
+
+
+def test_a_frozen_sensor_says_the_same_until_it_thaws(world):
+    timeline = Timeline(SEVEN, [Fault(Verb.FREEZE, 2, 5, pairs=((4, 2),))])
+    here, said = world.start(), []
+    for tick in range(7):
+        said.append(world.measure(tick, here, timeline.at(tick)))
+        here = world.step(tick, here, said[-1], REST, timeline.at(tick))
+    changed = [not np.array_equal(one[BIASED], other[BIASED]) for one, other in pairwise(said)]
+    assert changed == [True, False, False, False, True, True]
+
+
+def test_a_sensor_frozen_in_the_first_tick_says_the_truth_for_good(world):
+    now, here = under(Fault(Verb.FREEZE, 0, None, pairs=((4, 2),))), world.start()
+    truth = here.measured[BIASED]
+    for tick in range(3):
+        here = world.step(tick, here, world.measure(tick, here, now), np.ones((7, 2)), now)
+        np.testing.assert_array_equal(here.measured[BIASED], truth)
+
+
+def test_a_frozen_sensor_is_neither_biased_nor_stray(world):
+    on = {"pairs": ((4, 2),)}
+    faults = (
+        Fault(Verb.BIAS, 0, None, **on, vector=(1.0, 1.0)),
+        Fault(Verb.OUTLIER, 0, None, **on, probability=1.0, deviation=9.0),
+    )
+    assert failing(world, Fault(Verb.FREEZE, 0, None, **on), *faults)[0][BIASED].tolist() == [77.0, 77.0]
+
+
+def test_outliers_strike_with_their_probability_and_stray_by_their_deviation(world):
+    now = under(Fault(Verb.OUTLIER, 0, None, pairs=((4, 2), (1, 2)), probability=0.3, deviation=5.0))
+    ticks, here = range(1000), scene(ZHAO7.nominal)
+    off = np.array([world.measure(tick, here, now) - world.measure(tick, here, QUIET) for tick in ticks])
+    struck = np.array([world.outliers(tick, now) for tick in ticks])
+    np.testing.assert_array_equal((off != 0.0).all(axis=-1), struck)
+    np.testing.assert_array_equal((off != 0.0).any(axis=-1), struck)
+    assert set(np.flatnonzero(struck.any(axis=0))) == {BIASED, SEVEN.index[1, 2]}
+    assert abs(struck[:, BIASED].sum() - 300) < 3 * np.sqrt(1000 * 0.3 * 0.7)
+    assert off[struck].std() == pytest.approx(5.0, rel=0.1)
+    assert abs((off[:, BIASED, 0] * off[:, BIASED, 1]).sum() / 300 / 25.0) < 0.2
+
+
+def test_sensors_fail_as_they_are_told():
+    on_1_2, on_2_1 = {"pairs": ((1, 2),)}, {"pairs": ((2, 1),)}
+    links = Links.both_ways(2, [(1, 2)])
+    there, back = links.index[1, 2], links.index[2, 1]
+    now = under(
+        Fault(Verb.BIAS, 0, None, **on_1_2, vector=(1.0, 0.0)),
+        Fault(Verb.OUTLIER, 0, None, **on_1_2, probability=0.5, deviation=2.0),
+        Fault(Verb.FREEZE, 0, None, **on_2_1),
+        links=links,
+    )
+    measured, before, standard = np.full((2, 2), 10.0), np.full((2, 2), 7.0), np.full((2, 2), 3.0)
+    said = sensors.astray(measured, before, sensors.stray(np.array([0.4, 0.4]), now), standard, now)
+    assert (said[there].tolist(), said[back].tolist()) == ([17.0, 16.0], [7.0, 7.0])
+    said = sensors.astray(measured, before, sensors.stray(np.array([0.6, 0.6]), now), standard, now)
+    assert (said[there].tolist(), said[back].tolist()) == ([11.0, 10.0], [7.0, 7.0])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import zenoh
@@ -20,8 +22,10 @@ from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
 from world.history import History, Moment, Vigil, gather
-from world.logbook import Logbook
 from world.world import Scene
+
+if TYPE_CHECKING:
+    from world.logbook import Logbook
 
 
 class Theatre:
@@ -172,15 +176,19 @@ def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
     brief = supervisor.brief(WorldBrief)
+    from world.logbook import Logbook  # takes a second to import: the lifeline is to be watched by then
+
     with zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
-        with Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook:
+        with (
+            ExitStack() as last,
+            Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook,
+        ):
             theatre.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")
-            try:
-                with supervisor.confessing():
-                    theatre.run(logbook)
-            finally:
-                theatre.history.save(Path(brief.out) / ARRAYS)
+            # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
+            last.callback(theatre.history.save, Path(brief.out) / ARRAYS)
+            with supervisor.confessing():
+                theatre.run(logbook)
         supervisor.tell("done", uninstructed=theatre.uninstructed)

@@ -5,7 +5,7 @@ What it needs is imported when a test asks for it: pytest loads this file in eve
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -41,7 +41,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture
-def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Hangar:
+def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hangar]:
     """Builds runs: `swarm("corridor").fault("cut", links=["6-7"], at=2).fly().check(bounded(1.0))`."""
     from affinet.testing.swarm import Hangar
 
@@ -50,7 +50,9 @@ def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     seed = getattr(request, "param", None)
     hangar = Hangar(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"))
     request.node.stash[_HANGAR] = hangar
-    return hangar
+    yield hangar
+    if not hangar.failed:
+        hangar.clear()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -61,7 +63,17 @@ def pytest_runtest_makereport(
     report = yield
     hangar = item.stash.get(_HANGAR, None)
     if report.when == "call" and report.failed and hangar is not None:
-        for plan, out in hangar.keep():
-            says = f"seed {plan.scenario.seed}, {hangar.runtime}\nrecording: {out / 'run.rrd'}\nrepeat: affinet replay {out}"
-            report.sections.append(("affinet run", f"{says} --runtime {hangar.runtime}"))
+        hangar.failed = True
+        report.sections += [("affinet run", says) for says in _kept(hangar)]
     return report
+
+
+def _kept(hangar: Hangar) -> list[str]:
+    try:
+        return [
+            f"seed {plan.scenario.seed}, {hangar.runtime}\nrecording: {out / 'run.rrd'}\n"
+            f"repeat: affinet replay {out} --runtime {hangar.runtime}"
+            for plan, out in hangar.keep()
+        ]
+    except Exception as error:  # noqa: BLE001 - whatever goes wrong here, the test's own failure is what counts
+        return [f"the run could not be recorded: {error!r}"]

@@ -58,10 +58,14 @@ def faults(given: Scenario, verbs: Sequence[str]) -> SearchStrategy[Entries]:
     return st.sampled_from(list(verbs)).flatmap(lambda verb: _FAULTS[verb](given))
 
 
+def timelines(given: Scenario, verbs: Sequence[str], most: int = 3) -> SearchStrategy[list[Entries]]:
+    """One to `most` faults of these verbs, each with its entries."""
+    return st.lists(faults(given, verbs), min_size=1, max_size=most)
+
+
 def schedules(given: Scenario, verbs: Sequence[str], most: int = 3) -> SearchStrategy[Entries]:
     """Timelines of one to `most` faults of these verbs."""
-    several = st.lists(faults(given, verbs), min_size=1, max_size=most)
-    return several.map(lambda chosen: [entry for fault in chosen for entry in fault])
+    return timelines(given, verbs, most).map(lambda chosen: [entry for fault in chosen for entry in fault])
 
 
 def _seconds(given: Scenario, step: int) -> float:

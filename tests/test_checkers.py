@@ -1,0 +1,485 @@
+"""What checkers find: that it holds, the first tick in which it does not, or that the run never put it to the test."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from judged import changed, evidence, tampered
+from scipy.stats import chi2
+from scripted import timeline
+
+from affinet import checkers
+from affinet.checkers import Checker, Finding
+
+TICKS = 80
+CUT = {"verb": "cut", "at": 1.0, "until": 2.0, "links": ["2->4"]}  # ticks 20 to 39
+NO_DELAY = ("network.availability=1.0",)
+
+
+def all_but(*ticks):
+    """A signal that holds in every tick but these."""
+    return lambda run: ~np.isin(np.arange(run.ticks), ticks)
+
+
+def verdict(found):
+    return found.verdict, found.tick
+
+
+def with_error(run, error):
+    return tampered(run, error=np.broadcast_to(np.asarray(error, dtype=np.float64), (TICKS,)))
+
+
+def test_always_passes_where_the_signal_holds_throughout():
+    assert verdict(checkers.always(all_but())(evidence())) == ("pass", None)
+
+
+def test_always_fails_at_the_first_tick_without_the_signal():
+    assert verdict(checkers.always(all_but(17, 30))(evidence())) == ("fail", 17)
+
+
+@pytest.mark.parametrize(("since", "until", "tick"), [(0.9, None, 30), (0.0, 0.8, None), (0.0, 0.85, 17)])
+def test_always_looks_at_its_span_only_both_ends_included(since, until, tick):
+    found = checkers.always(all_but(17, 30), since=since, until=until)(evidence())
+    assert verdict(found) == ("pass" if tick is None else "fail", tick)
+
+
+def test_always_is_vacuous_when_the_run_ends_before_it_begins():
+    assert verdict(checkers.always(all_but(), since=4.0)(evidence())) == ("vacuous", None)
+
+
+def test_eventually_passes_and_says_from_when():
+    found = checkers.eventually(lambda run: np.arange(run.ticks) >= 17)(evidence())
+    assert verdict(found) == ("pass", None)
+    assert "tick 17 (0.85 s)" in found.says
+
+
+@pytest.mark.parametrize(("within", "last"), [(None, 79), (1.0, 30)])
+def test_eventually_fails_at_the_last_tick_it_had(within, last):
+    found = checkers.eventually(lambda run: np.arange(run.ticks) < 10, since=0.5, within=within)(evidence())
+    assert verdict(found) == ("fail", last)
+
+
+def test_eventually_is_vacuous_when_the_run_ends_before_it_begins():
+    assert verdict(checkers.eventually(all_but(), since=4.0)(evidence())) == ("vacuous", None)
+
+
+def test_bounded_passes_for_a_run_that_stays_below_the_level():
+    run = evidence()
+    assert verdict(checkers.bounded(run.error.max() + 1e-9)(run)) == ("pass", None)
+
+
+def test_bounded_fails_at_the_first_tick_that_reaches_the_level():
+    run = evidence()
+    assert verdict(checkers.bounded(run.error.max())(run)) == ("fail", int(run.error.argmax()))
+    assert verdict(checkers.bounded(5.0)(with_error(run, changed(run.error, [17, 40], 5.0)))) == ("fail", 17)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+@pytest.mark.parametrize("checker", [checkers.bounded(5.0), checkers.converged(5.0, by=0.5)], ids=lambda c: c.name)
+def test_an_error_that_is_no_number_is_never_good(checker, wrong):
+    run = evidence()
+    assert verdict(checker(with_error(run, changed(run.error, 17, wrong)))) == ("fail", 17)
+
+
+def test_converged_passes_once_the_swarm_has_settled():
+    run = evidence()
+    level = run.error[40:].max() + 1e-9
+    assert run.error.max() > level
+    assert verdict(checkers.converged(level, by=2.0)(run)) == ("pass", None)
+
+
+def test_converged_fails_at_the_first_tick_from_then_on():
+    run = with_error(evidence(), changed(evidence().error, [17, 40], 5.0))
+    assert verdict(checkers.converged(5.0, by=0.85)(run)) == ("fail", 17)
+    assert verdict(checkers.converged(5.0, by=0.9)(run)) == ("fail", 40)
+
+
+def test_converged_is_vacuous_when_the_run_ends_before():
+    assert verdict(checkers.converged(5.0, by=4.0)(evidence())) == ("vacuous", None)
+
+
+GUST = {"verb": "gust", "at": 1.0, "lasts": 0.5, "agents": [7], "velocity": [3.0, 0.0]}
+
+
+def test_recovers_passes_after_a_gust_that_the_law_makes_good():
+    run = evidence(timeline(GUST), "formation.spread=0.0", "time.duration=4")
+    assert run.error[20:30].max() > 0.3
+    found = checkers.recovers(0.3, within=2.0)(run)
+    assert verdict(found) == ("pass", None)
+    assert found.says == "after 1 faults"
+
+
+def test_recovers_fails_at_the_deadline_after_a_gust_that_takes_longer():
+    run = evidence(timeline(GUST), "formation.spread=0.0", "time.duration=8")
+    found = checkers.recovers(0.1, within=0.1)(run)
+    assert verdict(found) == ("fail", 30 + 2)
+    assert "gust (3, 0) m/s on 7" in found.says
+
+
+def under(*entries):
+    return evidence(timeline(*entries), *NO_DELAY)
+
+
+def lifted(until, level=5.0):
+    """An error at a level from tick 25 until a tick, and small else."""
+    tick = np.arange(TICKS)
+    return np.where((tick >= 25) & (tick < until), level, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("until", "expected"),
+    [(30, ("pass", None)), (60, ("pass", None)), (61, ("fail", 60)), (80, ("fail", 60))],
+)
+def test_recovers_counts_from_the_end_of_the_fault(until, expected):
+    assert verdict(checkers.recovers(1.0, within=1.0)(with_error(under(CUT), lifted(until)))) == expected
+
+
+def test_recovers_takes_an_error_that_is_no_number_for_none_that_fell():
+    run = with_error(under(CUT), lifted(TICKS, np.nan))
+    assert verdict(checkers.recovers(1.0, within=1.0)(run)) == ("fail", 60)
+
+
+CONDITION = {"tracking_error_above": 1e6}
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        (),
+        ({"verb": "cut", "at": 1.0, "links": ["2->4"]},),
+        (CUT | {"until": 3.1},),
+        (CUT, CUT | {"at": 2.5, "until": 3.5}),
+        ({"verb": "cut", "when": CONDITION, "lasts": 1.0, "links": ["2->4"]},),
+    ],
+    ids=["no fault", "for ever", "too late", "the next comes before", "never came"],
+)
+def test_recovers_is_vacuous_when_no_fault_ends_in_time_to_tell(entries):
+    found = checkers.recovers(1.0, within=1.0)(with_error(under(*entries), 5.0))
+    assert verdict(found) == ("vacuous", None)
+
+
+def test_recovers_is_vacuous_when_no_fault_lifted_the_error():
+    assert verdict(checkers.recovers(1.0, within=1.0)(with_error(under(CUT), 0.5))) == ("vacuous", None)
+
+
+def test_recovers_does_not_look_at_a_fault_whose_end_is_the_beginning_of_the_next():
+    entries = CUT | {"until": 1.5}, CUT | {"at": 1.5, "until": 3.5}
+    found = checkers.recovers(1.0, within=1.0)(with_error(under(*entries), lifted(75)))
+    assert verdict(found) == ("vacuous", None)
+
+
+def test_recovers_fails_after_the_first_fault_that_is_not_made_good():
+    entries = CUT | {"at": 0.5, "until": 1.0}, CUT | {"at": 2.0, "until": 2.5}
+    error = np.where(np.arange(TICKS) < 25, 0.01, 5.0)
+    error[15] = 5.0
+    assert verdict(checkers.recovers(1.0, within=0.5)(with_error(under(*entries), error))) == ("fail", 30)
+
+
+PARTITION = {"verb": "partition", "at": 1.0, "until": 2.0, "groups": [[1, 2, 3], [4, 5, 6, 7]]}
+
+
+@pytest.mark.parametrize("in_flight", ["drop", "deliver", "hold"])
+@pytest.mark.parametrize("fault", [CUT, PARTITION], ids=lambda fault: fault["verb"])
+def test_nothing_said_under_a_cut_is_heard_across_it(fault, in_flight):
+    run = evidence(timeline(fault | {"in_flight": in_flight}), "network.delay_ticks=3")
+    assert verdict(checkers.never_heard_across_a_cut()(run)) == ("pass", None)
+
+
+def heard(run, tick, channel, src, dst, spoken):
+    place = (tick, run.plan.channels.index(channel), run.plan.world.links.index[src, dst])
+    return tampered(run, newest=changed(run.arrays["newest"], place, spoken))
+
+
+def test_what_is_heard_across_a_cut_is_named_with_its_tick_link_and_channel():
+    run = under(CUT)
+    channel = run.plan.channels[-1]
+    found = checkers.never_heard_across_a_cut()(heard(run, 27, channel, 2, 4, 25))
+    assert verdict(found) == ("fail", 27)
+    assert found.says == f"4 heard 2 on {channel} across 'cut 2->4'"
+
+
+def test_what_is_heard_across_a_partition_is_named_with_its_link():
+    found = checkers.never_heard_across_a_cut()(heard(under(PARTITION), 20, "sense", 7, 2, 20))
+    assert verdict(found) == ("fail", 20)
+    assert found.says == "2 heard 7 on sense across 'partition 1,2,3 | 4,5,6,7'"
+
+
+@pytest.mark.parametrize(
+    ("tick", "link", "spoken"),
+    [(27, (2, 4), 19), (40, (2, 4), 39), (19, (2, 4), 19), (27, (4, 2), 27)],
+    ids=["said before", "heard after", "heard before", "the other way"],
+)
+def test_what_a_cut_does_not_forbid_may_be_heard(tick, link, spoken):
+    run = heard(under(CUT), tick, "sense", *link, spoken)
+    assert verdict(checkers.never_heard_across_a_cut()(run)) == ("pass", None)
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        (),
+        ({"verb": "lose", "at": 1.0, "links": ["all"], "loss": 1.0},),
+        (CUT | {"at": 5.0, "until": 6.0},),
+        ({"verb": "cut", "when": CONDITION, "links": ["2->4"]},),
+    ],
+    ids=["nothing", "no cut", "after the end", "never came"],
+)
+def test_never_heard_is_vacuous_when_nothing_was_cut(entries):
+    assert verdict(checkers.never_heard_across_a_cut()(under(*entries))) == ("vacuous", None)
+
+
+HONEST = ('agents.estimator="none"', 'manoeuvre={preset="hover"}', *NO_DELAY)
+
+
+def mean_nees_by_hand(run):
+    """Edge by edge, matrix by matrix: the mean of each tick, and the number of edges."""
+    links, arrays, means, numbers = run.plan.world.links, run.arrays, [], []
+    for tick in range(run.ticks):
+        each = []
+        for agent, slot in zip(*np.nonzero(arrays["known"][tick]), strict=True):
+            other = links.neighbours[agent, slot]
+            error = arrays["estimate"][tick, agent, slot] - (run.position[tick, agent] - run.position[tick, other])
+            xx, xy, yy = arrays["covariance"][tick, agent, slot]
+            each.append(error @ np.linalg.inv([[xx, xy], [xy, yy]]) @ error)
+        means.append(np.mean(each))
+        numbers.append(len(each))
+    return np.array(means), np.array(numbers)
+
+
+def outside_by_hand(run, level):
+    mean, number = mean_nees_by_hand(run)
+    low, high = chi2.interval(level, 2 * number)
+    return ~((low / number <= mean) & (mean <= high / number))
+
+
+def test_what_a_sensor_says_of_its_own_noise_is_consistent():
+    run = evidence(*HONEST)
+    assert not outside_by_hand(run, 0.99).any()
+    found = checkers.consistent()(run)
+    assert verdict(found) == ("pass", None)
+    assert f"mean NEES {mean_nees_by_hand(run)[0].mean():.3g} for 2 dimensions" in found.says
+
+
+@pytest.mark.parametrize("scale", [0.1, 10.0])
+def test_a_covariance_that_says_too_little_or_too_much_is_not_consistent(scale):
+    run = evidence(*HONEST)
+    run = tampered(run, covariance=scale * run.arrays["covariance"])
+    assert outside_by_hand(run, 0.99).all()
+    assert verdict(checkers.consistent()(run)) == ("fail", 0)
+
+
+def test_consistent_names_the_first_tick_outside_the_band():
+    run = evidence(*HONEST)
+    late = tampered(
+        run, covariance=np.where(np.arange(TICKS)[:, None, None, None] < 33, 1.0, 0.1) * run.arrays["covariance"]
+    )
+    assert verdict(checkers.consistent()(late)) == ("fail", 33)
+    assert verdict(checkers.consistent(since=2.0)(late)) == ("fail", 40)
+
+
+def test_a_filter_is_judged_as_by_hand():
+    run = evidence('agents.estimator="rkf"', 'manoeuvre={preset="hover"}', *NO_DELAY)
+    outside = outside_by_hand(run, 0.99)
+    found = checkers.consistent()(run)
+    assert verdict(found) == ("fail", int(outside.argmax()))
+    assert found.says.startswith(f"{1 - outside.mean():.1%} of the ticks inside the band")
+
+
+@pytest.mark.parametrize("level", [0.9, 0.99])
+def test_an_honest_sensor_is_consistent_whatever_the_seed(level):
+    verdicts = [checkers.consistent(level)(evidence(*HONEST, f"seed={seed}")).verdict for seed in range(1, 13)]
+    assert verdicts == ["pass"] * 12
+
+
+def test_a_filter_that_is_wrong_in_one_tick_of_four_is_not_consistent():
+    run = evidence(*HONEST)
+    wrong = np.arange(TICKS) % 4 == 3
+    scaled = np.where(wrong[:, None, None, None], 0.1, 1.0) * run.arrays["covariance"]
+    assert outside_by_hand(tampered(run, covariance=scaled), 0.99).mean() == 0.25
+    assert checkers.consistent(0.99)(tampered(run, covariance=scaled)).verdict == "fail"
+
+
+def test_an_estimate_that_is_no_number_is_not_consistent():
+    run = evidence(*HONEST)
+    found = checkers.consistent()(tampered(run, estimate=changed(run.arrays["estimate"], 17, np.nan)))
+    assert verdict(found) == ("fail", 17)
+
+
+def test_consistent_looks_at_agents_that_take_part_only():
+    run = evidence(*HONEST, timeline({"verb": "depart", "at": 0.0, "agents": [7]}))
+    wild = tampered(run, estimate=changed(run.arrays["estimate"], (slice(None), 6), 1e3))
+    known = changed(run.arrays["known"], (slice(None), 6), True)
+    assert checkers.consistent()(tampered(wild, known=known)) == checkers.consistent()(run)
+
+
+@pytest.mark.parametrize("verb", ["cut", "dropout"])
+def test_consistent_is_vacuous_when_nobody_estimates_anything(verb):
+    blind = evidence(*HONEST, timeline({"verb": verb, "at": 0.0, "links": ["all"]}))
+    assert verdict(checkers.consistent()(blind)) == ("vacuous", None)
+
+
+def test_consistent_is_vacuous_when_the_run_ends_before():
+    assert verdict(checkers.consistent(since=4.0)(evidence(*HONEST))) == ("vacuous", None)
+
+
+def closest(run):
+    """The least distance of any two agents in each tick."""
+    apart = np.linalg.norm(run.position[:, :, None] - run.position[:, None], axis=-1)
+    return np.where(np.eye(7, dtype=bool), np.inf, apart).min(axis=(1, 2))
+
+
+def test_collision_free_passes_up_to_the_least_distance_flown():
+    run = evidence()
+    assert verdict(checkers.collision_free(closest(run).min())(run)) == ("pass", None)
+
+
+def test_collision_free_fails_at_the_first_tick_too_close():
+    run = evidence()
+    level = np.nextafter(closest(run).min(), np.inf)
+    assert verdict(checkers.collision_free(level)(run)) == ("fail", int(closest(run).argmin()))
+
+
+def side_by_side(run, tick, one, other):
+    beside = run.arrays["position"][tick, other - 1] + [0.01, 0.0]
+    return tampered(run, position=changed(run.arrays["position"], (tick, one - 1), beside))
+
+
+def test_a_collision_is_named_with_its_tick_and_agents():
+    run = evidence("formation.spread=0.0")
+    found = checkers.collision_free(0.2)(side_by_side(run, 17, 3, 6))
+    assert verdict(found) == ("fail", 17)
+    assert "agents 3 and 6 are 0.01 m apart" in found.says
+
+
+def test_a_position_that_is_no_number_is_not_free_of_collisions():
+    run = evidence("formation.spread=0.0")
+    broken = tampered(run, position=changed(run.arrays["position"], (17, 3), np.nan))
+    assert verdict(checkers.collision_free(0.2)(broken)) == ("fail", 17)
+
+
+@pytest.mark.parametrize("checker", [checkers.energy(1.0), checkers.collision_free(0.2)], ids=lambda c: c.name)
+def test_a_run_that_diverged_is_judged_without_warnings(checker):
+    run = evidence()
+    far = changed(run.arrays["position"], slice(40, None), 1e200 * np.arange(14.0).reshape(7, 2))
+    fast = changed(run.arrays["velocity"], slice(40, None), 1e200)
+    checker(tampered(run, position=far, velocity=fast))
+
+
+@pytest.mark.parametrize(("body", "expected"), [("hold", ("fail", 30)), ("vanish", ("pass", None))])
+def test_nobody_collides_with_a_body_that_is_gone(body, expected):
+    run = evidence("formation.spread=0.0", timeline({"verb": "depart", "at": 1.0, "agents": [6], "body": body}))
+    assert verdict(checkers.collision_free(0.2)(side_by_side(run, 30, 3, 6))) == expected
+
+
+def test_agreement_passes_where_neighbours_perceive_the_same_map():
+    run = evidence()
+    level = np.nanmax(run.arrays["psi"][40:]) + 1e-9
+    assert verdict(checkers.agreement(level, by=2.0)(run)) == ("pass", None)
+
+
+def test_agreement_fails_at_the_first_tick_and_names_the_agent():
+    psi = changed(np.zeros((TICKS, 7)), ([17, 40], [4, 2]), 9.0)
+    found = checkers.agreement(1.0)(tampered(evidence(), psi=psi))
+    assert verdict(found) == ("fail", 17)
+    assert "psi of agent 5 is 9" in found.says
+    assert verdict(checkers.agreement(1.0, by=0.9)(tampered(evidence(), psi=psi))) == ("fail", 40)
+
+
+def test_agreement_leaves_out_who_heard_nobody():
+    psi = changed(np.zeros((TICKS, 7)), (17, 4), np.nan)
+    assert verdict(checkers.agreement(1.0)(tampered(evidence(), psi=psi))) == ("pass", None)
+
+
+def test_agreement_is_vacuous_where_nobody_perceives_a_map():
+    assert verdict(checkers.agreement(1.0)(evidence('agents.estimator="rkf"'))) == ("vacuous", None)
+
+
+def test_agreement_is_vacuous_when_the_run_ends_before():
+    assert verdict(checkers.agreement(1.0, by=4.0)(evidence())) == ("vacuous", None)
+
+
+def spent(run):
+    return np.cumsum((run.arrays["velocity"] ** 2).sum(axis=(1, 2)) * 0.05)
+
+
+def test_energy_passes_above_what_was_spent_and_fails_in_the_tick_that_spends_it():
+    run = evidence()
+    total = spent(run)
+    assert verdict(checkers.energy(total[-1] * (1 + 1e-12))(run)) == ("pass", None)
+    assert verdict(checkers.energy(total[17] * (1 - 1e-12))(run)) == ("fail", 17)
+
+
+def test_energy_of_agents_that_are_absent_is_not_counted():
+    run = evidence(timeline({"verb": "depart", "at": 1.0, "until": 2.0, "agents": [7], "body": "drift"}))
+    velocity = np.zeros((TICKS, 7, 2))
+    velocity[20:, 6, 0] = 2.0
+    assert verdict(checkers.energy(0.1)(tampered(run, velocity=velocity))) == ("fail", 40)
+
+
+def test_an_input_that_is_no_number_spends_too_much():
+    run = evidence()
+    broken = tampered(run, velocity=changed(run.arrays["velocity"], (17, 3), np.nan))
+    assert verdict(checkers.energy(1e9)(broken)) == ("fail", 17)
+
+
+def says(verdict, tick=None):
+    name = verdict if tick is None else f"{verdict}@{tick}"
+    return Checker(name, lambda _: Finding(name, verdict, tick, f"because of {name}"))
+
+
+VERDICTS = ("pass", "fail", "vacuous")
+PAIRS = list(product(VERDICTS, repeat=2))
+BY_TICK = {"pass": None, "fail": 17, "vacuous": None}
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_both_hold_unless_one_fails_and_prove_nothing_if_one_proves_nothing(one, other):
+    found = (says(one, BY_TICK[one]) & says(other, BY_TICK[other]))(evidence())
+    expected = next(each for each in ("fail", "vacuous", "pass") if each in (one, other))
+    assert verdict(found) == (expected, BY_TICK[expected])
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_either_holds_if_one_does_and_fails_if_both_do(one, other):
+    found = (says(one, BY_TICK[one]) | says(other, BY_TICK[other]))(evidence())
+    expected = next(each for each in ("pass", "vacuous", "fail") if each in (one, other))
+    assert verdict(found) == (expected, BY_TICK[expected])
+
+
+def test_of_two_failures_the_first_counts():
+    found = (says("fail", 30) & says("fail", 17))(evidence())
+    assert verdict(found) == ("fail", 17)
+    assert found.says == "fail@17: because of fail@17"
+    assert found.checker == "(fail@30 & fail@17)"
+
+
+def test_what_must_not_hold_fails_at_the_end_when_it_held():
+    assert verdict((~says("pass"))(evidence())) == ("fail", TICKS - 1)
+    assert verdict((~says("fail", 17))(evidence())) == ("pass", None)
+    assert verdict((~says("vacuous"))(evidence())) == ("vacuous", None)
+    assert (~says("pass")).name == "~pass"
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_de_morgan_holds(one, other):
+    a, b = says(one, BY_TICK[one]), says(other, BY_TICK[other])
+    assert (~(a & b))(evidence()).verdict == (~a | ~b)(evidence()).verdict
+    assert (~(a | b))(evidence()).verdict == (~a & ~b)(evidence()).verdict
+
+
+@pytest.mark.parametrize(("run", "found"), PAIRS)
+def test_a_failure_outweighs_what_proved_nothing_and_that_outweighs_a_pass(run, found):
+    judged = replace(evidence(), outcome=replace(evidence().outcome, verdict=run))
+    findings = [Finding("first", "pass", None, ""), Finding("second", found, BY_TICK[found], "")]
+    expected = next(each for each in ("fail", "vacuous", "pass") if each in (run, found))
+    assert checkers.summed_up(judged, findings) == expected
+    assert checkers.summed_up(judged, []) == run
+
+
+def test_a_finding_says_its_checker_verdict_and_reason():
+    found = checkers.bounded(1e-9)(evidence())
+    assert (
+        str(found)
+        == f"bounded(1e-09): fail: at 0 s (tick 0) it does not hold; the error is {evidence().error[0]:.4g} m²"
+    )

@@ -1,0 +1,125 @@
+"""An agent's state on disk: every estimator and law goes on from it bit for bit, whenever its process dies."""
+
+from importlib.metadata import entry_points
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flying import plan_of
+
+from agents import checkpoint
+from agents.agent import Agent
+from agents.estimators.base import Heard
+
+ESTIMATORS, LAWS = (entry_points(group=f"affinet.{what}") for what in ("estimators", "controllers"))
+PAIRS = [*product(sorted(ESTIMATORS.names), sorted(LAWS.names))]
+TICKS = 6
+FORGETFUL = {"none", "ral"}  # they say what the tick says
+
+
+def agent_of(estimator, law):
+    plan = plan_of("corridor")
+    return Agent(plan.brief.of(4), ESTIMATORS[estimator].load()(), LAWS[law].load()(), leader_gain=1.0)
+
+
+def leaves(state):
+    return [leaf for part in state for leaf in leaves(part)] if isinstance(state, tuple) else [np.asarray(state)]
+
+
+def assert_equal_bits(one, other):
+    assert len(leaves(one)) == len(leaves(other)) > 0
+    for here, there in zip(leaves(one), leaves(other), strict=True):
+        assert (here.dtype, here.shape, here.tobytes()) == (there.dtype, there.shape, there.tobytes())
+
+
+def lives(agent, state, ticks, seed):
+    """An agent's states and inputs while it sees and hears this and that."""
+    rng, slots = np.random.default_rng(seed), agent.brief.present.shape
+    told = []
+    for tick in range(ticks):
+        seen = (rng.random(slots) < 0.8) & agent.brief.present
+        measured = np.where(
+            seen[:, None], agent.brief.relative + 0.1 * rng.normal(size=agent.brief.relative.shape), 0.0
+        )
+        state, _ = agent.sense(state, measured, seen)
+        fresh = (rng.random(slots) < 0.8) & agent.brief.present
+        heard = {
+            channel: Heard(
+                {name: rng.normal(size=(*slots, *field.shape)).astype(field.dtype) for name, field in fields.items()},
+                fresh,
+            )
+            for channel, fields in agent.channels().items()
+        }
+        state, action = agent.act(state, tick, heard, None)
+        told.append(action.velocity)
+    return state, np.array(told)
+
+
+@pytest.mark.parametrize(("estimator", "law"), PAIRS)
+def test_every_estimator_and_law_goes_on_from_its_checkpoint_bit_for_bit(estimator, law, tmp_path):
+    agent = agent_of(estimator, law)
+    state, _ = lives(agent, agent.init(()), TICKS, seed=1)
+    checkpoint.save(tmp_path / "agent.npz", state)
+    loaded = checkpoint.load(tmp_path / "agent.npz", like=agent.init(()))
+    assert_equal_bits(loaded, state)
+    assert repr(type(loaded.estimator)) == repr(type(state.estimator))
+    later, told = lives(agent, state, TICKS, seed=2)
+    later_too, told_too = lives(agent, loaded, TICKS, seed=2)
+    assert_equal_bits(later_too, later)
+    assert told_too.tobytes() == told.tobytes()
+    _, of_nobody = lives(agent, agent.init(()), TICKS, seed=2)
+    assert estimator in FORGETFUL or of_nobody.tobytes() != told.tobytes()
+
+
+def test_numbers_that_are_none_and_zeros_below_zero_come_back_as_they_were(tmp_path):
+    agent = agent_of("rkf", "constant-velocity")
+    state = agent.init(())._replace(velocity=np.array([-0.0, np.nan]))
+    checkpoint.save(tmp_path / "agent.npz", state)
+    assert_equal_bits(checkpoint.load(tmp_path / "agent.npz", like=agent.init(())), state)
+
+
+@pytest.fixture
+def two_states():
+    agent = agent_of("ga-rkf", "constant-velocity")
+    first, _ = lives(agent, agent.init(()), 2, seed=1)
+    second, _ = lives(agent, first, 2, seed=2)
+    return agent, first, second
+
+
+def test_the_last_state_that_was_saved_is_the_one_that_is_loaded(two_states, tmp_path):
+    agent, first, second = two_states
+    for state in (first, second):
+        checkpoint.save(tmp_path / "agent.npz", state)
+    assert_equal_bits(checkpoint.load(tmp_path / "agent.npz", like=agent.init(())), second)
+    assert [file.name for file in tmp_path.iterdir()] == ["agent.npz"]
+
+
+class Death(BaseException):
+    pass
+
+
+def die_halfway(file, *_, **__):
+    Path(file).write_bytes(b"PK\x03\x04 half a state")
+    raise Death
+
+
+def test_a_death_while_it_is_written_leaves_the_state_before(two_states, tmp_path, monkeypatch):
+    agent, first, second = two_states
+    checkpoint.save(tmp_path / "agent.npz", first)
+    with monkeypatch.context() as dying:
+        dying.setattr(np, "savez", die_halfway)
+        with pytest.raises(Death):
+            checkpoint.save(tmp_path / "agent.npz", second)
+    assert_equal_bits(checkpoint.load(tmp_path / "agent.npz", like=agent.init(())), first)
+    checkpoint.save(tmp_path / "agent.npz", second)
+    assert_equal_bits(checkpoint.load(tmp_path / "agent.npz", like=agent.init(())), second)
+
+
+def test_a_death_while_the_first_is_written_leaves_none(two_states, tmp_path, monkeypatch):
+    agent, first, _ = two_states
+    monkeypatch.setattr(np, "savez", die_halfway)
+    with pytest.raises(Death):
+        checkpoint.save(tmp_path / "agent.npz", first)
+    with pytest.raises(FileNotFoundError):
+        checkpoint.load(tmp_path / "agent.npz", like=agent.init(()))

@@ -1,0 +1,249 @@
+"""The hunt for the smallest fault that breaks an invariant."""
+
+import sys
+
+import pytest
+from flying import digest_of
+from hypothesis import HealthCheck, given, settings
+from scripted import timeline
+
+from affinet import checkers, cli, hunt, scenario
+from affinet.checkers import Checker, Finding
+from affinet.evidence import Evidence
+from affinet.sections import ScenarioError
+from affinet.testing import strategies
+
+CORRIDOR = scenario.load("corridor", ("time.dt=0.05", "time.duration=4"))
+BRIEF = ("--set", "time.dt=0.05", "--duration", "2", "--estimator", "rkf")
+
+
+@pytest.fixture
+def den(tmp_path, monkeypatch):
+    """An empty directory to hunt from."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    return tmp_path
+
+
+def entries_of(given):
+    return [entry.model_dump(mode="json", exclude_none=True) for entry in given.timeline]
+
+
+def test_a_hunt_shrinks_writes_and_confirms_the_smallest_fault(den, capsys):
+    options = ("--invariant", "bounded(5)", "--verbs", "cut,dropout", "--budget", "20", "--duration", "4")
+    assert cli.main(["hunt", "corridor", *BRIEF, *options, "--out", "smallest.toml"]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    found = scenario.load("smallest.toml")
+    (entry,) = found.timeline
+    assert entry.at == 0.0
+    assert entry.until is entry.lasts is None
+    assert "bounded(5): fail: at" in printed
+    assert f"{entry.verb} " in printed
+    assert "over processes, the same bits: bounded(5): fail: at" in printed
+    assert "smallest.toml: affinet run smallest.toml" in printed
+    assert found.agents.estimator == "rkf"
+    assert (found.time.dt, found.time.duration) == (0.05, 4.0)
+    (run,) = (den / "runs").iterdir()
+    assert run.name.startswith("smallest-")
+    assert (run / "summary.json").exists()
+
+
+def test_the_smallest_is_named_after_its_scenario_where_no_file_is_named(den, monkeypatch):
+    quarry = hunt.Quarry(CORRIDOR, Finding("bounded(5)", "fail", 3, "x"), "digest")
+    monkeypatch.setattr(hunt, "hunt", lambda *_, **__: (quarry, hunt.Coverage()))
+    monkeypatch.setattr(cli, "_confirm", lambda *_: 1)
+    assert cli.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
+    assert said(scenario.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
+
+
+def test_a_hunt_that_finds_nothing_says_what_it_tried(capsys, den):
+    options = ("--invariant", "bounded(1e9)", "--verbs", "delay,pause", "--budget", "4")
+    assert cli.main(["hunt", "corridor", *BRIEF, *options]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "nothing found that breaks it" in printed
+    assert "4 schedules, 0 could not tell" in printed
+    assert any(verb in printed for verb in ("delay", "pause"))
+    assert not list(den.iterdir())
+
+
+@pytest.mark.usefixtures("den")
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--invariant", "bounded(1e-9)"), "it fails with no fault at all"),
+        (("--invariant", "bounded(5)", "--invariant", "bounded(1e-9)"), "it fails with no fault at all"),
+        (("--invariant", "bound(5)"), "there are bounded(level)"),
+        (("--invariant", "bounded(5)", "--verbs", "cut,heal,shake"), "--verbs heal,shake: there are cut, lose"),
+        (("--invariant", "bounded(5)", "--estimator", "guess"), "agents.estimator"),
+    ],
+    ids=["fails undisturbed", "one of two fails undisturbed", "no checker", "no such verbs", "no such estimator"],
+)
+def test_what_cannot_be_hunted_is_refused(options, says, capsys):
+    assert cli.main(["hunt", "corridor", *BRIEF, *options]) == 2
+    assert says in capsys.readouterr().err
+
+
+def touched(verb, *words):
+    """Fails under a fault of this verb on what any of these words selects."""
+
+    def check(evidence: Evidence) -> Finding:
+        wrong = [
+            entry
+            for entry in entries_of(evidence.plan.scenario)
+            if entry["verb"] == verb and set(words) & {*entry.get("links", ()), *entry.get("agents", ())}
+        ]
+        return Finding("touched", "fail" if wrong else "pass", 0 if wrong else None, f"{len(wrong)} times")
+
+    return Checker("touched", check)
+
+
+INSTANT = scenario.load("corridor", ("time.dt=0.05", "time.duration=0.2", "network.availability=1.0"))
+
+
+def hunted(invariant, *, verbs, seed=1, budget=60, watch=lambda *_: None):
+    return hunt.hunt(INSTANT, invariant, budget=budget, verbs=verbs, seed=seed, watch=watch)
+
+
+def test_the_same_seed_hunts_the_same_and_another_does_not():
+    chases = []
+    for seed in (1, 1, 2):
+        seen = []
+        quarry, coverage = hunted(
+            touched("freeze", "all", "min-cut"),
+            verbs=["freeze"],
+            seed=seed,
+            watch=lambda coverage, broke, seen=seen: seen.append((coverage.schedules, broke)),
+        )
+        chases.append((seen, quarry and (entries_of(quarry.scenario), quarry.digest), coverage))
+    assert chases[0] == chases[1]
+    assert chases[0] != chases[2]
+
+
+def test_no_fault_that_is_found_can_be_left_out():
+    given_to = scenario.load("corridor", ("time.dt=0.05", "time.duration=2", 'agents.estimator="rkf"'))
+    quarry, _ = hunt.hunt(
+        given_to, checkers.bounded(5), budget=20, verbs=["cut", "dropout"], seed=1, watch=lambda *_: None
+    )
+    assert len(quarry.scenario.timeline) == 1
+
+
+def test_what_is_found_breaks_the_invariant_and_is_permanent_from_the_start():
+    quarry, _ = hunted(touched("dropout", "all", "1", "min-cut"), verbs=["dropout"])
+    assert quarry.finding.verdict == "fail"
+    assert all(entry["at"] == 0.0 and "lasts" not in entry for entry in entries_of(quarry.scenario))
+    assert said(quarry.scenario) | {"timeline": []} == said(INSTANT)
+
+
+def test_coverage_counts_verbs_and_kinds_of_selectors():
+    coverage = hunt.Coverage()
+    coverage.add([{"verb": "cut", "links": ["2->4"]}, {"verb": "cut", "links": ["2-4", "min-cut"]}])
+    coverage.add([{"verb": "kill", "agents": [4]}, {"verb": "partition", "groups": "halves"}])
+    assert coverage.schedules == 2
+    assert coverage.verbs == {"cut": 2, "kill": 1, "partition": 1}
+    assert coverage.selectors == {"one-way link": 1, "edge": 1, "min-cut": 1, "agent": 1, "halves": 1}
+
+
+def test_every_schedule_flown_is_seen_and_counted():
+    seen = []
+    _, coverage = hunted(touched("gust"), verbs=["gust"], budget=10, watch=lambda c, _: seen.append(c.schedules))
+    assert seen == list(range(1, 11))
+    assert coverage.schedules == 10
+    assert set(coverage.verbs) == {"gust"}
+    assert sum(coverage.selectors.values()) >= sum(coverage.verbs.values())
+
+
+def test_a_fault_that_touches_nothing_breaks_nothing():
+    mute = scenario.load("corridor", ("time.dt=0.05", "time.duration=0.2", 'agents.estimator="rkf"'))
+    quarry, coverage = hunt.hunt(
+        mute, touched("lie", 1, "leaders", "followers"), budget=10, verbs=["lie"], seed=1, watch=lambda *_: None
+    )
+    assert quarry is None
+    assert coverage.vacuous == coverage.schedules > 0
+
+
+def test_an_invariant_that_is_never_put_to_the_test_is_not_broken():
+    quarry, coverage = hunted(checkers.converged(1e-9, by=1.0), verbs=["cut"], budget=10)
+    assert quarry is None
+    assert coverage.vacuous == coverage.schedules
+
+
+def test_an_invariant_that_fails_undisturbed_is_no_quarry():
+    with pytest.raises(ScenarioError, match="nothing to hunt for"):
+        hunted(checkers.bounded(1e-9), verbs=["cut"])
+
+
+def said(given):
+    """A scenario without where it was read."""
+    return given.model_dump()
+
+
+def round_trip(given, path):
+    path.write_text(scenario.to_toml(given), encoding="utf-8")
+    return said(scenario.load(str(path)))
+
+
+@pytest.mark.parametrize("name", scenario.shipped())
+def test_a_shipped_scenario_is_the_same_after_it_is_written(name, tmp_path):
+    loaded = scenario.load(name)
+    assert round_trip(loaded, tmp_path / "again.toml") == said(loaded)
+
+
+WILD = (
+    "seed=18446744073709551615",
+    'description="a \\"quoted\\" line\\nand ünïcode"',
+    'network.profile="wild"',
+    'network.profiles.wild={netem="delay 10ms 2ms 25% loss gemodel 1% 10% duplicate 1%"}',
+    'network.profiles.list={like="wild",loss=[{model="list",messages=[3,5]}],corrupt=[{kind="bias",p=0.1,by=-0.5}]}',
+    "network.coupled=false",
+    'network.links=[{links="2->4",channels="sensing",availability=0.5}]',
+    "network.zones=[{centre=[1.0,2.0],radius=3.0,share=0.25}]",
+    "agents.parameters.ga-rkf.sigma_w=0.25",
+    "record.enabled=false",
+    timeline(
+        {"verb": "cut", "name": "first", "when": {"tracking_error_above": 0.5, "lasting": 0.1}, "links": ["6-7"]},
+        {
+            "verb": "lose",
+            "after": "first",
+            "at": 0.1,
+            "every": 0.5,
+            "times": 3,
+            "lasts": 0.2,
+            "links": ["all"],
+            "loss": 0.5,
+        },
+        {"verb": "pause", "at": 0.4, "agents": [4, "random 1 followers"]},
+        {"verb": "resume", "at": 0.6, "agents": [4]},
+        {"verb": "delay", "name": "second", "at": 0.25, "links": ["min-cut"], "delay": 0.1},
+        {"verb": "heal", "at": 0.75, "names": ["second"]},
+    ),
+)
+
+
+def test_a_scenario_that_says_everything_is_the_same_after_it_is_written(tmp_path):
+    loaded = scenario.load("corridor", WILD)
+    assert round_trip(loaded, tmp_path / "again.toml") == said(loaded)
+
+
+def test_any_schedule_is_the_same_after_it_is_written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("written") / "again.toml"
+
+    @settings(
+        max_examples=60,
+        derandomize=True,
+        database=None,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    )
+    @given(entries=strategies.schedules(CORRIDOR, strategies.VERBS))
+    def same(entries):
+        extended = scenario.extended(CORRIDOR, entries)
+        assert round_trip(extended, path) == said(extended)
+        assert len(extended.timeline) == len(entries)
+
+    same()
+
+
+def test_what_is_written_flies_the_same_bits(tmp_path):
+    overrides = ("time.dt=0.05", "time.duration=1", "network.coupled=false", *WILD[2:5], WILD[-1])
+    (tmp_path / "again.toml").write_text(scenario.to_toml(scenario.load("corridor", overrides)), encoding="utf-8")
+    assert digest_of(str(tmp_path / "again.toml")) == digest_of("corridor", *overrides)

@@ -1,0 +1,233 @@
+"""The pytest plugin as the tests of others see it: what passes, what fails, what a failure says and leaves behind."""
+
+import importlib
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from affinet.cli import main
+from affinet.sections import ScenarioError
+
+# A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
+for module in ("affinet.testing.swarm", "netem.journal", "world.logbook", "cvxpy", "hypothesis"):
+    importlib.import_module(module)
+
+pytest_plugins = ["pytester"]
+
+SHORT = '"corridor", "time.dt=0.05", "time.duration=1"'
+SAYS_WHERE = re.compile(r"^seed (\d+), (\w+)\nrecording: (.+)\nrepeat: affinet (.+)$", re.MULTILINE)
+
+
+@pytest.fixture
+def tested(pytester):
+    """Runs pytest on the text of a test file, in this process."""
+
+    def run(text, *options):
+        pytester.makepyfile("from affinet.checkers import bounded, recovers\nimport pytest\n" + text)
+        return pytester.runpytest_inprocess(f"--basetemp={pytester.path / 'base'}", *options)
+
+    return run
+
+
+def outcomes(result):
+    """How many tests passed, failed and so on."""
+    return {name: number for name, number in result.parseoutcomes().items() if name != "warnings"}
+
+
+def directories(pytester):
+    """Those made for runs, of whatever test."""
+    return list((pytester.path / "base").glob("affinet[0-9]*"))
+
+
+# ---- verdicts
+
+
+def test_the_fixture_flies_and_what_it_flew_is_checked(tested):
+    text = f"""
+def test_flies(swarm):
+    run = swarm({SHORT}).fault("cut", links=["1-2"], at=0.2, until=0.4).fly().check(bounded(5))
+    assert run.ticks == 20 and run.bites[0].touched > 0
+"""
+    assert outcomes(tested(text)) == {"passed": 1}
+
+
+def test_a_run_whose_fault_touched_nothing_fails(tested):
+    text = f"""
+def test_nobody_listens(swarm):
+    deaf = swarm({SHORT}, "agents.estimator=rkf")
+    deaf.fault("lie", agents=[4], matrix=[[2.0, 0.0], [0.0, 2.0]], at=0.5).fly()
+"""
+    result = tested(text)
+    assert outcomes(result) == {"failed": 1}
+    result.stdout.fnmatch_lines(["*Broken: the run is vacuous, not pass: 'lie 4' touched no messages*"])
+
+
+def test_a_checker_that_was_not_put_to_the_test_fails(tested):
+    text = f"""
+def test_calm(swarm):
+    swarm({SHORT}).fly().check(bounded(5), recovers(0.1, within=0.2))
+"""
+    result = tested(text)
+    assert outcomes(result) == {"failed": 1}
+    result.stdout.fnmatch_lines(["*Broken: recovers(0.1, within=0.2): vacuous: no fault that ended*"])
+
+
+def test_what_comes_out_badly_can_be_what_is_expected(tested):
+    text = f"""
+def test_vacuous(swarm):
+    swarm({SHORT}).fault("cut", links=["1-2"], when=dict(tracking_error_above=1e9)).fly("vacuous")
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_fails(swarm):
+    swarm({SHORT}, "formation.spread=1e308").fly("fail")
+
+def test_does_not_fail(swarm):
+    swarm({SHORT}).fly("fail")
+"""
+    result = tested(text)
+    assert outcomes(result) == {"passed": 2, "failed": 1}
+    result.stdout.fnmatch_lines(["*Broken: the run is pass, not fail: every fault bit and nothing broke"])
+
+
+@pytest.mark.parametrize(
+    ("verb", "keys", "says"),
+    [
+        ("sever", {"at": 1, "links": ["1-2"]}, r"timeline\.1: needs a verb among cut, partition"),
+        ("cut", {"at": 1, "link": ["1-2"]}, r"timeline\.1\.link: unknown key; did you mean 'links'\?"),
+        ("cut", {"at": 1, "links": ["1=2"]}, r"timeline\.1\.links\.1: '1=2' selects no links"),
+        ("cut", {"links": ["1-2"]}, r"timeline\.1: says not when: give at"),
+        ("lose", {"at": 1, "links": ["all"], "loss": 2.0}, r"timeline\.1\.loss: should be less than or equal to 1"),
+    ],
+)
+def test_a_wrong_verb_or_key_is_said_with_its_key(swarm, verb, keys, says):
+    with pytest.raises(ScenarioError, match=says):
+        swarm("corridor").fault(verb, **keys)
+
+
+def test_what_only_the_formation_can_tell_is_said_when_it_flies(swarm):
+    with pytest.raises(ScenarioError, match=r"timeline\.1\.links: '1-7' matches no link"):
+        swarm("corridor").fault("cut", at=1, links=["1-7"]).fly()
+
+
+# ---- what a failure leaves behind
+
+
+def test_a_failure_says_how_to_fly_the_same_bits_again(tested, tmp_path, monkeypatch, capfd):
+    text = f"""
+@pytest.mark.affinet_seeds(7)
+def test_breaks(swarm):
+    swarm({SHORT}).fault("cut", links=["1-2"], at=0.2, until=0.4).fly().check(bounded(1e-9))
+"""
+    result = tested(text)
+    assert outcomes(result) == {"failed": 1}
+    ((seed, runtime, recording, command),) = SAYS_WHERE.findall(result.stdout.str())
+    assert (seed, runtime) == ("7", "inprocess")
+    assert Path(recording).stat().st_size > 0
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    capfd.readouterr()
+    assert main(shlex.split(command)) == 0
+    assert f"the same bits as {Path(recording).parent}" in capfd.readouterr().err.replace("\n", "")
+
+
+def test_a_test_that_passes_leaves_nothing(tested, pytester):
+    text = f"""
+def test_passes(swarm):
+    swarm({SHORT}).fly()
+
+def test_of_something_else():
+    assert False
+"""
+    result = tested(text)
+    assert outcomes(result) == {"passed": 1, "failed": 1}
+    assert not directories(pytester)
+    result.stdout.no_fnmatch_line("*affinet replay*")
+
+
+def test_of_many_runs_the_last_four_are_kept(tested, pytester):
+    text = f"""
+def test_breaks_late(swarm):
+    for seed in range(1, 7):
+        swarm({SHORT.replace("=1", "=0.5")}, f"seed={{seed}}").fly()
+    assert False
+"""
+    result = tested(text)
+    kept = SAYS_WHERE.findall(result.stdout.str())
+    assert [seed for seed, *_ in kept] == ["3", "4", "5", "6"]
+    assert {Path(recording).parents[1] for _, _, recording, _ in kept} == set(directories(pytester))
+    assert all(Path(recording).is_file() for _, _, recording, _ in kept)
+
+
+# ---- seeds, runtimes, workers
+
+
+def test_a_mark_runs_a_test_once_with_each_seed(tested):
+    text = f"""
+seen = set()
+
+@pytest.mark.affinet_seeds(11, 12)
+def test_seeded(swarm):
+    run = swarm({SHORT}).fly()
+    seen.add((run.plan.scenario.seed, run.outcome.digest))
+
+def test_both():
+    assert {{seed for seed, _ in seen}} == {{11, 12}} and len({{digest for _, digest in seen}}) == 2
+"""
+    result = tested(text, "-v")
+    assert outcomes(result) == {"passed": 3}
+    result.stdout.fnmatch_lines(["*test_seeded?seed11?*", "*test_seeded?seed12?*"])
+
+
+def test_the_command_line_says_where_to_fly_and_a_mark_says_otherwise(tested):
+    text = """
+AIR = "corridor", "time.dt=0.05", "time.duration=0.5"
+digests = set()
+
+def test_over_processes(swarm):
+    run = swarm(*AIR).fly()
+    assert len(run.outcome.processes) >= 7
+    digests.add(run.outcome.digest)
+
+@pytest.mark.affinet_runtime("inprocess")
+def test_here(swarm):
+    run = swarm(*AIR).fly()
+    assert not run.outcome.processes
+    digests.add(run.outcome.digest)
+
+def test_same_bits():
+    assert len(digests) == 1
+"""
+    assert outcomes(tested(text, "--affinet-runtime=processes")) == {"passed": 3}
+
+
+def test_a_runtime_that_is_none_is_refused(tested):
+    result = tested("def test_nothing(): pass", "--affinet-runtime=thread")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--affinet-runtime: invalid choice: 'thread'*"])
+
+
+def test_workers_fly_swarms_and_report_what_failed(pytester):
+    pytester.makepyfile(f"""
+def test_flies(swarm):
+    swarm({SHORT}).fly()
+
+def test_breaks(swarm):
+    swarm({SHORT}).fly("fail")
+""")
+    result = pytester.runpytest_subprocess("-n", "2")
+    assert outcomes(result) == {"passed": 1, "failed": 1}
+    ((_, _, recording, _),) = SAYS_WHERE.findall(result.stdout.str())
+    assert Path(recording).is_file()
+
+
+def test_the_marks_are_known(tested):
+    result = tested(f"""
+@pytest.mark.affinet_seeds(1)
+@pytest.mark.affinet_runtime("inprocess")
+def test_flies(swarm):
+    swarm({SHORT}).fly()
+""", "--strict-markers")  # fmt: skip
+    assert outcomes(result) == {"passed": 1}
