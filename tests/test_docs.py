@@ -12,6 +12,8 @@ from flying import digest_of, plan_of
 from affinet import events, impairments, sections
 from affinet.run import fly
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 
