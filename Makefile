@@ -10,10 +10,10 @@ demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
 
 test: lint types imports ## everything that must hold, in minutes
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist loadgroup
 
 test-all: lint types imports ## and the slow proofs
-	$(BIN)/pytest -m "slow or not slow" --timeout 1800
+	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
 
 lint: $(READY)
 	$(BIN)/ruff check

@@ -136,7 +136,7 @@ def _length(entry: Event, begin: Moment) -> float:
 
 
 def _occurrences(draft: _Draft, number: int, entry: Event) -> Iterator[tuple[Moment, int, int | None]]:
-    """When it begins, and its first and last tick but one, each time."""
+    """When it begins, each time, the tick in which it does, and the first in which it holds no longer."""
     first, again = draft.begins[number], 0
     while again == 0 or (entry.every is not None and again < (entry.times or again + 1)):
         seconds = first.seconds + again * (entry.every or 0.0)

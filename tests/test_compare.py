@@ -13,6 +13,8 @@ from affinet.run import fly
 from netem.fate import Fate
 from world import history
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 PLAN = plan_of("corridor", "time.duration=0.5")
 
 

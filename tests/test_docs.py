@@ -1,6 +1,8 @@
 """The documentation shows what is."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import get_args
 
@@ -9,6 +11,8 @@ from flying import digest_of, plan_of
 
 from affinet import events, impairments, sections
 from affinet.run import fly
+
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -69,3 +73,24 @@ def test_every_verb_of_the_timeline_is_documented():
         assert f"| `{verb}` |" in text
         for key in set(model.model_fields) - {"verb"}:
             assert f"`{key}`" in text
+
+
+def test_the_tests_in_the_docs_pass(tmp_path):
+    for page in ("README.md", "docs/testing.md"):
+        blocks = re.findall(r"```python\n(.*?)```", (DOCS.parent / page).read_text(), flags=re.DOTALL)
+        tests = [block for block in blocks if "def test_" in block]
+        assert tests
+        (tmp_path / f"test_{Path(page).stem}.py").write_text("\n\n".join(tests))
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        str(tmp_path),
+        str(tmp_path),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stdout

@@ -12,6 +12,8 @@ import psutil
 import pytest
 from rerun.chunk import RrdReader
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 PATIENCE = 30.0
 
 

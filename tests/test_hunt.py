@@ -13,6 +13,8 @@ from affinet.evidence import Evidence
 from affinet.sections import ScenarioError
 from affinet.testing import strategies
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 CORRIDOR = scenario.load("corridor", ("time.dt=0.05", "time.duration=4"))
 BRIEF = ("--set", "time.dt=0.05", "--duration", "2", "--estimator", "rkf")
 

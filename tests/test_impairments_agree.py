@@ -13,6 +13,8 @@ from affinet.run import fly
 from netem import journal
 from world import history
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 LOSSES = {
     "bernoulli": {"p": 0.2},
     "gilbert": {"loss": 0.2, "burst": 4.0, "extra_delay": 0.06},

@@ -14,6 +14,8 @@ from netem.control import Action, Order, obey
 from netem.fault import Fault, Verb
 from netem.links import Links
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 SCRIPTED = (Fault(Verb.CUT, 0, None, pairs=((1, 2),)),)
 

@@ -11,6 +11,8 @@ import pytest
 from affinet.cli import main
 from affinet.sections import ScenarioError
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 # A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
 for module in ("affinet.testing.swarm", "netem.journal", "world.logbook", "cvxpy", "hypothesis"):
     importlib.import_module(module)

@@ -11,6 +11,8 @@ from affinet.inprocess import Swarm
 from affinet.run import fly
 from world import history
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 # A coarse tick flies each scenario to its end, through every fault, in seconds.
 COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
 

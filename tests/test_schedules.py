@@ -15,6 +15,8 @@ from affinet.run import fly, rehearse
 from affinet.sections import ScenarioError
 from affinet.testing import strategies
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 ENDERS = {"heal", "restart", "resume", "rejoin"}
 ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none")
 COARSE = ("time.dt=0.05", "time.duration=4")

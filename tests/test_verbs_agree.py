@@ -11,6 +11,8 @@ from affinet.run import fly
 from netem import journal
 from world import history
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 COARSE = ("time.dt=0.05", "record.enabled=false", "network.availability=0.9", "formation.spread=0.5")
 MIRROR = [[-1.0, 0.0], [0.0, 1.0]]
 BELOW = {"tracking_error_below": 1e3, "lasting": 0.3}
