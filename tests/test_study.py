@@ -11,6 +11,8 @@ from affinet import cli, scenario, study
 from affinet import plan as planning
 from affinet.sections import ScenarioError
 
+pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+
 TINY = """
 title = "Tiny"
 source = "nobody"
