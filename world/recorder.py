@@ -84,6 +84,7 @@ class Recorder:
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
         self._stream.set_sinks(*sinks, default_blueprint=_blueprint(formation))
         self._log_static()
+        self._stream.flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
