@@ -17,13 +17,21 @@ def killed(role, moment, *options):
 
 
 # Seconds from the victim's start: the launcher while its children log in, the world while it imports, the others in flight.
-@pytest.mark.parametrize(("role", "moment"), [("launcher", "2.2"), ("world", "0.5"), ("netem", "3"), ("agents", "3.5")])
+@pytest.mark.parametrize(
+    ("role", "moment"),
+    [
+        ("launcher", "2.2"),
+        ("world", "0.5"),
+        pytest.param("netem", "3", marks=pytest.mark.slow),
+        pytest.param("agents", "3.5", marks=pytest.mark.slow),
+    ],
+)
 def test_a_kill_at_any_moment_leaves_nothing_but_what_can_be_read(role, moment):
     bench = killed(role, moment)
     assert bench.returncode == 0, bench.stdout + bench.stderr
 
 
-@pytest.mark.parametrize("moment", ["1.8", "2.6"])
+@pytest.mark.parametrize("moment", ["1.8", pytest.param("2.6", marks=pytest.mark.slow)])
 def test_ctrl_c_while_it_starts_leaves_in_order(moment):
     bench = killed("ctrl-c", moment)
     assert bench.returncode == 0, bench.stdout + bench.stderr

@@ -216,6 +216,7 @@ def test_workers_fly_swarms_and_report_what_failed(pytester):
 def test_flies(swarm):
     swarm({SHORT}).fly()
 
+@pytest.mark.slow
 def test_breaks(swarm):
     swarm({SHORT}).fly("fail")
 """)

@@ -55,7 +55,7 @@ def strange(run):
 
 
 @pytest.mark.timeout(1800)
-@some_then_all(25, 300)
+@some_then_all(10, 300)
 def test_any_schedule_flies_and_its_accounts_close(number):
     verdicts = Counter()
 
