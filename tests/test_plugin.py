@@ -211,12 +211,12 @@ def test_a_runtime_that_is_none_is_refused(tested):
     result.stderr.fnmatch_lines(["*--affinet-runtime: invalid choice: 'thread'*"])
 
 
+@pytest.mark.slow
 def test_workers_fly_swarms_and_report_what_failed(pytester):
     pytester.makepyfile(f"""
 def test_flies(swarm):
     swarm({SHORT}).fly()
 
-@pytest.mark.slow
 def test_breaks(swarm):
     swarm({SHORT}).fly("fail")
 """)
