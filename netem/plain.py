@@ -136,8 +136,16 @@ def _enum(kind: type[Enum]) -> Reader:
 
 
 def _optional(hint: Any) -> Reader:
-    inner = [_reader(option) for option in get_args(hint) if option is not type(None)][-1]
-    return inner if type(None) not in get_args(hint) else lambda value: None if value is None else inner(value)
+    """Of several options the last is read; but a whole number is one, where it may be."""
+    options = get_args(hint)
+    inner = [_reader(option) for option in options if option is not type(None)][-1]
+
+    def read(value: Any) -> Any:
+        if (value is None and type(None) in options) or (type(value) is int and int in options):
+            return value
+        return inner(value)
+
+    return read
 
 
 def _array(hint: Any) -> Reader:

@@ -384,14 +384,17 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
         ({"login": {"endpoint": "tcp/x", "name": "netem"}}, r"^login: Login has .*missing \['password'\]"),
         ({"channels": ["sense", 3]}, r"^channels\[\]: expected a text, got 3"),
         (
-            {"links": {"agents": 2, "src": [[1], [2, 3]], "dst": [1]}},
+            {"links": {"agents": 2, "src": [[1], [2, 3]], "dst": [1], "swarm": 2}},
             r"^links\.src: expected a rectangular list of int64",
         ),
-        ({"links": {"agents": 2, "src": {}, "dst": [1]}}, r"^links\.src: expected a nested list"),
-        ({"links": {"agents": 2, "src": [1.7], "dst": [1]}}, r"^links\.src: .*int64.*1\.7"),
-        ({"links": {"agents": 2, "src": ["2"], "dst": [1]}}, r"^links\.src: .*int64.*'2'"),
-        ({"links": {"agents": 2, "src": [True], "dst": [1]}}, r"^links\.src: .*int64.*True"),
-        ({"links": {"agents": 2, "src": [2**64 - 1], "dst": [1]}}, r"^links\.src: .*int64.*18446744073709551615"),
+        ({"links": {"agents": 2, "src": {}, "dst": [1], "swarm": 2}}, r"^links\.src: expected a nested list"),
+        ({"links": {"agents": 2, "src": [1.7], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*1\.7"),
+        ({"links": {"agents": 2, "src": ["2"], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*'2'"),
+        ({"links": {"agents": 2, "src": [True], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*True"),
+        (
+            {"links": {"agents": 2, "src": [2**64 - 1], "dst": [1], "swarm": 2}},
+            r"^links\.src: .*int64.*18446744073709551615",
+        ),
         ({"leaders": [1, 0, 2]}, r"^leaders: .*bool.*2"),
         ({"leaders": ["no"]}, r"^leaders: .*bool.*'no'"),
         (
