@@ -4,8 +4,8 @@ from functools import cache
 
 from affinet import plan as planning
 from affinet import scenario
-from affinet.inprocess import Swarm
 from affinet.plan import Plan
+from affinet.run import rehearse
 from world.history import digest
 
 
@@ -18,6 +18,4 @@ def plan_of(name: str, *overrides: str) -> Plan:
 @cache
 def digest_of(name: str, *overrides: str) -> str:
     """The digest of a scenario flown in this process, once."""
-    swarm = Swarm(plan_of(name, *overrides))
-    swarm.fly(lambda _: None, batch=50)
-    return digest(swarm.history.arrays())
+    return digest(rehearse(plan_of(name, *overrides)).arrays)

@@ -8,8 +8,7 @@ from flying import plan_of
 
 from affinet import cli
 from affinet.compare import first_difference
-from affinet.inprocess import Swarm
-from affinet.run import fly
+from affinet.run import fly, rehearse
 from netem.fate import Fate
 from world import history
 
@@ -20,9 +19,7 @@ PLAN = plan_of("corridor", "time.duration=0.5")
 
 @pytest.fixture(scope="module")
 def arrays():
-    swarm = Swarm(PLAN)
-    swarm.fly(lambda _: None, batch=50)
-    return swarm.history.arrays()
+    return rehearse(PLAN).arrays
 
 
 def compared(arrays, **changes):

@@ -8,8 +8,7 @@ from flying import plan_of
 
 from affinet import impairments, scenario, selectors
 from affinet import plan as planning
-from affinet.inprocess import Swarm
-from affinet.run import fly
+from affinet.run import fly, rehearse
 from affinet.sections import ScenarioError
 from netem.fate import Fate
 
@@ -158,23 +157,19 @@ def test_a_trace_is_flown(tmp_path):
         f"{at},{src},{dst},{share}" for src, dst in links.index for at, share in ((0, 1), (0.5, 0 if src == 4 else 1))
     ]
     (tmp_path / "trace.csv").write_text(HEADER + "\n".join(rows) + "\n")
-    swarm = Swarm(planned(*traced(tmp_path / "trace.csv")))
-    swarm.fly(lambda _: None, batch=50)
+    flown = rehearse(planned(*traced(tmp_path / "trace.csv"))).arrays
     expected = np.full((100, 4, 24), int(Fate.DELIVERED))
     expected[50:, :, links.src == 4] = Fate.LOST
-    assert np.array_equal(swarm.history.fates, expected)
+    assert np.array_equal(flown["fates"], expected)
 
 
 def test_the_losses_of_an_earlier_run_are_a_trace(tmp_path):
     lossy = planned("network.availability=0.6", 'timeline=[{verb="cut",at=0.2,until=0.4,links=["1-2"]}]')
     fly(lossy, "inprocess", tmp_path / "before", lambda *_: None)
-    swarm = Swarm(planned(*traced(tmp_path / "before"), "seed=9"))
-    swarm.fly(lambda _: None, batch=50)
-    first = Swarm(lossy)
-    first.fly(lambda _: None, batch=50)
-    lost = first.history.fates == Fate.LOST
+    again = rehearse(planned(*traced(tmp_path / "before"), "seed=9")).arrays["fates"]
+    lost = rehearse(lossy).arrays["fates"] == Fate.LOST
     assert 0.3 < lost.mean() < 0.5
-    assert np.array_equal(swarm.history.fates == Fate.LOST, lost)
+    assert np.array_equal(again == Fate.LOST, lost)
 
 
 def test_a_run_shorter_than_this_one_is_no_trace(tmp_path):

@@ -7,8 +7,7 @@ import pytest
 from flying import digest_of, plan_of
 
 from affinet import scenario
-from affinet.inprocess import Swarm
-from affinet.run import fly
+from affinet.run import fly, rehearse
 from world import history
 
 pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
@@ -136,9 +135,8 @@ def test_shipped_scenarios_agree_in_full(name, seed, out):
 
 
 def mean_error(estimator, seed):
-    swarm = Swarm(plan_of("corridor", f'agents.estimator="{estimator}"', "network.availability=0.5", f"seed={seed}"))
-    swarm.fly(lambda _: None, batch=50)
-    return swarm.history.error.mean()
+    plan = plan_of("corridor", f'agents.estimator="{estimator}"', "network.availability=0.5", f"seed={seed}")
+    return rehearse(plan).error.mean()
 
 
 @pytest.mark.parametrize("seeds", [(1,), pytest.param(range(1, 6), marks=pytest.mark.slow)], ids=["one", "five"])
