@@ -66,7 +66,8 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     assert len(curves["seconds"]) == 2 * 2 * 20
     assert set(curves["estimator"]) == {"none", "ga-rkf"}
     assert np.isfinite(runs["mean_error"]).all()
-    assert min(Image.open(out / "figure.png").size) > 300
+    with Image.open(out / "figure.png") as figure:
+        assert min(figure.size) > 300
     assert "does not hold" in capsys.readouterr().out
 
 
