@@ -25,10 +25,14 @@ from netem.channels import THETA
 
 
 class Agreement(NamedTuple):
-    """What is perceived in this tick, and the consensus map that outlasts it, with the H H^T of all nominal neighbours."""
+    """What is perceived in this tick, and the consensus map that outlasts it, with the H H^T of all nominal neighbours.
+
+    And the covariance of its edges at first: that of a linear class of maps stays so.
+    """
 
     perceived: Perceived
     consensus: geometry.Fit
+    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ class ConsensusLocalization:
         """Nothing perceived, nothing agreed."""
         perceived = RelativeAffineLocalization().init(brief, batch)
         nominal = np.broadcast_to(geometry.gram(brief.relative, brief.present), perceived.local.gram.shape)
-        return Agreement(perceived, perceived.local._replace(gram=nominal))
+        consensus = perceived.local._replace(gram=nominal)
+        return Agreement(perceived, consensus, self._covariance(consensus, brief))
 
     def sense(
         self, brief: Brief, state: Agreement, measured: Array, seen: Mask
@@ -79,8 +84,11 @@ class ConsensusLocalization:
         psi = geometry.indicator(self._in_use(state.consensus), maps.nearest(said.fields["consensus"]), voices)
         consensus = self._step(state, said, voices)
         shape = self._in_use(consensus)
-        covariance = maps.covariance(shape, brief.relative, brief.covariance)
+        covariance = state.covariance if maps.linear else self._covariance(shape, brief)
         return state._replace(consensus=consensus), complete(brief, state.perceived, shape, covariance, psi)
+
+    def _covariance(self, shape: geometry.Fit, brief: Brief) -> Array:
+        return MAPS[self.constraint].covariance(shape, brief.relative, brief.covariance)
 
     def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
         nearest = MAPS[self.constraint].nearest(consensus.theta)

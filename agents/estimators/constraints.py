@@ -31,7 +31,15 @@ _GENERATORS = {
 
 
 class Maps(Protocol):
-    """A class of maps."""
+    """A class of maps.
+
+    Attributes
+    ----------
+    linear
+        Whether a map of it is linear in what is measured: its covariance then depends on the neighbours, not on the map.
+    """
+
+    linear: bool
 
     def feasible(self, gram: Array) -> Mask:
         """Whether neighbours of this H H^T (..., D, D) determine a map, shape (...)."""
@@ -67,6 +75,8 @@ class Maps(Protocol):
 class Affine:
     """Any matrix: at least D neighbours, not in a line (plane) with the agent."""
 
+    linear = True
+
     def feasible(self, gram: Array) -> Mask:
         """Rank H = D (Remark 1)."""
         return geometry.regular(gram)
@@ -91,6 +101,8 @@ class Affine:
 
 class Scaling:
     """A factor for each coordinate (13): one neighbour will do that differs from the agent in every coordinate."""
+
+    linear = True
 
     def feasible(self, gram: Array) -> Mask:
         """Whether some neighbour differs from the agent in each coordinate."""
@@ -121,6 +133,8 @@ class Rotation:
     In space one neighbour leaves the turn about its edge open, whatever section IV-B says (errata).
     """
 
+    linear = False
+
     def feasible(self, gram: Array) -> Mask:
         """Rank H >= D - 1; with the determinant fixed, the last direction follows from the others."""
         scale = np.einsum("...ii", gram) / gram.shape[-1]
@@ -144,6 +158,8 @@ class Rotation:
 
 class Similarity:
     """A rotation and one scale, feasible where a rotation is; its determinant is s^D."""
+
+    linear = False
 
     def feasible(self, gram: Array) -> Mask:
         """Rank H >= D - 1."""

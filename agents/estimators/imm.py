@@ -68,10 +68,9 @@ class InteractingMultipleModel:
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Modes:
         """All edges unknown, all models as probable."""
         shape = (*batch, brief.relative.shape[-2])
-        prior = np.repeat([self.prior_position, self.prior_velocity, self.prior_acceleration], brief.dimension)
-        covariance = np.broadcast_to(np.diag(prior**2), (*shape, 3, len(prior), len(prior))).copy()
-        mean, probability = np.zeros((*shape, 3, len(prior))), np.full((*shape, 3), 1.0 / 3.0)
-        return Modes(mean, covariance, probability, np.zeros(shape, dtype=bool))
+        deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
+        filters = kalman.unknown((*shape, 3), brief.dimension, deviations)
+        return Modes(*filters, np.full((*shape, 3), 1.0 / 3.0), np.zeros(shape, dtype=bool))
 
     def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
         """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""

@@ -7,7 +7,7 @@ the bits of each alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Literal
 
@@ -65,6 +65,23 @@ def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[A
     axes = np.eye(dimension)
     F, Q = np.kron(transition, axes), sigma_w**2 * np.kron(np.outer(deflection, deflection), axes)
     return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
+
+
+def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float]) -> tuple[Array, Array]:
+    """Means and covariances of filters before the first measurement: zero, and as wide as the standard deviations say.
+
+    Parameters
+    ----------
+    shape
+        Of the stack of filters.
+    dimension
+        D.
+    deviations
+        Of position, and of its derivatives as far as the state has them, in SI units.
+    """
+    prior = np.repeat(deviations, dimension)
+    covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
+    return np.zeros((*shape, len(prior))), covariance
 
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:

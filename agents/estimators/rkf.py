@@ -49,9 +49,8 @@ class EdgeFilters:
         """All edges unknown."""
         shape = (*batch, brief.relative.shape[-2])
         deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
-        prior = np.repeat(deviations[: kalman.ORDER[self.model]], brief.dimension)
-        covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
-        return Tracks(np.zeros((*shape, len(prior))), covariance, np.zeros(shape, dtype=bool))
+        filters = kalman.unknown(shape, brief.dimension, deviations[: kalman.ORDER[self.model]])
+        return Tracks(*filters, np.zeros(shape, dtype=bool))
 
     def advance(self, brief: Brief, tracks: Tracks, position: Array, R: Array, usable: Mask) -> Tracks:
         """All filters one tick ahead, corrected by positions (..., n, D) with covariances R (..., n, D, D) where usable."""

@@ -5,7 +5,10 @@ At this size a call into LAPACK is mostly preparation; an agent makes two of eac
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.brief import Array
 
@@ -54,6 +57,12 @@ def _turn(along: Array, across: Array) -> Array:
 
 def triangle(matrix: Array) -> Array:
     """The upper triangles of matrices (..., D, D), row by row, shape (..., D (D + 1) / 2)."""
-    rows, columns = np.triu_indices(matrix.shape[-1])
+    rows, columns = _upper(matrix.shape[-1])
     upper: Array = matrix[..., rows, columns]
     return upper
+
+
+@cache
+def _upper(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    # Looking for them takes ten times as long as taking them, and an agent does so in every tick.
+    return np.triu_indices(size)
