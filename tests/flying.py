@@ -2,11 +2,16 @@
 
 from functools import cache
 
+import pytest
+
 from affinet import plan as planning
 from affinet import scenario
 from affinet.plan import Plan
 from affinet.run import rehearse
 from world.history import digest
+
+# Tests that fly processes stay on one worker: two swarms of processes at once are too many for two cores.
+PROCESSES = pytest.mark.xdist_group("processes")
 
 
 @cache

@@ -6,9 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from flying import PROCESSES
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 ROOT = Path(__file__).parents[1]
 

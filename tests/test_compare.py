@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from flying import plan_of
+from flying import PROCESSES, plan_of
 
 from affinet import cli
 from affinet.compare import first_difference
@@ -12,7 +12,7 @@ from affinet.run import fly, rehearse
 from netem.fate import Fate
 from world import history
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 PLAN = plan_of("corridor", "time.duration=0.5")
 

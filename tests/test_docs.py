@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from flying import digest_of, plan_of
+from flying import PROCESSES, digest_of, plan_of
 
 from affinet import events, impairments, sections
 from affinet.run import fly
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -10,9 +10,10 @@ from importlib import resources
 
 import psutil
 import pytest
+from flying import PROCESSES
 from rerun.chunk import RrdReader
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 PATIENCE = 30.0
 

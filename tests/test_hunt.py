@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from flying import digest_of
+from flying import PROCESSES, digest_of
 from hypothesis import HealthCheck, given, settings
 from scripted import timeline
 
@@ -13,7 +13,7 @@ from affinet.evidence import Evidence
 from affinet.sections import ScenarioError
 from affinet.testing import strategies
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 CORRIDOR = scenario.load("corridor", ("time.dt=0.05", "time.duration=4"))
 BRIEF = ("--set", "time.dt=0.05", "--duration", "2", "--estimator", "rkf")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flying import PROCESSES
 
 from affinet import plan as planning
 from affinet import scenario
@@ -13,7 +14,7 @@ from affinet.run import fly
 from netem import journal
 from world import history
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 LOSSES = {
     "bernoulli": {"p": 0.2},

@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from flying import plan_of
+from flying import PROCESSES, plan_of
 
 from affinet import cli
 from affinet import plan as planning
@@ -14,7 +14,7 @@ from netem.control import Action, Order, obey
 from netem.fault import Fault, Verb
 from netem.links import Links
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 SCRIPTED = (Fault(Verb.CUT, 0, None, pairs=((1, 2),)),)

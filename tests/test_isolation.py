@@ -4,14 +4,13 @@ import json
 import sys
 from pathlib import Path
 
-import pytest
 import zenoh
-from flying import digest_of, plan_of
+from flying import PROCESSES, digest_of, plan_of
 
 from affinet.launcher import Launcher
 from world import history
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 PROGRAMS = Path(__file__).parent / "programs"
 

@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from flying import PROCESSES
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 BENCH = Path(__file__).parents[1] / "bench" / "kills.py"
 

@@ -7,11 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from flying import PROCESSES
 
 from affinet.cli import main
 from affinet.sections import ScenarioError
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 # A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
 for module in ("affinet.testing.swarm", "netem.journal", "world.logbook", "cvxpy", "hypothesis"):

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from flying import digest_of, plan_of
+from flying import PROCESSES, digest_of, plan_of
 
 from affinet import scenario
 from affinet.run import fly, rehearse
 from world import history
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 # A coarse tick flies each scenario to its end, through every fault, in seconds.
 COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from flying import plan_of
+from flying import PROCESSES, plan_of
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from test_runtimes import OCTAHEDRON
@@ -15,7 +15,7 @@ from affinet.run import fly, rehearse
 from affinet.sections import ScenarioError
 from affinet.testing import strategies
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 ENDERS = {"heal", "restart", "resume", "rejoin"}
 ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none")

@@ -5,13 +5,14 @@ import json
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from flying import PROCESSES
 from PIL import Image
 
 from affinet import cli, scenario, study
 from affinet import plan as planning
 from affinet.sections import ScenarioError
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 TINY = """
 title = "Tiny"

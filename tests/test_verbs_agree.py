@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flying import plan_of
+from flying import PROCESSES, plan_of
 from scripted import timeline
 
 from affinet import events
@@ -11,7 +11,7 @@ from affinet.run import fly
 from netem import journal
 from world import history
 
-pytestmark = pytest.mark.xdist_group("processes")  # two swarms of processes at once are too many for two cores
+pytestmark = PROCESSES
 
 COARSE = ("time.dt=0.05", "record.enabled=false", "network.availability=0.9", "formation.spread=0.5")
 MIRROR = [[-1.0, 0.0], [0.0, 1.0]]
