@@ -75,7 +75,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         def of_runs(array: Any) -> Any:
             return array.reshape(len(array), runs, agents, *array.shape[2:])
 
-        present = np.array([~swarm.timeline.at(tick).absent for tick in moments.ticks.tolist()])
+        present = swarm.timeline.present(moments.ticks.tolist())
         errors.append(tracking_error(of_runs(moments.position), of_runs(moments.target), of_runs(present)))
         indicators.append(of_runs(moments.psi)[-moments.first % every :: every])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from affinet.plan import Plan
 from netem import lie
 from netem.fate import FATE_OF, Fate, Fates
 from netem.fault import Fault, Verb
-from netem.links import Mask
+from netem.links import Integers, Mask
 from netem.medium import Medium
 from netem.timeline import Timeline
 from world.history import Arrays
@@ -57,17 +58,47 @@ def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
     arrays
         What happened.
     """
+    flown = _Flown(plan, timeline, arrays)
     return [
-        Bite(fault, _at(fault, plan.world.dt), *_touched(plan, timeline, number, arrays))
-        for number, fault in enumerate(timeline.faults)
+        Bite(fault, _at(fault, plan.world.dt), *_touched(flown, number)) for number, fault in enumerate(timeline.faults)
     ]
+
+
+@dataclass(frozen=True)
+class _Flown:
+    plan: Plan
+    timeline: Timeline
+    arrays: Arrays
+
+    @cached_property
+    def arrivals(self) -> Integers:
+        """When every message offered arrives, -1 where it is dropped at once, shape (T, C, L)."""
+        return self._judged_again(self.timeline, len(self.arrays["fates"]))
+
+    def arrivals_without(self, number: int) -> Integers:
+        """The same had one fault not been, up to its end."""
+        links, faults = self.timeline.links, self.timeline.faults
+        others = [other for place, other in enumerate(faults) if place != number]
+        ticks = len(self.arrays["fates"][: faults[number].end])
+        return self._judged_again(Timeline(links, others, self.timeline.triggers), ticks)
+
+    def _judged_again(self, timeline: Timeline, ticks: int) -> Integers:
+        fates, position = self.arrays["fates"], self.arrays["position"]
+        medium = Medium(self.plan.scenario.seed, self.plan.channels, self.plan.profiles, timeline)
+        air, arrivals = medium.begin(), np.empty((ticks, *fates.shape[1:]), dtype=np.int64)
+        for tick in range(ticks):
+            air, verdicts = medium.judge(air, tick, fates[tick] != Fate.SILENT, position[tick])
+            air, _ = medium.deliver(air, tick, verdicts)
+            arrivals[tick] = np.where(verdicts.fate <= Fate.DELAYED, verdicts.due, -1)
+        return arrivals
 
 
 def _at(fault: Fault, dt: float) -> float | None:
     return None if fault.trigger is not None else fault.start * dt
 
 
-def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tuple[int, str]:
+def _touched(flown: _Flown, number: int) -> tuple[int, str]:
+    plan, timeline, arrays = flown.plan, flown.timeline, flown.arrays
     fault = timeline.faults[number]
     if fault.trigger is not None:
         return 0, "messages: its condition never came"
@@ -93,7 +124,7 @@ def _touched(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> tup
         case Verb.LIE:
             return _told(plan, fault, fates), "messages"
         case Verb.LOSE | Verb.DROPOUT | Verb.DELAY | Verb.DEGRADE if plan.journal is None:
-            return _otherwise(plan, timeline, number, arrays), "messages"
+            return _otherwise(flown, number), "messages"
         case Verb.DEGRADE:
             return int((fates[:, :, held] > Fate.DELIVERED).sum()), "messages"
     return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
@@ -111,23 +142,11 @@ def _working(timeline: Timeline, span: range, fates: Fates) -> Mask:
     return working
 
 
-def _otherwise(plan: Plan, timeline: Timeline, number: int, arrays: Arrays) -> int:
-    """How many messages would have fared otherwise without a fault: by judging all of them again, with it and without."""
-    fault, faults = timeline.faults[number], timeline.faults
-    without = Timeline(
-        timeline.links, [other for place, other in enumerate(faults) if place != number], timeline.triggers
-    )
-    media = [Medium(plan.scenario.seed, plan.channels, plan.profiles, each) for each in (timeline, without)]
-    airs, changed = [medium.begin() for medium in media], 0
-    last = len(arrays["fates"]) if fault.end is None else min(fault.end, len(arrays["fates"]))
-    for tick in range(last):
-        offered, fared = arrays["fates"][tick] != Fate.SILENT, []
-        for place, medium in enumerate(media):
-            air, verdicts = medium.judge(airs[place], tick, offered, arrays["position"][tick])
-            airs[place], _ = medium.deliver(air, tick, verdicts)
-            fared.append(np.where(verdicts.fate <= Fate.DELAYED, verdicts.due, -1))
-        changed += int((fared[0] != fared[1]).sum()) if tick >= fault.start else 0
-    return changed
+def _otherwise(flown: _Flown, number: int) -> int:
+    """How many messages fared otherwise than they would have without a fault."""
+    without = flown.arrivals_without(number)
+    changed = flown.arrivals[: len(without)] != without
+    return int(changed[flown.timeline.faults[number].start :].sum())
 
 
 def _told(plan: Plan, fault: Fault, fates: Any) -> int:

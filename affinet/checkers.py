@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from affinet.evidence import Evidence
+from affinet.outcome import Verdict
 from analysis import consistency
 from netem.fault import Fault, Verb
 from netem.links import Integers, Mask
 from world import sensors
 from world.formation import Array
-
-Verdict = Literal["pass", "fail", "vacuous"]
 
 _STANDARD_ERRORS = 3.0
 

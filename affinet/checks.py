@@ -13,6 +13,7 @@ from agents.controllers import VaryingVelocity
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from analysis.affine import Array
+from analysis.graph import reached
 from netem.fault import Fault
 from world import stress
 from world.formation import Formation
@@ -85,15 +86,11 @@ def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
 
 def _connected(formation: Formation) -> Finding:
     B = stress.incidence(formation.agents, formation.edges)
-    reached = np.zeros(formation.agents, dtype=bool)
-    reached[0] = True
-    near = (B @ B.T) != 0.0
-    for _ in range(formation.agents):
-        reached = reached | near[reached].any(axis=0)
-    if reached.all():
+    with_first = reached((B @ B.T) != 0.0)[0]
+    if with_first.all():
         edges = len(formation.edges)
         return Finding("graph", "ok", f"{formation.agents} agents, {edges} undirected edges, connected")
-    apart = (np.flatnonzero(~reached) + 1).tolist()
+    apart = (np.flatnonzero(~with_first) + 1).tolist()
     return Finding("graph", "error", f"the graph is disconnected: agents {apart} cannot be reached from agent 1")
 
 

@@ -18,14 +18,13 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, scenario, show
+from affinet import compare, files, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
-from affinet.evidence import Evidence
 from affinet.inject import Access, NotFlying, Wish
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
-from affinet.run import Runtime, fly
+from affinet.run import Runtime, evidence, fly
 from affinet.sections import ScenarioError
 from world import history
 
@@ -165,7 +164,7 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="fly a scenario over a grid of settings and many seeds; a figure, and a verdict on every claim",
         description="Exit status 0 whatever the verdicts on the claims: that a claim does not hold is a finding.",
     )
-    study.add_argument("study", help="a TOML file, or one of: paper-000-fig10, ...")
+    study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
     study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
     study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME")
     study.set_defaults(command=_study)
@@ -293,9 +292,8 @@ def _confirm(quarry: Quarry, invariant: Checker, file: Path) -> int:
     with show.Progress(plan, file.stem, out) as watch:
         flown = fly(plan, "processes", out, watch.see)
     same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
-    found = (
-        invariant(Evidence(plan, history.load(out / history.FILE), flown)) if flown.digest else "; ".join(flown.reasons)
-    )
+    landed = evidence(plan, flown)
+    found = invariant(landed) if landed else "; ".join(flown.reasons)
     print(f"over processes, {same}: {found}\n{file}: affinet run {file}")  # noqa: T201
     return FAIL
 

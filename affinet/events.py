@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, Field, PlainValidator, model_validator
 
@@ -253,29 +253,6 @@ def _something(entry: Any, vector: list[float], key: str) -> Any:
     return entry
 
 
-MODELS: tuple[type[Event], ...] = (
-    Cut,
-    Partition,
-    Lose,
-    Delay,
-    Degrade,
-    Heal,
-    Kill,
-    Restart,
-    Pause,
-    Resume,
-    Clock,
-    Depart,
-    Rejoin,
-    Gust,
-    Bias,
-    Outlier,
-    Dropout,
-    Freeze,
-    Lie,
-)
-VERBS: dict[str, type[Event]] = {model.model_fields["verb"].default: model for model in MODELS}
-
 AnyEvent = Annotated[
     Cut
     | Partition
@@ -298,3 +275,5 @@ AnyEvent = Annotated[
     | Lie,
     Field(discriminator="verb"),
 ]
+
+VERBS: dict[str, type[Event]] = {model.model_fields["verb"].default: model for model in get_args(get_args(AnyEvent)[0])}

@@ -75,7 +75,7 @@ class Evidence:
     @cached_property
     def present(self) -> Mask:
         """Agents that take part, shape (T, N)."""
-        return self._of_conditions(lambda now: ~now.absent)
+        return self.timeline.present(range(self.ticks))
 
     @cached_property
     def embodied(self) -> Mask:

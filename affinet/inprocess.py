@@ -97,10 +97,9 @@ class Swarm:
         return state, self._moment(tick, scene, now, action, verdicts, delivery)
 
     def _as_told(self, said: Broadcasts, now: Conditions) -> Broadcasts:
-        agents = np.arange(1, self._links.agents + 1)
         for liar in now.liars if lie.CHANNEL in said else ():
             true, false = said[lie.CHANNEL], lie.told(said[lie.CHANNEL], liar)
-            lies = np.isin(agents, liar.agents)
+            lies = np.isin(np.arange(1, self._links.agents + 1), liar.agents)
             said = {**said, lie.CHANNEL: {name: chosen(lies, false[name], true[name]) for name in true}}
         return said
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -88,12 +89,12 @@ class Plan:
         """Ticks over which links count as working together in the realised graph."""
         return max(1, _tick(self.scenario.record.window, self.world.dt))
 
-    @property
+    @cached_property
     def timeline(self) -> Timeline:
         """All faults over the links."""
         return Timeline(self.world.links, (*self.faults, *self.injected), self.triggers)
 
-    @property
+    @cached_property
     def told_mission(self) -> Mask:
         """Which agents know the manoeuvre, and fly it by their clocks, shape (N,)."""
         return self.world.formation.is_leader | needs_mission(self.law.build())

@@ -54,19 +54,13 @@ def rehearse(plan: Plan) -> Evidence:
     swarm, flown = Swarm(plan), History(plan.world, len(plan.channels))
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
-    arrays = flown.arrays()
-    done = outcome.judge(
-        plan,
-        swarm.timeline,
-        arrays,
-        in_flight=swarm.in_flight,
-        uninstructed=0,
-        failure=None,
-        wall_s=time.perf_counter() - started,
-        processes=[],
-        out=Path(),
-    )
-    return Evidence(plan, arrays, done)
+    return _judged(plan, swarm, flown, time.perf_counter() - started, Path())
+
+
+def evidence(plan: Plan, done: Outcome) -> Evidence | None:
+    """A run with the arrays in its directory; None where it left none."""
+    path = Path(done.out) / history.FILE
+    return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
 def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
@@ -107,10 +101,15 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
         swarm.fly(see, books.batch)
     wall_s = time.perf_counter() - started
     flown.save(out / history.FILE)
-    return outcome.judge(
+    return _judged(plan, swarm, flown, wall_s, out).outcome
+
+
+def _judged(plan: Plan, swarm: Swarm, flown: History, wall_s: float, out: Path) -> Evidence:
+    arrays = flown.arrays()
+    done = outcome.judge(
         plan,
         swarm.timeline,
-        flown.arrays(),
+        arrays,
         in_flight=swarm.in_flight,
         uninstructed=0,
         failure=None,
@@ -118,3 +117,4 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
         processes=[],
         out=out,
     )
+    return Evidence(plan, arrays, done)

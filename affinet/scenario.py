@@ -7,25 +7,24 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from pydantic import ValidationError
 
-from affinet import events, impairments, sections
+from affinet import events, files, impairments, sections
 from affinet.impairments import Section
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
 
 FILE = "scenario.json"  # in a run directory, as resolved
+_FOLDER = "scenarios"
 
 
 def shipped() -> list[str]:
     """Names of the scenarios that come with affinet."""
-    folder = resources.files("affinet") / "scenarios"
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return files.shipped(_FOLDER)
 
 
 def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
@@ -36,22 +35,8 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
     ScenarioError
         When there is no such scenario, or something in it is wrong.
     """
-    path = Path(name)
-    if path.suffix == ".toml" and path.is_file():
-        try:
-            text = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise ScenarioError(f"{path.name}: not UTF-8, as TOML must be: {error}") from error
-    elif name in shipped():
-        path = Path(f"{name}.toml")
-        text = (resources.files("affinet") / "scenarios" / path.name).read_text(encoding="utf-8")
-    else:
-        raise ScenarioError(f"{name}: no such file, and no such scenario; shipped are {', '.join(shipped())}")
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{path.name}: not TOML: {error}") from error
-    return _validated(raw, Source(path.name, text, tuple(overrides)))
+    file = files.read(name, _FOLDER, "scenario")
+    return _validated(file.says, Source(file.name, file.text, tuple(overrides)))
 
 
 def resolved(out: Path, overrides: Sequence[str] = ()) -> Scenario:

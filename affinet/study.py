@@ -9,17 +9,16 @@ from __future__ import annotations
 import itertools
 import json
 import multiprocessing
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
 
+from affinet import files
 from affinet import plan as planning
 from affinet import scenario as scenarios
 from affinet.batch import Runs, fly_all
@@ -35,6 +34,7 @@ from world.formation import Array
 
 Labels = dict[str, str]
 
+_FOLDER = "studies"
 _KEPT = 600  # moments of a curve
 
 
@@ -99,8 +99,7 @@ class Result:
 
 def shipped() -> list[str]:
     """Names of the studies that come with affinet."""
-    folder = resources.files("affinet") / "studies"
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return files.shipped(_FOLDER)
 
 
 def load(name: str) -> Study:
@@ -111,19 +110,11 @@ def load(name: str) -> Study:
     ScenarioError
         When there is none, or something in it is wrong.
     """
-    path = Path(name)
-    if name in shipped():
-        text = (resources.files("affinet") / "studies" / f"{name}.toml").read_text(encoding="utf-8")
-    elif path.suffix == ".toml" and path.is_file():
-        text = path.read_text(encoding="utf-8")
-    else:
-        raise ScenarioError(f"{name}: no such file, and no such study; shipped are {', '.join(shipped())}")
+    file = files.read(name, _FOLDER, "study")
     try:
-        return Study.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{name}: not TOML: {error}") from error
+        return Study.model_validate(file.says)
     except ValidationError as error:
-        wrong = [f"{name}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
+        wrong = [f"{file.name}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
         raise ScenarioError("\n".join(wrong)) from error
 
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, maximum_flow
 
+from analysis.graph import reached
+
 Edge = tuple[int, int]
 
 
@@ -33,17 +35,9 @@ def smallest_cut(agents: int, edges: Sequence[Edge]) -> NDArray[np.bool_]:
     graph = _matrix(agents, edges)
     flows = [maximum_flow(graph, 0, sink) for sink in range(1, agents)]
     least = min(range(len(flows)), key=lambda n: flows[n].flow_value)
-    residual = csr_array((graph - flows[least].flow) > 0)
-    return _reached(residual)
-
-
-def _reached(residual: csr_array) -> NDArray[np.bool_]:
-    reached = np.zeros(residual.shape[0], dtype=bool)
-    reached[0] = True
-    near = residual.toarray()
-    for _ in range(len(reached)):
-        reached = reached | near[reached].any(axis=0)
-    return reached
+    residual: NDArray[np.bool_] = (graph - flows[least].flow).toarray() > 0
+    side: NDArray[np.bool_] = reached(residual)[0]
+    return side
 
 
 def _parts(agents: int, edges: Sequence[Edge]) -> int:

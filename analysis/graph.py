@@ -129,7 +129,7 @@ def algebraic_connectivity(adjacency: Mask, present: Mask | None = None) -> Arra
 
 def connected(adjacency: Mask) -> Mask:
     """Whether the mutual graph (N, N) is connected, shape (...)."""
-    return np.all(_reached(mutual(adjacency))[..., 0], axis=-1)
+    return np.all(reached(mutual(adjacency))[..., 0], axis=-1)
 
 
 def rooted(adjacency: Mask, leaders: Integers | Sequence[int]) -> Mask:
@@ -143,7 +143,7 @@ def rooted(adjacency: Mask, leaders: Integers | Sequence[int]) -> Mask:
         Agent numbers; without any, nobody is reached.
     """
     roots = np.asarray(leaders, dtype=np.int64) - 1
-    return np.all(np.any(_reached(adjacency)[..., roots], axis=-1), axis=-1)
+    return np.all(np.any(reached(adjacency)[..., roots], axis=-1), axis=-1)
 
 
 def feasible(heard: Mask, src: Integers, dst: Integers, nominal: Array) -> Mask:
@@ -158,14 +158,30 @@ def feasible(heard: Mask, src: Integers, dst: Integers, nominal: Array) -> Mask:
     nominal
         Nominal positions, shape (N, D), in metres.
     """
-    agents, dimension = nominal.shape
-    relative = nominal[dst - 1] - nominal[src - 1]
-    share = np.zeros((len(src), agents, dimension, dimension))
-    share[np.arange(len(src)), dst - 1] = relative[:, :, None] * relative[:, None, :]
-    flat = heard.astype(np.float64) @ share.reshape(len(src), agents * dimension**2)
-    HHt = flat.reshape(*heard.shape[:-1], agents, dimension, dimension)
-    scale = np.einsum("...ii", HHt) / dimension
-    return np.linalg.eigvalsh(HHt)[..., 0] > _SINGULAR * scale
+    return regular(grams(adjacency(heard, src, dst, len(nominal)), nominal))
+
+
+def grams(sees: Mask, nominal: Array) -> Array:
+    """H H^T of the neighbours that every agent sees, shape (..., N, D, D), in square metres.
+
+    Parameters
+    ----------
+    sees
+        Shape (..., N, N); [i - 1, j - 1] where i sees j.
+    nominal
+        Nominal positions, shape (..., N, D), in metres.
+    """
+    dimension = nominal.shape[-1]
+    relative = nominal[..., :, None, :] - nominal[..., None, :, :]
+    products = (relative[..., :, None] * relative[..., None, :]).reshape(*relative.shape[:-1], dimension**2)
+    flat = (sees[..., None, :].astype(np.float64) @ products)[..., 0, :]
+    return flat.reshape(*flat.shape[:-1], dimension, dimension)
+
+
+def regular(gram: Array) -> Mask:
+    """Whether rank H = D, shape (...), from H H^T (..., D, D)."""
+    scale = np.einsum("...ii", gram) / gram.shape[-1]
+    return np.linalg.eigvalsh(gram)[..., 0] > _SINGULAR * scale
 
 
 def stress_dimension(edges_up: Mask, edges: Edges, nominal: Array) -> Integers:
@@ -199,7 +215,7 @@ def _ends(edges: Edges) -> tuple[Integers, Integers]:
     return i, j
 
 
-def _reached(adjacency: Mask) -> Mask:
+def reached(adjacency: Mask) -> Mask:
     """Who is reached, in any number of steps, from whom, shape (..., N, N); everybody from itself."""
     agents = adjacency.shape[-1]
     reach = (adjacency | np.eye(agents, dtype=np.bool_)).astype(np.float64)

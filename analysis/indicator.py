@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.graph import grams, regular
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Of the smallest eigenvalue to the mean: below this, neighbours do not determine an affine map.
-_SINGULAR = 1e-9
 _ROUNDING = 1e-12
 
 
@@ -53,11 +53,8 @@ def bounds(
     sees = both & (heard if seen is None else seen)
     relative = nominal[..., :, None, :] - nominal[..., None, :, :]
 
-    products = (relative[..., :, None] * relative[..., None, :]).reshape(*relative.shape[:-1], dimension**2)
-    flat = sees[..., None, :].astype(np.float64) @ products
-    HHt = flat.reshape(*flat.shape[:-2], dimension, dimension)
-    scale = np.einsum("...ii", HHt) / dimension
-    feasible = np.linalg.eigvalsh(HHt)[..., 0] > _SINGULAR * scale
+    HHt = grams(sees, nominal)
+    feasible = regular(HHt)
     inverse = np.linalg.inv(np.where(feasible[..., None, None], HHt, np.eye(dimension)))
 
     counts = both & heard & feasible[..., None, :]

@@ -123,6 +123,10 @@ class Timeline:
         """The conditions of a tick; the same object for as long as nothing changes."""
         return self._segments[bisect_right(self._boundaries, tick) - 1]
 
+    def present(self, ticks: Iterable[int]) -> Mask:
+        """Agents that take part in each of these ticks, shape (T, N)."""
+        return np.array([~self.at(tick).absent for tick in ticks])
+
     @cached_property
     def pending(self) -> tuple[int, ...]:
         """Triggers that have not fired yet and still hold a fault back."""

@@ -127,7 +127,6 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
     """Consecutive moments as arrays, with what they are measured against."""
     ticks = np.arange(first, first + len(moments))
     where, target = np.array([moment.position for moment in moments]), world.target(ticks)
-    present = np.array([~timeline.at(tick).absent for tick in ticks.tolist()])
     fates = np.array([moment.fates for moment in moments], dtype=np.uint8)
     entries = [
         Entry(each, _rows(moment.odd), _rows(moment.dropped), _rows(moment.released), moment.injected)
@@ -147,7 +146,7 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
         late=np.array([moment.late for moment in moments]),
         dropped=np.array([np.bincount(entry.dropped[:, _FATE], minlength=len(Fate)) for entry in entries]),
         target=target,
-        error=tracking_error(where, target, present),
+        error=tracking_error(where, target, timeline.present(ticks.tolist())),
         entries=entries,
     )
 

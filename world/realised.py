@@ -98,7 +98,7 @@ class Watch:
         ticks = np.arange(first, first + len(newest))
         age = graph.age(by_channel, np.arange(first - len(known), first + len(newest)))[:, kept]
         heard, joint = by_channel[:, kept] >= 0, graph.joint(by_channel >= 0, self._window)[:, kept]
-        present = np.array([~timeline.at(tick).absent for tick in ticks[::every].tolist()])
+        present = timeline.present(ticks[::every].tolist())
         joint_edges = graph.undirected(joint, links.src, links.dst, self._edges)
         self._remember(whole)
 

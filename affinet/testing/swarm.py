@@ -12,13 +12,12 @@ from typing import Any
 
 from affinet import plan as planning
 from affinet import scenario as scenarios
-from affinet.checkers import Checker, Verdict
+from affinet.checkers import Checker
 from affinet.evidence import Evidence
-from affinet.outcome import Outcome
+from affinet.outcome import Verdict
 from affinet.plan import Plan
-from affinet.run import Runtime, fly, rehearse
+from affinet.run import Runtime, evidence, fly, rehearse
 from affinet.sections import Scenario
-from world import history
 
 _KEPT = 4
 
@@ -137,12 +136,16 @@ class Hangar:
     def _launch(self, plan: Plan) -> Flown:
         if self.runtime == "inprocess":
             self._flown.append((plan, None))
-            evidence = rehearse(plan)
-            return Flown(plan, evidence.arrays, evidence.outcome)
+            rehearsed = rehearse(plan)
+            return Flown(plan, rehearsed.arrays, rehearsed.outcome)
         self._rooms.append(self._room())
         out = self._rooms[-1] / "run"
         self._flown.append((plan, out))
-        return _landed(plan, fly(plan, "processes", out, lambda *_: None))
+        done = fly(plan, "processes", out, lambda *_: None)
+        landed = evidence(plan, done)
+        if landed is None:
+            raise Broken(f"the run left nothing: {'; '.join(done.reasons)}")
+        return Flown(plan, landed.arrays, done)
 
     def _recorded(self, plan: Plan) -> Path:
         out = self._room() / "run"
@@ -150,10 +153,3 @@ class Hangar:
             warnings.simplefilter("ignore")  # the numbers of a run that diverged do not fit a recording
             fly(plan, "inprocess", out, lambda *_: None)
         return out
-
-
-def _landed(plan: Plan, outcome: Outcome) -> Flown:
-    path = Path(outcome.out) / history.FILE
-    if not path.exists():
-        raise Broken(f"the run left nothing: {'; '.join(outcome.reasons)}")
-    return Flown(plan, history.load(path), outcome)

@@ -1,0 +1,49 @@
+"""TOML files by name: the user's own, or those that come with affinet."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from affinet.sections import ScenarioError
+
+
+class Read(NamedTuple):
+    """A file: its name, its text, and what it says."""
+
+    name: str
+    text: str
+    says: dict[str, Any]
+
+
+def shipped(folder: str) -> list[str]:
+    """Names of the files in a folder of the package."""
+    items = (resources.files("affinet") / folder).iterdir()
+    return sorted(item.name.removesuffix(".toml") for item in items if item.name.endswith(".toml"))
+
+
+def read(name: str, folder: str, what: str) -> Read:
+    """The file of this path, or the one that is shipped under this name; `what` it should be, for people.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none, or it is not TOML.
+    """
+    path = Path(name)
+    if path.suffix == ".toml" and path.is_file():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise ScenarioError(f"{path.name}: not UTF-8, as TOML must be: {error}") from error
+    elif name in shipped(folder):
+        path = Path(f"{name}.toml")
+        text = (resources.files("affinet") / folder / path.name).read_text(encoding="utf-8")
+    else:
+        raise ScenarioError(f"{name}: no such file, and no such {what}; shipped are {', '.join(shipped(folder))}")
+    try:
+        return Read(path.name, text, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path.name}: not TOML: {error}") from error
