@@ -272,7 +272,7 @@ def energy(level: float) -> Checker:
     name = f"energy({level:g})"
 
     def check(evidence: Evidence) -> Finding:
-        power = np.where(evidence.present[..., None], evidence.arrays["velocity"] ** 2, 0.0).sum(axis=(1, 2))
+        power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
         spent = np.cumsum(power) * evidence.dt
         return _every(
             name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} m²/s are spent"

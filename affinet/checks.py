@@ -12,6 +12,7 @@ from affinet import stability
 from agents.controllers import VaryingVelocity
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.second_order import DoubleVaryingVelocity
 from analysis.affine import Array
 from analysis.graph import reached
 from netem.fault import Fault
@@ -57,7 +58,9 @@ def closed_loop(formation: Formation, L: Array, law: Any, estimator: Any, dt: fl
         Finding("followers", "ok", f"follower block eigenvalues {slow:.4f} to {fast:.4f}"),
     ]
     degree = np.diag(L)[followers]
-    if isinstance(law, VaryingVelocity):
+    if isinstance(law, VaryingVelocity) and law.source == "feed-forward":
+        found.append(Finding("one-tick radius", "ok", "velocities are fed forward: no loop through the network"))
+    elif isinstance(law, VaryingVelocity | DoubleVaryingVelocity):
         found.append(_one_tick(law, L_ff, degree, dt))
     step = stability.step_matrix(law, L_ff, degree, dt)
     if step is None:
@@ -124,23 +127,24 @@ def _leaders(formation: Formation) -> Finding:
     )
 
 
-def _one_tick(law: VaryingVelocity, L_ff: Array, degree: Array, dt: float) -> Finding:
-    name = "one-tick radius"
-    if law.source == "feed-forward":
-        return Finding(name, "ok", "velocities are fed forward: no loop through the network")
+def _one_tick(law: VaryingVelocity | DoubleVaryingVelocity, L_ff: Array, degree: Array, dt: float) -> Finding:
+    name, what = "one-tick radius", ("velocities", "accelerations")[law.order - 1]
     radius = stability.one_tick_radius(L_ff, degree, law.relaxation)
     if radius < 1.0:
-        return Finding(name, "ok", f"{radius:.3f} < 1: velocities heard one tick late settle")
+        return Finding(name, "ok", f"{radius:.3f} < 1: {what} heard one tick late settle")
     remedy = _relaxation_that_settles(law, L_ff, degree, dt)
     relax = f"relax the law (relaxation = {remedy:.2f} settles), " if remedy else ""
+    other = ", or feed velocities forward" if isinstance(law, VaryingVelocity) else ""
     return Finding(
         name,
         "error",
-        f"{radius:.3f} >= 1: velocities heard one tick late diverge; {relax}choose other leaders, or feed velocities forward",
+        f"{radius:.3f} >= 1: {what} heard one tick late diverge; {relax}choose other leaders{other}",
     )
 
 
-def _relaxation_that_settles(law: VaryingVelocity, L_ff: Array, degree: Array, dt: float) -> float | None:
+def _relaxation_that_settles(
+    law: VaryingVelocity | DoubleVaryingVelocity, L_ff: Array, degree: Array, dt: float
+) -> float | None:
     for relaxation in np.arange(0.95, 0.0, -0.05).tolist():
         step = stability.step_matrix(replace(law, relaxation=relaxation), L_ff, degree, dt)
         if step is not None and stability.radius(step) < 1.0:
@@ -149,18 +153,16 @@ def _relaxation_that_settles(law: VaryingVelocity, L_ff: Array, degree: Array, d
 
 
 def _step(radius: float, law: Any, dt: float, fast: float) -> Finding:
-    gain = getattr(law, "alpha", 1.0)
+    gain = getattr(law, "alpha", None)
     if radius < 1.0:
-        return Finding(
-            "step",
-            "ok",
-            f"radius {radius:.6f} < 1 at dt {dt:g} s, gain {gain:g}: settles to 1/e in {_settle(radius, dt)}",
-        )
+        gains = f", gain {gain:g}" if gain else ""
+        settles = f"settles to 1/e in {_settle(radius, dt)}"
+        return Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {dt:g} s{gains}: {settles}")
     return Finding(
         "step",
         "error",
-        f"radius {radius:.4f} >= 1 at dt {dt:g} s: the step is too long for the gains "
-        f"(dt * gain * eigenvalue = {dt * gain * fast:.3f}); lower the gains, or dt",
+        f"radius {radius:.4f} >= 1 at dt {dt:g} s: the step is too long for the gains"
+        f"{f' (dt * gain * eigenvalue = {dt * gain * fast:.3f})' if gain else ''}; lower the gains, or dt",
     )
 
 

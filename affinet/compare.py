@@ -13,7 +13,7 @@ from netem.links import Links
 from world.history import Arrays
 
 # In the order in which a tick makes them, so that a cause is named before what follows from it.
-_OF_AGENTS = ("target", "position", "known", "estimate", "covariance", "psi", "velocity")
+_OF_AGENTS = ("target", "position", "known", "estimate", "covariance", "psi", "feasible", "input")
 _OF_LINKS = ("fates", "newest")
 _ORDER = (
     "target",
@@ -28,7 +28,8 @@ _ORDER = (
     "estimate",
     "covariance",
     "psi",
-    "velocity",
+    "feasible",
+    "input",
 )
 
 

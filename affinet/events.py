@@ -182,6 +182,13 @@ class Rejoin(Event):
     agents: Whom | None = None
 
 
+class Replace(Event):
+    """Departed agents, or all of them, whose places are taken: new processes, which know nothing, in the bodies left behind."""
+
+    verb: Literal["replace"] = "replace"
+    agents: Whom | None = None
+
+
 class Gust(Lasting):
     """A push: agents whose bodies are carried along, in metres per second."""
 
@@ -267,6 +274,7 @@ AnyEvent = Annotated[
     | Clock
     | Depart
     | Rejoin
+    | Replace
     | Gust
     | Bias
     | Outlier

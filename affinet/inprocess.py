@@ -13,6 +13,7 @@ import numpy as np
 
 from affinet.plan import Plan
 from agents.agent import Action, AgentState, chosen, renew
+from agents.brief import Reading
 from agents.estimators.base import Fields, Heard
 from analysis.affine import Array
 from netem import channels, lie
@@ -23,7 +24,7 @@ from netem.links import Integers, Mask
 from netem.medium import Medium
 from netem.plain import to_plain
 from netem.timeline import Conditions
-from world.history import Moment, Moments, Vigil, gather
+from world.history import UNTOLD, Moment, Moments, Vigil, gather
 from world.world import Scene
 
 Broadcasts = Mapping[str, Fields]
@@ -70,7 +71,7 @@ class Swarm:
                 measured = world.measure(tick, scene, timeline.at(tick))
                 state, moment = self._tick(tick, scene, measured, state)
                 vigil.see(tick, scene.position, timeline)
-                scene = world.step(tick, scene, measured, moment.velocity, timeline.at(tick))
+                scene = world.step(tick, scene, measured, moment.input, timeline.at(tick))
                 moments.append(moment)
                 if len(moments) == batch or tick == world.ticks - 1:
                     gathered = gather(world, timeline, tick + 1 - len(moments), moments)
@@ -86,15 +87,21 @@ class Swarm:
         air, verdicts = self._medium.judge(self._air, tick, self._offered(~now.idle), scene.position)
         seen = (verdicts.fate[0] == Fate.DELIVERED)[links.slots] & links.present
         measured = np.where(seen[..., None], sensed[links.slots], 0.0)
-        state, said = self._agents.sense(before, measured, seen)
+        velocity = self._plan.world.odometry(scene)
+        state, said = self._agents.sense(before, measured, seen, velocity)
         self._said[tick] = self._as_told(said, now)
         self._air, delivery = self._medium.deliver(air, tick, verdicts)
         heard = {name: self._hear(name, delivery) for name in self._fields}
-        state, action = self._agents.act(state, self.timeline.clock(tick), heard, scene.position)
+        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, velocity)
         if now.idle.any():
             state = renew(state, before, now.idle)
         self._forget(tick)
         return state, self._moment(tick, scene, now, action, verdicts, delivery)
+
+    def _reading(self, tick: int) -> Reading:
+        """What the clocks say; one reading for all, where they agree, spares looking up the manoeuvre for each."""
+        clocks = self.timeline.clock(tick)
+        return int(clocks[0]) if (clocks == clocks[0]).all() else clocks
 
     def _as_told(self, said: Broadcasts, now: Conditions) -> Broadcasts:
         for liar in now.liars if lie.CHANNEL in said else ():
@@ -147,11 +154,12 @@ class Swarm:
         real = self._links.present & awake[:, None]
         return Moment(
             position=scene.position,
-            velocity=self._plan.world.flown(scene, np.where(awake[:, None], action.velocity, 0.0), now),
+            input=self._plan.world.flown(scene, np.where(awake[:, None], action.input, 0.0), now),
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,
             covariance=np.where(real[..., None], estimate.spread, 0.0),
             psi=np.where(awake, estimate.psi, np.nan),
+            feasible=np.where(awake, UNTOLD if estimate.feasible is None else estimate.feasible, UNTOLD),
             fates=verdicts.fate,
             odd=out_of_the_ordinary(tick, verdicts),
             apart=delivery.apart,

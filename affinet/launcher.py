@@ -220,6 +220,7 @@ class Launcher:
             estimator=plan.estimator,
             law=plan.law,
             leader_gain=plan.scenario.agents.leader_gain,
+            limit=plan.scenario.agents.limit,
             brief=replace(whole.of(row), mission=whole.mission if told else None),
             checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
             remembers=remembers,

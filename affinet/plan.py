@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
 from agents.brief import Brief, Mask
-from agents.controllers import needs_mission
+from agents.controllers import Law, needs_mission
+from agents.estimators.base import Heard
 from agents.process import Choice
 from analysis.affine import Array, Manoeuvre
 from netem import channels
@@ -28,6 +30,9 @@ from world import maneuver, stress
 from world.brief import Books
 from world.formation import PRESETS, Formation
 from world.world import World
+
+# Presets that are flown in so many dimensions.
+_MANOEUVRES = {"corridor": (2, maneuver.corridor), "ravine": (3, maneuver.ravine)}
 
 
 class PlanError(ValueError):
@@ -102,7 +107,7 @@ class Plan:
     @property
     def agents(self) -> Agent:
         """All agents, as one batch."""
-        return Agent(self.brief, self.estimator.build(), self.law.build(), self.scenario.agents.leader_gain)
+        return _agents(self.scenario, self.brief, self.estimator, self.law)
 
 
 def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | None = None) -> Plan:
@@ -169,6 +174,7 @@ def _make(given: Scenario) -> Plan:
     formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
+    _check_order(given, law.build())
     findings = checks.framework(formation)
     if any(finding.fatal for finding in findings):
         raise PlanError(findings)
@@ -183,8 +189,10 @@ def _make(given: Scenario) -> Plan:
     world = _world(given, formation)
     brief = _brief(world, L)
     played = script.write(given, formation, world.links)
-    batch = Agent(brief, estimator.build(), law.build(), given.agents.leader_gain)
-    spoken = batch.channels()
+    agents = _agents(given, brief, estimator, law)
+    with sections.said_at("agents"):
+        _try_out(agents)
+    spoken = agents.channels()
     names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
     own, aired = air.plan(given, formation, world.links, bits)
@@ -204,7 +212,37 @@ def _make(given: Scenario) -> Plan:
 
 
 def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
-    return registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
+    choice = registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
+    with sections.said_at(f"agents.parameters.{name}"):
+        choice.build()
+    return choice
+
+
+def _check_order(given: Scenario, law: Law[Any]) -> None:
+    if law.order != given.dynamics.order:
+        steers = ("velocities", "accelerations")[law.order - 1]
+        fits = ("single-integrator", "double-integrator")[law.order - 1]
+        raise ScenarioError(
+            f"dynamics.model: {given.agents.law} steers {steers}, and bodies are {given.dynamics.model}s; "
+            f"set it to {fits!r}, or choose another law"
+        )
+
+
+def _agents(given: Scenario, brief: Brief, estimator: Choice, law: Choice) -> Agent:
+    return Agent(brief, estimator.build(), law.build(), given.agents.leader_gain, given.agents.limit)
+
+
+def _try_out(agents: Agent) -> None:
+    """One tick in silence: what law and estimator want of each other shows before anything starts."""
+    brief, batch = agents.brief, agents.brief.present.shape[:1]
+    nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
+    velocity = nowhere if agents.law.order == 2 else None
+    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, velocity)
+    silence = {
+        channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
+        for channel, fields in agents.channels().items()
+    }
+    agents.act(state, 0, silence, nowhere, velocity)
 
 
 def formation_of(given: Scenario) -> Formation:
@@ -235,6 +273,7 @@ def _world(given: Scenario, formation: Formation) -> World:
         seed=given.seed,
         dt=given.time.dt,
         ticks=given.time.ticks,
+        order=given.dynamics.order,
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
@@ -249,10 +288,13 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
     section = given.manoeuvre
     if section.preset == "hover":
         return maneuver.hover(seconds, dimension)
-    if section.preset == "corridor":
-        if dimension != 2:
-            raise ScenarioError("manoeuvre.preset: 'corridor' is flown in two dimensions; give keyframes")
-        return maneuver.corridor(seconds)
+    if section.preset is not None:
+        flown_in, flown = _MANOEUVRES[section.preset]
+        if dimension != flown_in:
+            raise ScenarioError(
+                f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
+            )
+        return flown(seconds)
     square = (dimension, dimension)
     theta, offset = [], []
     for number, frame in enumerate(section.keyframes, start=1):

@@ -19,7 +19,7 @@ from netem.timeline import Timeline
 from netem.trigger import Trigger
 from world.formation import Formation
 
-_ENDED_BY = {"restart": Verb.KILL, "resume": Verb.PAUSE, "rejoin": Verb.DEPART}
+_ENDED_BY = {"restart": Verb.KILL, "resume": Verb.PAUSE, "rejoin": Verb.DEPART, "replace": Verb.DEPART}
 _ON_LINKS = (Verb.CUT, Verb.PARTITION, Verb.LOSE, Verb.DELAY, Verb.DEGRADE)
 
 
@@ -93,7 +93,7 @@ def write(given: Scenario, formation: Formation, links: Links) -> Script:
 
 
 def _ends(entry: Event) -> bool:
-    return isinstance(entry, events.Heal | events.Restart | events.Resume | events.Rejoin)
+    return isinstance(entry, events.Heal | events.Restart | events.Resume | events.Rejoin | events.Replace)
 
 
 def _begin(draft: _Draft, number: int, asking: tuple[int, ...]) -> Moment:
@@ -243,6 +243,10 @@ def _end(draft: _Draft, number: int, entry: Any) -> None:
             warm = isinstance(entry, events.Restart) and entry.state == "warm"
             for place in begun:
                 _close(draft, place, tick, warm)
+            if isinstance(
+                entry, events.Replace
+            ):  # its process ends in the last tick of its absence, and a new one begins
+                draft.faults.append((number, Fault(Verb.KILL, tick - 1, tick, trigger=moment.frame, agents=(agent,))))
 
 
 def _whose(draft: _Draft, number: int, entry: Any, verb: Verb, frame: int | None, tick: int) -> tuple[int, ...]:

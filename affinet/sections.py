@@ -78,13 +78,13 @@ class Keyframe(Section):
 class Manoeuvre(Section):
     """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
 
-    preset: Literal["hover", "corridor"] | None = None
+    preset: Literal["hover", "corridor", "ravine"] | None = None
     keyframes: list[Keyframe] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _whole(self) -> Manoeuvre:
         if (self.preset is None) == (not self.keyframes):
-            raise ValueError("give a preset ('hover', 'corridor'), or keyframes")
+            raise ValueError("give a preset ('hover', 'corridor', 'ravine'), or keyframes")
         if self.keyframes and len(self.keyframes) < 2:
             raise ValueError("give at least two keyframes")
         times = [frame.time for frame in self.keyframes]
@@ -129,18 +129,27 @@ class Sensing(Section):
 
 
 class Dynamics(Section):
-    """Single integrators; `disturbance` is the standard deviation of their displacement in a tick, per axis, in metres."""
+    """What the bodies are; `disturbance` is the standard deviation of their displacement in a tick, per axis, in metres."""
 
-    model: Literal["single-integrator"] = "single-integrator"
+    model: Literal["single-integrator", "double-integrator"] = "single-integrator"
     disturbance: NotNegative = 0.0
+
+    @property
+    def order(self) -> int:
+        """How often the input is integrated to a position."""
+        return 2 if self.model == "double-integrator" else 1
 
 
 class Agents(Section):
-    """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s."""
+    """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s.
+
+    `limit` is the longest input they command, in m/s, or m/s2 of double integrators: longer ones are shortened.
+    """
 
     estimator: str
     law: str
     leader_gain: NotNegative = 1.0
+    limit: Positive | None = None
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity
+from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ def radius(matrix: Array) -> float:
 
 
 def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array | None:
-    """One tick of the followers under a law of Table II.
+    """One tick of the followers under a law of Table II, or its counterpart for double integrators.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array |
     Returns
     -------
     Array or None
-        Step of the state the law has (positions, and its integral or its last input); None for a law not known here.
+        Step of the state the law has (positions, velocities, its integral or its last input); None for a law not known here.
     """
     followers = len(stress)
     identity = np.eye(followers)
@@ -52,7 +53,20 @@ def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array |
             held = held + law.relaxation * (identity - share)
         pull = -law.relaxation * law.alpha * share
         return np.block([[identity + dt * pull, dt * held], [pull, held]])
+    if isinstance(law, DoubleConstantVelocity):
+        pull = np.block([-law.position_gain * stress, -law.velocity_gain * stress])
+        return np.block([[identity, dt * identity], [0.0 * identity, identity]]) + _integrated(pull, dt)
+    if isinstance(law, DoubleVaryingVelocity):
+        share = law.relaxation * stress / degree[:, None]
+        law_of_state = np.block([-law.position_gain * share, -law.velocity_gain * share, identity - share])
+        moves = np.block([[identity, dt * identity, 0.0 * identity], [0.0 * identity, identity, 0.0 * identity]])
+        return np.vstack([moves + _integrated(law_of_state, dt), law_of_state])
     return None
+
+
+def _integrated(acceleration: Array, dt: float) -> Array:
+    """What accelerations, rows (F, S) over the state, do to positions and velocities in a tick, shape (2 F, S)."""
+    return np.vstack([0.5 * dt**2 * acceleration, dt * acceleration])
 
 
 def one_tick_radius(stress: Array, degree: Array, relaxation: float) -> float:

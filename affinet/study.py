@@ -23,7 +23,7 @@ from affinet import plan as planning
 from affinet import scenario as scenarios
 from affinet.batch import Runs, fly_all
 from affinet.impairments import Section
-from affinet.plan import PlanError
+from affinet.plan import Plan, PlanError
 from affinet.sections import ScenarioError
 from analysis import claims
 from analysis.claims import Verdict
@@ -46,9 +46,10 @@ class Axis(Section):
 
 
 class Claim(Section):
-    """What a paper says, and the check that decides it over the cases selected by their labels."""
+    """What a paper says, for `each` label of some axes, and the check that decides it over the cases of these labels."""
 
     says: str
+    each: list[str] = Field(default_factory=list)
     check: Literal["flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower"]
     of: Labels
     to: Labels | None = None
@@ -65,18 +66,19 @@ class Size(Section):
 
 
 class Study(Section):
-    """A study."""
+    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis."""
 
     title: str
     source: str
-    figure: Literal["curves", "sweep", "indicator"]
+    figure: Literal["curves", "sweep", "indicator", "map"]
     scenario: str
     set: list[str] = Field(default_factory=list)
     full: Size
     quick: Size
     axes: list[Axis]
     along: str | None = None
-    claims: list[Claim]
+    skip: list[Labels] = Field(default_factory=list)
+    claims: list[Claim] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,9 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
     for labels in itertools.product(*(axis.values for axis in study.axes)):
         chosen = [axis.values[label] for axis, label in zip(study.axes, labels, strict=True)]
         overrides = (*study.set, *size.set, *itertools.chain.from_iterable(chosen))
-        yield Case(dict(zip((axis.name for axis in study.axes), labels, strict=True)), overrides)
+        case = Case(dict(zip((axis.name for axis in study.axes), labels, strict=True)), overrides)
+        if not any(_selected(case, left_out) for left_out in study.skip):
+            yield case
 
 
 def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[Result]:
@@ -132,11 +136,13 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
 
     Raises
     ------
-    ScenarioError, PlanError
+    ScenarioError
         When a case cannot fly.
     """
     size = study.quick if quick else study.full
     todo = list(cases(study, quick=quick))
+    for case in todo:  # before any has flown
+        _planned(study.scenario, case)
     context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
     with ProcessPoolExecutor(mp_context=context) as pool:
         waiting = [pool.submit(_fly, study.scenario, case, size.runs) for case in todo]
@@ -147,11 +153,15 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     return results
 
 
-def _fly(name: str, case: Case, runs: int) -> Result:
+def _planned(name: str, case: Case) -> Plan:
     try:
-        plan = planning.make(scenarios.load(name, case.overrides))
+        return planning.make(scenarios.load(name, case.overrides))
     except (ScenarioError, PlanError) as error:
         raise ScenarioError(f"case {case.labels}: {error}") from error
+
+
+def _fly(name: str, case: Case, runs: int) -> Result:
+    plan = _planned(name, case)
     every = max(1, plan.world.ticks // _KEPT)
     first = plan.scenario.seed
     flown = fly_all(plan, range(first, first + runs), every)
@@ -163,7 +173,18 @@ def _fly(name: str, case: Case, runs: int) -> Result:
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:
     """The verdict on each of its claims."""
-    return [_judge(claim, results) for claim in study.claims]
+    return [_judge(one, results) for claim in study.claims for one in _spelled_out(study, claim)]
+
+
+def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
+    """A claim for each label of the axes it is for."""
+    values = {axis.name: list(axis.values) for axis in study.axes}
+    for labels in itertools.product(*(values[name] for name in claim.each)):
+        where = dict(zip(claim.each, labels, strict=True))
+        other = None if claim.to is None else claim.to | where
+        yield claim.model_copy(
+            update={"says": ", ".join(labels) + ": " * bool(labels) + claim.says, "of": claim.of | where, "to": other}
+        )
 
 
 def _judge(claim: Claim, results: list[Result]) -> Verdict:
@@ -186,18 +207,13 @@ def _judge(claim: Claim, results: list[Result]) -> Verdict:
             return claims.leaves(claim.says, *_curves(chosen), claim.level or 1.0, span)
         case "indicator_below_error":
             (one,) = chosen
-            return claims.below_in_mean(claim.says, one.runs.seconds, _corrected(one), one.runs.error[..., None])
+            followers, limits, runs = one.followers, one.bounds, one.runs
+            psi = (runs.psi - limits.offset)[:, :, followers]
+            return claims.below_in_mean(claim.says, runs.seconds, psi, runs.error[..., None] * limits.slope[followers])
 
 
-def _corrected(one: Result) -> Array:
-    """The followers' indicators less their offset, over their slope: (psi - b) / c of (18), shape (R, T, F)."""
-    limits = one.bounds
-    corrected: Array = ((one.runs.psi - limits.offset) / limits.slope)[:, :, one.followers]
-    return corrected
-
-
-def _selected(result: Result, labels: Mapping[str, str]) -> bool:
-    return all(result.labels[name] == label for name, label in labels.items())
+def _selected(one: Case | Result, labels: Mapping[str, str]) -> bool:
+    return all(one.labels[name] == label for name, label in labels.items())
 
 
 def _means(results: list[Result]) -> Array:
@@ -221,8 +237,11 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
         figures.curves(out / "figure.png", study.title, curves, [axis.name for axis in study.axes])
     elif study.figure == "sweep":
         figures.sweep(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], study.along or "")
+    elif study.figure == "map":
+        figures.settings(out / "figure.png", study.title, curves, [axis.name for axis in study.axes])
     else:
         (one,) = results
-        numbers = (np.flatnonzero(one.followers) + 1).tolist()
-        path = out / "figure.png"
-        figures.indicator(path, study.title, one.runs.seconds, one.runs.error, _corrected(one), numbers)
+        corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
+        numbers = np.flatnonzero(one.followers)
+        path, seen = out / "figure.png", corrected[:, :, numbers]
+        figures.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())

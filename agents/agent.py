@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Reading
-from agents.controllers import Law, pilot
+from agents import second_order
+from agents.brief import Array, Brief, Mask, Own, Reading
+from agents.controllers import Law, pilot, saturated
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
+from analysis.affine import Manoeuvre
 from netem.channels import INPUT
 
 
@@ -19,13 +21,13 @@ class AgentState(NamedTuple):
 
     estimator: Any
     law: Any
-    velocity: Array
+    input: Array
 
 
 class Action(NamedTuple):
-    """What an agent does in a tick: its input (..., D), in metres per second, and the estimate behind it."""
+    """What an agent does in a tick: its input (..., D), a velocity or an acceleration, and the estimate behind it."""
 
-    velocity: Array
+    input: Array
     estimate: Estimate
 
 
@@ -41,48 +43,68 @@ class Agent:
         What it runs.
     leader_gain
         How hard a leader pulls toward its target, per second.
+    limit
+        The longest input its body takes, in metres per second, or per second squared; None for any.
     """
 
     brief: Brief
     estimator: Estimator[Any]
     law: Law[Any]
     leader_gain: float
+    limit: float | None
 
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
         dimension = self.brief.dimension
-        return {INPUT: {"velocity": Field((dimension,))}, **self.estimator.channels(dimension)}
+        moves = ("velocity", "acceleration")[: self.law.order]
+        return {INPUT: {name: Field((dimension,)) for name in moves}, **self.estimator.channels(dimension)}
 
     def init(self, batch: tuple[int, ...]) -> AgentState:
         """A fresh agent, or a batch of them."""
         return AgentState(
             estimator=self.estimator.init(self.brief, batch),
             law=self.law.init(self.brief, batch),
-            velocity=np.zeros((*batch, self.brief.dimension)),
+            input=np.zeros((*batch, self.brief.dimension)),
         )
 
-    def sense(self, state: AgentState, measured: Array, seen: Mask) -> tuple[AgentState, Mapping[str, Fields]]:
+    def sense(
+        self, state: AgentState, measured: Array, seen: Mask, velocity: Array | None
+    ) -> tuple[AgentState, Mapping[str, Fields]]:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
 
-        The input broadcast is the one now flying, of the tick before.
+        The input broadcast is the one now flying, of the tick before; only double integrators have a `velocity` (..., D) too.
         """
         estimator, said = self.estimator.sense(self.brief, state.estimator, measured, seen)
-        return state._replace(estimator=estimator), {INPUT: {"velocity": state.velocity}, **said}
+        moves = {"velocity": state.input} if velocity is None else {"velocity": velocity, "acceleration": state.input}
+        return state._replace(estimator=estimator), {INPUT: moves, **said}
 
     def act(
-        self, state: AgentState, tick: Reading, heard: Mapping[str, Heard], position: Array | None
+        self,
+        state: AgentState,
+        tick: Reading,
+        heard: Mapping[str, Heard],
+        position: Array | None,
+        velocity: Array | None,
     ) -> tuple[AgentState, Action]:
         """Estimate from what was heard, and steer; `tick` is what its clock says.
 
-        Only leaders have their own `position` (..., D).
+        Only leaders have their own `position` (..., D), and only double integrators a `velocity` (..., D).
         """
         brief = self.brief
+        own = Own(state.input if velocity is None else velocity, state.input)
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard)
-        law, velocity = self.law.command(brief, state.law, tick, state.velocity, estimate, heard[INPUT])
+        law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
         if position is not None and brief.mission is not None:
-            led = pilot(brief, brief.mission, self.leader_gain, tick, position)
-            velocity = np.where(brief.leader[..., None], led, velocity)
-        return AgentState(estimator, law, velocity), Action(velocity, estimate)
+            led = self._led(brief.mission, tick, position, own.velocity)
+            steered = np.where(brief.leader[..., None], led, steered)
+        if self.limit is not None:
+            steered = saturated(steered, self.limit)
+        return AgentState(estimator, law, steered), Action(steered, estimate)
+
+    def _led(self, mission: Manoeuvre, tick: Reading, position: Array, velocity: Array) -> Array:
+        if self.law.order == 1:
+            return pilot(self.brief, mission, self.leader_gain, tick, position)
+        return second_order.pilot(self.brief, mission, self.leader_gain, tick, position, velocity)
 
 
 def renew(state: Any, fresh: Any, which: Mask) -> Any:

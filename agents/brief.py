@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,21 @@ from analysis.affine import Manoeuvre
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Reading = int | NDArray[np.int64]  # of a clock, in ticks; one for all, or each its own
+
+
+class Own(NamedTuple):
+    """What an agent knows of its own motion.
+
+    Parameters
+    ----------
+    velocity
+        Shape (..., D), in metres per second: what odometry says, or a single integrator's input.
+    input
+        Now flying, shape (..., D), in metres per second, or per second squared.
+    """
+
+    velocity: Array
+    input: Array
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The control laws of paper 000, Table II, and the leaders' pilot.
+"""The control laws of paper 000, Table II, for single integrators, and the leaders' pilot.
 
 Each law is a frozen dataclass of its gains with two pure methods over arrays with any leading axes. All steer by
 sum_j l_ij zhat_ij over the edges for which there is an estimate; an edge without one contributes nothing.
@@ -7,11 +7,11 @@ sum_j l_ij zhat_ij over the edges for which there is an estimate; an edge withou
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from agents.brief import Array, Brief, Reading
+from agents.brief import Array, Brief, Own, Reading
 from agents.estimators.base import Estimate, Heard
 from analysis.affine import Manoeuvre
 
@@ -19,17 +19,19 @@ State = TypeVar("State")
 
 
 class Law(Protocol[State]):
-    """A control law for followers."""
+    """A control law for followers; `order` is that of the bodies it steers, by a velocity (1) or an acceleration (2)."""
+
+    order: ClassVar[int]
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
         """The state before the first tick, with `batch` as its leading axes."""
 
     def command(
-        self, brief: Brief, state: State, tick: Reading, velocity: Array, estimate: Estimate, inputs: Heard
+        self, brief: Brief, state: State, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
     ) -> tuple[State, Array]:
-        """The input of this tick, shape (..., D), in metres per second.
+        """The input of this tick, shape (..., D), in metres per second, or per second squared.
 
-        `velocity` (..., D) is the input now flying, `inputs` what the neighbours said of theirs.
+        `inputs` is what the neighbours said of theirs.
         """
 
 
@@ -59,6 +61,7 @@ class Static:
         Gain, per second.
     """
 
+    order: ClassVar[int] = 1
     alpha: float = 10.0
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
@@ -70,7 +73,7 @@ class Static:
         brief: Brief,
         state: Nothing,
         tick: Reading,  # noqa: ARG002
-        velocity: Array,  # noqa: ARG002
+        own: Own,  # noqa: ARG002
         estimate: Estimate,
         inputs: Heard,  # noqa: ARG002
     ) -> tuple[Nothing, Array]:
@@ -90,6 +93,7 @@ class ConstantVelocity:
         Integral gain, per second. The sum over ticks is bare, so eta stands for a continuous gain times dt.
     """
 
+    order: ClassVar[int] = 1
     alpha: float = 10.0
     eta: float = 0.1
 
@@ -102,7 +106,7 @@ class ConstantVelocity:
         brief: Brief,
         state: Integral,
         tick: Reading,  # noqa: ARG002
-        velocity: Array,  # noqa: ARG002
+        own: Own,  # noqa: ARG002
         estimate: Estimate,
         inputs: Heard,  # noqa: ARG002
     ) -> tuple[Integral, Array]:
@@ -130,6 +134,7 @@ class VaryingVelocity:
         eta in u <- (1 - eta) u_before + eta u_law, in (0, 1].
     """
 
+    order: ClassVar[int] = 1
     alpha: float = 1.0
     source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
     relaxation: float = 1.0
@@ -139,34 +144,35 @@ class VaryingVelocity:
         return LastHeard(np.zeros((*batch, *brief.relative.shape[-2:])))
 
     def command(
-        self, brief: Brief, state: LastHeard, tick: Reading, velocity: Array, estimate: Estimate, inputs: Heard
+        self, brief: Brief, state: LastHeard, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
     ) -> tuple[LastHeard, Array]:
         """Move as the neighbours do, and fall toward the formation."""
         heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
-        theirs = self._neighbours_velocity(brief, tick, velocity, estimate, heard)
-        motion = (brief.stress[..., None] * theirs).sum(axis=-2)
-        law = (motion - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
-        return LastHeard(heard), (1.0 - self.relaxation) * velocity + self.relaxation * law
+        theirs = self._neighbours_velocity(brief, tick, own, estimate, heard)
+        law = (weighted(brief.stress, theirs) - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
+        return LastHeard(heard), (1.0 - self.relaxation) * own.input + self.relaxation * law
 
-    def _neighbours_velocity(
-        self, brief: Brief, tick: Reading, velocity: Array, estimate: Estimate, heard: Array
-    ) -> Array:
+    def _neighbours_velocity(self, brief: Brief, tick: Reading, own: Own, estimate: Estimate, heard: Array) -> Array:
         if self.source == "communicated":
             return heard
         if self.source == "estimated":
             if estimate.relative_velocity is None:
                 raise ValueError("the velocity source 'estimated' needs an estimator that tracks relative velocities")
-            return velocity[..., None, :] - estimate.relative_velocity
+            return own.velocity[..., None, :] - estimate.relative_velocity
         if brief.mission is None:
             raise ValueError("the velocity source 'feed-forward' needs the mission in the brief")
-        of_edges = np.asarray(tick)[..., None]
+        of_edges = tick if isinstance(tick, int) else tick[..., None]
         return brief.mission.velocity(of_edges, brief.nominal[..., None, :] - brief.relative, brief.dt)
 
 
 def stress_force(brief: Brief, estimate: Estimate) -> Array:
     """sum_j l_ij zhat_ij over the edges with an estimate, shape (..., D), in metres."""
-    weights = np.where(estimate.known, brief.stress, 0.0)
-    total: Array = (weights[..., None] * estimate.relative).sum(axis=-2)
+    return weighted(np.where(estimate.known, brief.stress, 0.0), estimate.relative)
+
+
+def weighted(stress: Array, of_neighbours: Array) -> Array:
+    """Sum over the neighbours of their weights (..., n) by what is known of each (..., n, D), shape (..., D)."""
+    total: Array = (stress[..., None] * of_neighbours).sum(axis=-2)
     return total
 
 
@@ -180,8 +186,14 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
     position
         The leader's own, shape (..., D), in metres.
     """
-    target = mission.target(tick, brief.nominal)
-    return mission.velocity(tick, brief.nominal, brief.dt) + gain * (target - position)
+    astray = mission.target(tick, brief.nominal) - position
+    return mission.velocity(tick, brief.nominal, brief.dt) + gain * astray
+
+
+def saturated(command: Array, limit: float) -> Array:
+    """Inputs (..., D) shortened to this length, in their unit, where they are longer."""
+    length = np.sqrt((command * command).sum(axis=-1, keepdims=True))
+    return command * (limit / np.maximum(length, limit))
 
 
 def needs_mission(law: Law[Any]) -> bool:

@@ -45,7 +45,7 @@ class AgentBrief:
         Where it connects, and as whom.
     agent, neighbours
         Its number, and the numbers of the agents in its neighbour slots.
-    estimator, law, leader_gain, brief
+    estimator, law, leader_gain, limit, brief
         What `Agent` is made of.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
@@ -58,6 +58,7 @@ class AgentBrief:
     estimator: Choice
     law: Choice
     leader_gain: float
+    limit: float | None
     brief: Brief
     checkpoint: str | None
     remembers: bool
@@ -70,7 +71,7 @@ class Node:
         self._number = brief.agent
         self._neighbours = brief.neighbours
         self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
-        self._agent = Agent(brief.brief, brief.estimator.build(), brief.law.build(), brief.leader_gain)
+        self._agent = Agent(brief.brief, brief.estimator.build(), brief.law.build(), brief.leader_gain, brief.limit)
         self._width, self._dimension = brief.brief.relative.shape
         self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
         self._state: AgentState = self._agent.init(())
@@ -116,7 +117,7 @@ class Node:
         if inbox.neighbours:
             slots = [self._slot[number] for number in inbox.neighbours]
             measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, measured, seen)
+        self._state, said = self._agent.sense(self._state, measured, seen, _numbers(inbox.velocity))
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
             self._broadcasts[name].put(
@@ -125,8 +126,8 @@ class Node:
 
     def _exchange(self, inbox: wire.ExchangeInbox, sensed: wire.SenseInbox) -> None:
         self._heard += len(inbox.messages)
-        own = None if sensed.position is None else np.array(sensed.position, dtype=np.float64)
-        self._state, action = self._agent.act(self._state, sensed.clock, self._gather(inbox.messages), own)
+        heard, position, velocity = self._gather(inbox.messages), _numbers(sensed.position), _numbers(sensed.velocity)
+        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, velocity)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
@@ -134,11 +135,12 @@ class Node:
             k=inbox.k,
             src=self._number,
             seq=self._numbers.next("act"),
-            velocity=action.velocity,
+            input=action.input,
             estimate=estimate.relative[:degree],
             known=estimate.known[:degree],
             covariance=estimate.spread[:degree],
             psi=float(estimate.psi),
+            feasible=None if estimate.feasible is None else bool(estimate.feasible),
             heard=self._heard,
         )
         self._act.put(wire.pack(act))
@@ -169,6 +171,10 @@ class Node:
                 f"{error!r} (see docs/protocol.md)"
             ) from error
         return gathered
+
+
+def _numbers(given: wire.Rows | None) -> Array | None:
+    return None if given is None else np.array(given, dtype=np.float64)
 
 
 def main() -> None:

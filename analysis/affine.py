@@ -28,13 +28,17 @@ class Manoeuvre:
     def target(self, tick: int | NDArray[np.int64], nominal: Array) -> Array:
         """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3), in a tick each.
 
-        Ticks and agents broadcast against each other; after its last tick the manoeuvre rests.
+        Ticks and agents broadcast against each other; before its first and after its last tick the manoeuvre rests.
         """
-        last = len(self.theta) - 1
-        reached = np.minimum(tick, last)
+        reached = np.clip(tick, 0, len(self.theta) - 1)
         return (self.theta[reached] @ nominal[..., None])[..., 0] + self.offset[reached]
 
     def velocity(self, tick: int | NDArray[np.int64], nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
         travelled: Array = self.target(tick + 1, nominal) - self.target(tick, nominal)
         return travelled / dt
+
+    def acceleration(self, tick: int | NDArray[np.int64], nominal: Array, dt: float) -> Array:
+        """Second difference of the target about this tick, shape (..., D), in metres per second squared."""
+        gained: Array = self.velocity(tick, nominal, dt) - self.velocity(np.asarray(tick) - 1, nominal, dt)
+        return gained / dt

@@ -12,6 +12,7 @@ Span = tuple[float, float | None]
 
 _STANDARD_ERRORS = 3.0
 _MOST = 0.9  # of the runs
+_DOUBLE = 2.0
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,11 @@ def flat(says: str, mean_errors: Array, factor: float) -> Verdict:
 
 
 def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Verdict:
-    """From the last case to the first of (S, R), the mean comes to at least a share of the other's, from a smaller one."""
-    ratio = _mean(mean_errors) / _mean(others)
-    holds = bool(ratio[0] >= share and ratio[0] > ratio[-1])
-    return Verdict(says, holds, f"ratio to the other {_list(ratio)}, from the first case to the last")
+    """From the last case to the first of (S, R), the mean at least doubles, and comes to at least a share of the other's."""
+    means = _mean(mean_errors)
+    ratio, growth = means / _mean(others), float(means[0] / means[-1])
+    found = f"ratio to the other {_list(ratio)}, from the first case to the last; it grows by {growth:.3g}"
+    return Verdict(says, bool(ratio[0] >= share and growth >= _DOUBLE), found)
 
 
 def lower(says: str, mean_errors: Array, others: Array) -> Verdict:
@@ -68,12 +70,12 @@ def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Ver
     above = np.argwhere(mean > _STANDARD_ERRORS * error)
     if not len(above):
         return Verdict(
-            says, True, f"at all of {len(seconds)} moments, for all {values.shape[-1]}; closest {mean.max():.3g} m²"
+            says, True, f"at all of {len(seconds)} moments, for all {values.shape[-1]}; closest {mean.max():.3g}"
         )
     tick, which = above[0]
     share = len(above) / mean.size
     return Verdict(
-        says, False, f"above at {share:.1%} of the moments, first at {seconds[tick]:g} s by {mean[tick, which]:.3g} m²"
+        says, False, f"above at {share:.1%} of the moments, first at {seconds[tick]:g} s by {mean[tick, which]:.3g}"
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
-_LINE_STYLES = ("-", "--", ":", "-.")
+_LOST = 1.0  # m²
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,35 @@ def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: A
         panel.plot(seconds, _positive(corrected[:, :, place].mean(axis=0)), lw=0.8, label=f"agent {number}")
     panel.plot(seconds, error.mean(axis=0), color="black", lw=1.2, label="tracking error")
     _finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
+    figure.savefig(path)
+
+
+def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) -> None:
+    """Mean error over a grid: a panel for each label of the first axis, rows and columns for those of the second and third.
+
+    A cell is struck out where a run has left the formation for good: its error is above 1 m² at the end.
+    """
+    across, down, each = axes
+    panels, rows, columns = (_labels(cases, axis) for axis in (across, down, each))
+    size = (1.6 + 0.52 * len(columns) * len(panels), 1.3 + 0.26 * len(rows))
+    figure = Figure(figsize=size, layout="constrained", dpi=160)
+    for panel, label in zip(figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True):
+        grid, lost = np.full((2, len(rows), len(columns)), np.nan)
+        for case in cases:
+            if case.labels[across] == label:
+                place = rows.index(case.labels[down]), columns.index(case.labels[each])
+                grid[place] = _finite(case.mean_error).mean()
+                lost[place] = bool((_finite(case.error)[:, -1] > _LOST).any())
+        image = panel.imshow(np.log10(grid), cmap="RdYlGn_r", vmin=-3, vmax=2, aspect="auto")
+        for row, column in np.argwhere(np.isfinite(grid)):
+            said = "lost" if lost[row, column] else f"{grid[row, column]:.2g}"
+            panel.text(column, row, said, ha="center", va="center", fontsize=6)
+        panel.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
+        panel.set_yticks(range(len(rows)), rows)
+        panel.set_title(label)
+        panel.grid(visible=False)
+    figure.suptitle(title)
+    figure.colorbar(image, label="mean tracking error (m²), power of ten")
     figure.savefig(path)
 
 

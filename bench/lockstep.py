@@ -45,10 +45,12 @@ def sizes(plan: Plan) -> dict[str, int]:
     broadcasts = [wire.pack(wire.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
     messages = {
         "sense": wire.pack(
-            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), [])
+            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), None, [])
         ),
         "seen": wire.pack(
-            wire.SenseInbox(500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None)
+            wire.SenseInbox(
+                500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None, None
+            )
         ),
         "heard": wire.pack_exchange(500, 500, broadcasts * heard),
         "act": wire.pack(
@@ -56,6 +58,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 *(500, 1, 500, number(size=dimension), number(size=(degree, dimension)), [True] * degree),
                 covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
                 psi=0.1,
+                feasible=True,
                 heard=500,
             )
         ),

@@ -38,7 +38,8 @@ class Sense(NamedTuple):
     """World to medium: the raw sensing of tick k; `last` says that the run is over and nothing was sensed.
 
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
-    (N, D), both in metres; `fired` are the numbers of the triggers that fire in this tick.
+    (N, D), both in metres; `velocity` the true velocities, shape (N, D), in metres per second, where agents are told theirs;
+    `fired` are the numbers of the triggers that fire in this tick.
     """
 
     k: int
@@ -47,6 +48,7 @@ class Sense(NamedTuple):
     last: bool
     measured: Array | Rows
     position: Array | Rows
+    velocity: Array | Rows | None
     fired: Rows
 
 
@@ -55,7 +57,7 @@ class SenseInbox(NamedTuple):
 
     `clock` is what the agent's own clock says, in ticks; `neighbours` are the agents measured, shape (m,), `measured` their
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
-    positioning, get it.
+    positioning, get it; `velocity` its own, shape (D,), in metres per second, if it is a double integrator.
     """
 
     k: int
@@ -66,6 +68,7 @@ class SenseInbox(NamedTuple):
     neighbours: Rows
     measured: Rows
     position: Rows | None
+    velocity: Rows | None
 
 
 class Broadcast(NamedTuple):
@@ -103,20 +106,22 @@ class EndInbox(NamedTuple):
 class Act(NamedTuple):
     """Agent to world: its control input, and what it believes.
 
-    `velocity` is the input u_i, shape (D,), in metres per second; `estimate` the relative positions it acts on, one per
-    neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape (m,); `covariance` the upper
-    triangles of their covariances, row by row, shape (m, D (D + 1) / 2), in square metres, 0 where not known; `psi` its
-    convergence indicator, NaN where undefined; `heard` how many broadcasts it has received so far.
+    `input` is u_i, shape (D,), in metres per second, or per second squared of a double integrator; `estimate` the relative
+    positions it acts on, one per neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape
+    (m,); `covariance` the upper triangles of their covariances, row by row, shape (m, D (D + 1) / 2), in square metres, 0 where
+    not known; `psi` its convergence indicator, NaN where undefined; `feasible` whether the neighbours it sees determine a local
+    map, if its estimator fits one; `heard` how many broadcasts it has received so far.
     """
 
     k: int
     src: int
     seq: int
-    velocity: Array | Rows
+    input: Array | Rows
     estimate: Array | Rows
     known: Mask | Rows
     covariance: Array | Rows
     psi: float
+    feasible: bool | None
     heard: int
 
 

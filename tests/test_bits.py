@@ -16,6 +16,7 @@ from agents.estimators.imm import InteractingMultipleModel
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
+from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
 
 TICKS, RUNS = 10, 3
 
@@ -44,13 +45,17 @@ LAWS = {
     "communicated": VaryingVelocity(relaxation=0.7),
     "estimated": VaryingVelocity(source="estimated"),
     "feed-forward": VaryingVelocity(source="feed-forward"),
+    "double-constant-velocity": DoubleConstantVelocity(),
+    "double-communicated": DoubleVaryingVelocity(relaxation=0.7),
+    "double-estimated": DoubleVaryingVelocity(source="estimated"),
 }
+LIMIT = 4.0  # m/s2; it bites in some of the ticks
 PLAIN = ("none", "rkf", "ral", "conral", "ga-rkf-ral", "ga-rkf-conral")  # with every law; their variants with one
 PAIRS = [
     (estimator, law)
     for estimator in ESTIMATORS
     for law in LAWS
-    if (law != "estimated" or "rkf" in estimator) and (estimator in PLAIN or law == "constant-velocity")
+    if ("estimated" not in law or "rkf" in estimator) and (estimator in PLAIN or law == "constant-velocity")
 ]
 
 # An octahedron with its diagonals, and a seventh agent tied to four of them.
@@ -86,15 +91,24 @@ def plans(tmp_path_factory):
     }
 
 
+def agent_of(plan, estimator, law):
+    limit = LIMIT if LAWS[law].order == 2 else None
+    return Agent(plan.brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0, limit=limit)
+
+
 def draw(agent, links, seed, lead):
-    """What reaches the agents in every tick: measured, seen, heard from whom, own position."""
+    """What reaches the agents in every tick: measured, seen, heard from whom, own position and velocity."""
     rng, dimension = np.random.default_rng(seed), agent.brief.dimension
     slots = (TICKS, *lead, *links.present.shape)
     seen, fresh = rng.random((2, *slots)) < 0.7
     seen, fresh = seen & links.present, fresh & links.present
     measured = agent.brief.relative + 0.1 * rng.normal(size=(*slots, dimension))
-    position = rng.normal(size=(TICKS, *lead, links.agents, dimension))
-    return np.where(seen[..., None], measured, 0.0), seen, fresh, position
+    position, velocity = rng.normal(size=(2, TICKS, *lead, links.agents, dimension))
+    return np.where(seen[..., None], measured, 0.0), seen, fresh, position, velocity
+
+
+def odometry(agent, velocity):
+    return velocity if agent.law.order == 2 else None
 
 
 def leaves(value):
@@ -120,13 +134,14 @@ def row_of(heard, index):
     return {c: Heard({n: f[index] for n, f in h.fields.items()}, h.fresh[index]) for c, h in heard.items()}
 
 
-def fly_together(agent, links, measured, seen, fresh, position):
+def fly_together(agent, links, measured, seen, fresh, position, velocity):
     """A batch, and what each of its agents heard in every tick."""
     state, ticks = agent.init(fresh.shape[1:-1]), []
     for tick in range(TICKS):
-        state, said = agent.sense(state, measured[tick], seen[tick])
+        told = odometry(agent, velocity[tick])
+        state, said = agent.sense(state, measured[tick], seen[tick], told)
         heard = gather(said, links.neighbours, fresh[tick])
-        state, action = agent.act(state, tick, heard, position[tick])
+        state, action = agent.act(state, tick, heard, position[tick], told)
         ticks.append((said, heard, action, state))
     return ticks
 
@@ -134,16 +149,16 @@ def fly_together(agent, links, measured, seen, fresh, position):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("estimator", "law"), PAIRS)
 def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, dimension, plans):
-    brief, links = plans[dimension].brief, plans[dimension].world.links
-    everybody = Agent(brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0)
-    measured, seen, fresh, position = draw(everybody, links, 1, ())
-    together = fly_together(everybody, links, measured, seen, fresh, position)
+    everybody, links = agent_of(plans[dimension], estimator, law), plans[dimension].world.links
+    measured, seen, fresh, position, velocity = draw(everybody, links, 1, ())
+    together = fly_together(everybody, links, measured, seen, fresh, position, velocity)
     for row in range(links.agents):
-        alone = replace(everybody, brief=brief.of(row))
+        alone = replace(everybody, brief=everybody.brief.of(row))
         state = alone.init(())
         for tick, (all_said, all_heard, all_action, all_state) in enumerate(together):
-            state, said = alone.sense(state, measured[tick, row], seen[tick, row])
-            state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row])
+            told = odometry(alone, velocity[tick, row])
+            state, said = alone.sense(state, measured[tick, row], seen[tick, row], told)
+            state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row], told)
             for one, many in zip(leaves((said, action, state)), leaves((all_said, all_action, all_state)), strict=True):
                 assert one.shape == many[row].shape
                 assert one.tobytes() == many[row].tobytes()
@@ -152,8 +167,7 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, di
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("estimator", "law"), PAIRS)
 def test_a_batch_of_runs_gives_the_bits_of_each_run_alone(estimator, law, dimension, plans):
-    brief, links = plans[dimension].brief, plans[dimension].world.links
-    agent = Agent(brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0)
+    agent, links = agent_of(plans[dimension], estimator, law), plans[dimension].world.links
     drawn = draw(agent, links, 2, (RUNS,))
     together = fly_together(agent, links, *drawn)
     for run in range(RUNS):
@@ -164,21 +178,27 @@ def test_a_batch_of_runs_gives_the_bits_of_each_run_alone(estimator, law, dimens
 
 
 def test_what_is_compared_is_no_constant(plans):
-    links = plans[2].world.links
-    agent = Agent(plans[2].brief, ESTIMATORS["ga-rkf-conral"], LAWS["communicated"], leader_gain=1.0)
+    agent, links = agent_of(plans[2], "ga-rkf-conral", "communicated"), plans[2].world.links
     (_, _, _, first), *_, (_, heard, action, last) = fly_together(agent, links, *draw(agent, links, 1, ()))
     assert all(np.isfinite(leaf).all() for leaf in leaves(last))
     assert not np.isclose(first.estimator.tracks.mean, last.estimator.tracks.mean)[links.present].all(axis=-1).any()
     assert np.isfinite(action.estimate.psi).any()
-    assert len(np.unique(action.velocity)) == action.velocity.size
+    assert len(np.unique(action.input)) == action.input.size
     assert not heard["theta"].fresh[links.present].all()
     assert not links.present.all()
 
 
+def test_the_limit_bites_in_some_ticks_and_in_others_not(plans):
+    agent, links = agent_of(plans[2], "rkf", "double-communicated"), plans[2].world.links
+    flown = [action.input for _, _, action, _ in fly_together(agent, links, *draw(agent, links, 1, ()))]
+    shortened = np.isclose(np.linalg.norm(flown, axis=-1), LIMIT, rtol=1e-12)
+    assert 0.2 < shortened[:, agent.brief.leader].mean() < 0.8
+    assert 0.2 < shortened[:, ~agent.brief.leader].mean() < 0.8
+
+
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_a_restarted_agent_is_a_fresh_one_and_the_others_go_on(estimator, plans):
-    links = plans[2].world.links
-    agent = Agent(plans[2].brief, ESTIMATORS[estimator], LAWS["constant-velocity"], leader_gain=1.0)
+    agent, links = agent_of(plans[2], estimator, "constant-velocity"), plans[2].world.links
     *_, (_, _, _, flown) = fly_together(agent, links, *draw(agent, links, 1, ()))
     restarted, new = np.arange(10) == 4, agent.init((10,))
     for now, fresh, before in zip(leaves(renew(flown, new, restarted)), leaves(new), leaves(flown), strict=True):

@@ -362,8 +362,8 @@ def test_a_position_that_is_no_number_is_not_free_of_collisions():
 def test_a_run_that_diverged_is_judged_without_warnings(checker):
     run = evidence()
     far = changed(run.arrays["position"], slice(40, None), 1e200 * np.arange(14.0).reshape(7, 2))
-    fast = changed(run.arrays["velocity"], slice(40, None), 1e200)
-    checker(tampered(run, position=far, velocity=fast))
+    fast = changed(run.arrays["input"], slice(40, None), 1e200)
+    checker(tampered(run, position=far, input=fast))
 
 
 @pytest.mark.parametrize(("body", "expected"), [("hold", ("fail", 30)), ("vanish", ("pass", None))])
@@ -400,7 +400,7 @@ def test_agreement_is_vacuous_when_the_run_ends_before():
 
 
 def spent(run):
-    return np.cumsum((run.arrays["velocity"] ** 2).sum(axis=(1, 2)) * 0.05)
+    return np.cumsum((run.arrays["input"] ** 2).sum(axis=(1, 2)) * 0.05)
 
 
 def test_energy_passes_above_what_was_spent_and_fails_in_the_tick_that_spends_it():
@@ -414,12 +414,12 @@ def test_energy_of_agents_that_are_absent_is_not_counted():
     run = evidence(timeline({"verb": "depart", "at": 1.0, "until": 2.0, "agents": [7], "body": "drift"}))
     velocity = np.zeros((TICKS, 7, 2))
     velocity[20:, 6, 0] = 2.0
-    assert verdict(checkers.energy(0.1)(tampered(run, velocity=velocity))) == ("fail", 40)
+    assert verdict(checkers.energy(0.1)(tampered(run, input=velocity))) == ("fail", 40)
 
 
 def test_an_input_that_is_no_number_spends_too_much():
     run = evidence()
-    broken = tampered(run, velocity=changed(run.arrays["velocity"], (17, 3), np.nan))
+    broken = tampered(run, input=changed(run.arrays["input"], (17, 3), np.nan))
     assert verdict(checkers.energy(1e9)(broken)) == ("fail", 17)
 
 

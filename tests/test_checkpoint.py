@@ -20,7 +20,7 @@ FORGETFUL = {"none", "ral"}  # they say what the tick says
 
 def agent_of(estimator, law):
     plan = plan_of("corridor")
-    return Agent(plan.brief.of(4), ESTIMATORS[estimator].load()(), LAWS[law].load()(), leader_gain=1.0)
+    return Agent(plan.brief.of(4), ESTIMATORS[estimator].load()(), LAWS[law].load()(), leader_gain=1.0, limit=None)
 
 
 def leaves(state):
@@ -42,7 +42,8 @@ def lives(agent, state, ticks, seed):
         measured = np.where(
             seen[:, None], agent.brief.relative + 0.1 * rng.normal(size=agent.brief.relative.shape), 0.0
         )
-        state, _ = agent.sense(state, measured, seen)
+        velocity = rng.normal(size=agent.brief.dimension) if agent.law.order == 2 else None
+        state, _ = agent.sense(state, measured, seen, velocity)
         fresh = (rng.random(slots) < 0.8) & agent.brief.present
         heard = {
             channel: Heard(
@@ -51,8 +52,8 @@ def lives(agent, state, ticks, seed):
             )
             for channel, fields in agent.channels().items()
         }
-        state, action = agent.act(state, tick, heard, None)
-        told.append(action.velocity)
+        state, action = agent.act(state, tick, heard, None, velocity)
+        told.append(action.input)
     return state, np.array(told)
 
 
@@ -74,7 +75,7 @@ def test_every_estimator_and_law_goes_on_from_its_checkpoint_bit_for_bit(estimat
 
 def test_numbers_that_are_none_and_zeros_below_zero_come_back_as_they_were(tmp_path):
     agent = agent_of("rkf", "constant-velocity")
-    state = agent.init(())._replace(velocity=np.array([-0.0, np.nan]))
+    state = agent.init(())._replace(input=np.array([-0.0, np.nan]))
     checkpoint.save(tmp_path / "agent.npz", state)
     assert_equal_bits(checkpoint.load(tmp_path / "agent.npz", like=agent.init(())), state)
 

@@ -37,7 +37,7 @@ def test_a_run_is_like_itself(arrays):
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"velocity": ((7, 3, 1), 0.25)}, "tick 7: velocity of agent 4 is "),
+        ({"input": ((7, 3, 1), 0.25)}, "tick 7: input of agent 4 is "),
         ({"psi": ((0, 6), np.nan), "position": ((9, 0, 0), 0.0)}, "tick 0: psi of agent 7 is "),
         ({"newest": ((5, 2, 1), 77), "estimate": ((5, 0, 0, 0), 9.0)}, "tick 5: newest of measurement on 3->1 is "),
         ({"fates": ((3, 0, 0), Fate.DEAD), "newest": ((3, 0, 0), 9)}, "tick 3: fates of sense on 2->1 is "),

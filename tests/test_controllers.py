@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents.agent import Agent
-from agents.brief import Brief
+from agents.brief import Brief, Own
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity, needs_mission, pilot, stress_force
 from agents.estimators.base import Estimate, Heard
 from agents.estimators.none import NoEstimator
@@ -36,12 +36,14 @@ ESTIMATE = Estimate(
 )
 FORCE = np.array([3 * 1.0 - 4.0, 3 * 2.0 + 1.0])  # (-1, 7)
 FLYING = np.array([0.5, -0.5])
+OWN = Own(FLYING, FLYING)
+STILL = Own(np.zeros((7, 2)), np.zeros((7, 2)))
 SAID = Heard({"velocity": np.array([[1.0, 0.0], [2.0, 4.0], [0.0, 0.0]])}, np.array([True, True, False]))
 SILENCE = Heard({"velocity": np.full((3, 2), 77.0)}, np.zeros(3, dtype=bool))
 
 
 def command(law, brief=BRIEF, state=None, tick=0, estimate=ESTIMATE, inputs=SAID):
-    return law.command(brief, law.init(brief, ()) if state is None else state, tick, FLYING, estimate, inputs)
+    return law.command(brief, law.init(brief, ()) if state is None else state, tick, OWN, estimate, inputs)
 
 
 def test_stress_force_is_the_weighted_sum_of_the_estimates():
@@ -176,7 +178,7 @@ def test_in_formation_followers_fly_the_velocity_of_the_manoeuvre(zhao7):
         zhao7,
         law.init(zhao7, (7,)),
         tick,
-        np.zeros((7, 2)),
+        STILL,
         affine(zhao7, zhao7.mission.theta[tick]),
         Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present),
     )
@@ -198,17 +200,17 @@ def test_pilot_halves_its_error_every_tick_at_gain_one_half_per_tick(zhao7):
 
 
 def test_leaders_follow_the_pilot_and_followers_the_law(zhao7):
-    agent = Agent(zhao7, NoEstimator(), Static(alpha=2.0), leader_gain=1.0)
+    agent = Agent(zhao7, NoEstimator(), Static(alpha=2.0), leader_gain=1.0, limit=None)
     measured, position = np.random.default_rng(1).normal(size=(2, 7, 4, 2))
     position = position[:, 0]
-    state, said = agent.sense(agent.init((7,)), measured, zhao7.present)
+    state, said = agent.sense(agent.init((7,)), measured, zhao7.present, None)
     np.testing.assert_array_equal(said[INPUT]["velocity"], np.zeros((7, 2)))
     heard = {INPUT: Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)}
-    state, action = agent.act(state, 40, heard, position)
-    np.testing.assert_allclose(action.velocity[:3], pilot(zhao7, zhao7.mission, 1.0, 40, position)[:3])
-    np.testing.assert_allclose(action.velocity[3:], -2.0 * stress_force(zhao7, action.estimate)[3:])
-    _, said = agent.sense(state, measured, zhao7.present)
-    np.testing.assert_array_equal(said[INPUT]["velocity"], action.velocity)
+    state, action = agent.act(state, 40, heard, position, None)
+    np.testing.assert_allclose(action.input[:3], pilot(zhao7, zhao7.mission, 1.0, 40, position)[:3])
+    np.testing.assert_allclose(action.input[3:], -2.0 * stress_force(zhao7, action.estimate)[3:])
+    _, said = agent.sense(state, measured, zhao7.present, None)
+    np.testing.assert_array_equal(said[INPUT]["velocity"], action.input)
 
 
 CLOCKS = np.array([5200, 5200, 5150, 5200, 5199, 5300, 0])
@@ -229,7 +231,7 @@ def test_feed_forward_flies_by_the_clock_of_the_agent_for_all_its_neighbours(zha
     estimate = affine(zhao7, np.eye(2))
 
     def commanded(tick):
-        return law.command(zhao7, law.init(zhao7, (7,)), tick, np.zeros((7, 2)), estimate, silence)[1]
+        return law.command(zhao7, law.init(zhao7, (7,)), tick, STILL, estimate, silence)[1]
 
     together = commanded(CLOCKS)
     for agent, tick in enumerate(CLOCKS.tolist()):
@@ -243,5 +245,5 @@ def test_everybody_rests_when_the_clock_is_past_the_manoeuvre(zhao7):
     np.testing.assert_array_equal(pilot(zhao7, zhao7.mission, 3.0, late, position), 0.0)
     silence = Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)
     estimate = affine(zhao7, np.eye(2))
-    _, u = law.command(zhao7, law.init(zhao7, (7,)), late, np.zeros((7, 2)), estimate, silence)
+    _, u = law.command(zhao7, law.init(zhao7, (7,)), late, STILL, estimate, silence)
     np.testing.assert_allclose(u, 0.0, atol=1e-12)

@@ -1,4 +1,6 @@
-"""The preset formations are those of papers 000 and 004."""
+"""The preset formations: those of papers 000 and 004, and one in space."""
+
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -24,6 +26,28 @@ def test_hexa10_is_graph_2_of_paper_000():
     edges = {(int(i), int(j)) for i, j in text.split()} | {(5, 10), (6, 10), (7, 10), (8, 10), (9, 10)}
     assert set(hexa10.edges) == edges
     assert len(hexa10.edges) == 30
+
+
+def test_octa10_is_an_octahedron_with_its_diagonals_about_a_tetrahedron_with_its_edges():
+    octa10 = PRESETS["octa10"]
+    assert (octa10.agents, octa10.dimension, octa10.leaders) == (10, 3, (1, 3, 6, 10))
+    tips, core = octa10.nominal[:6], octa10.nominal[6:]
+    assert sorted(tips.tolist()) == sorted([*(2 * np.eye(3)).tolist(), *(-2 * np.eye(3)).tolist()])
+    assert {tuple(corner) for corner in core.tolist()} == {
+        (x / 2, y / 2, x * y / 2) for x, y in product((1, -1), repeat=2)
+    }
+    edges = {frozenset(edge) for edge in octa10.edges}
+    assert {frozenset(pair) for pair in [*combinations(range(1, 7), 2), *combinations(range(7, 11), 2)]} <= edges
+    # The rest ties each corner of the tetrahedron to the three tips about it.
+    tied = {
+        frozenset((tip, 7 + row))
+        for row, corner in enumerate(core)
+        for tip in range(1, 7)
+        if tips[tip - 1] @ corner > 0
+    }
+    assert len(tied) == 12
+    assert len(edges) == len(octa10.edges) == 15 + 6 + 12
+    assert tied <= edges
 
 
 @pytest.mark.parametrize("preset", PRESETS)

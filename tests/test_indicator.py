@@ -61,9 +61,9 @@ def test_theorem_1_bounds_the_indicator_of_the_presets_over_parts_of_their_graph
     links = Links.both_ways(formation.agents, formation.edges)
     up = rng.random((1000, len(links))) < 0.7
     heard = graph.adjacency(up, links.src, links.dst, formation.agents)
-    position = formation.nominal + rng.normal(size=(1000, formation.agents, 2))
+    position = formation.nominal + rng.normal(size=(1000, *formation.nominal.shape))
     psi = indicators(formation.nominal, position, heard)
-    slope, _ = bounds(formation.nominal, heard, NOWHERE)
+    slope, _ = bounds(formation.nominal, heard, np.zeros((formation.dimension, formation.dimension)))
     error = tracking_error(position, formation.nominal, np.ones((1000, formation.agents), dtype=bool))
     feasible = graph.feasible(up, links.src, links.dst, formation.nominal)
     np.testing.assert_array_equal(np.isfinite(slope), feasible & (heard & feasible[:, None, :]).any(axis=-1))

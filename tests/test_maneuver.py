@@ -1,14 +1,17 @@
-"""Manoeuvres: the corridor of the benchmark, keyframes, hovering."""
+"""Manoeuvres: the corridor of the benchmark, the ravine, keyframes, hovering."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis.affine import Manoeuvre
 from world.formation import PRESETS
-from world.maneuver import corridor, hover, keyframes
+from world.maneuver import corridor, hover, keyframes, ravine
 
 NOMINAL = 2.0 * PRESETS["zhao7"].nominal
+OCTA10 = PRESETS["octa10"].nominal
+DIAGONAL = np.sqrt(0.5)
 
 
 @pytest.mark.parametrize(
@@ -46,6 +49,58 @@ def test_corridor_passes_between_the_walls():
 def test_corridor_moves_without_jumps():
     step = np.diff(corridor(np.arange(0, 130, 0.01)).target(np.arange(13000)[:, None], NOMINAL), axis=0)
     assert 0.01 < np.linalg.norm(step, axis=-1).max() < 0.05  # at most 5 m/s
+
+
+def test_ravine_starts_at_the_nominal_formation_of_octa10():
+    begun = ravine(np.array([0.0]))
+    np.testing.assert_array_equal(begun.theta[0], np.eye(3))
+    np.testing.assert_array_equal(begun.offset[0], np.zeros(3))
+    np.testing.assert_array_equal(begun.target(0, OCTA10), OCTA10)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "theta", "offset"),
+    [
+        # Speed that rises along half a cosine from 0 to 1 m/s in T covers t / 2 - T / (2 pi) sin(pi t / T) m.
+        (4.0, np.eye(3), [2 - 4 / np.pi, 0, (1 - 3 / np.pi) / 4]),
+        (9.0, np.eye(3), [5, 0, 1.5]),
+        (16.0, np.diag([1, 0.7, 1]), [12, 0, 5 - (1 - 3 / np.pi) / 4]),
+        (24.0, np.diag([1, 0.4, 1]), [20, 0, 6]),
+        (28.0, np.diag([1, 0.7, 1]), [24, 0, 6]),
+        (34.0, np.eye(3), [30, 0, 6]),
+        (39.0, [[DIAGONAL, DIAGONAL, 0], [-DIAGONAL, DIAGONAL, 0], [0, 0, 1]], [32.5 + 5 / np.pi, -2.5 + 5 / np.pi, 6]),
+        (47.0, [[0, 1, 0], [-1, 0, 0], [0, 0, 0.5]], [35, -8, 6]),
+        (51.0, [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], [35, -12, 6]),
+        (56.0, [[0, 1, 0], [-1, 0, 0], [0, 0, 0.5]], [35, -17, 6]),
+        (60.0, [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], [35, -21, 6]),
+    ],
+)
+def test_ravine_passes_its_checkpoints(seconds, theta, offset):
+    flown = ravine(np.array([seconds]))
+    np.testing.assert_allclose(flown.theta[0], theta, atol=0.01)
+    np.testing.assert_allclose(flown.offset[0], offset, atol=1e-9)
+
+
+def test_ravine_flies_everybody_through_a_slot_and_under_a_ceiling():
+    seconds = np.array([21.0, 51.0])
+    slot, ceiling = ravine(seconds).target(np.arange(2)[:, None], OCTA10)
+    assert np.abs(slot[:, 1]).max() < 0.41 * np.abs(OCTA10[:, 1]).max()
+    np.testing.assert_allclose(ceiling[:, 2], 6.0, atol=0.01)
+    singular = np.linalg.svd(ravine(seconds).theta[1], compute_uv=False)
+    assert singular[1] > 0.99
+    assert singular[2] < 0.01 * singular[0]
+
+
+def test_ravine_ends_after_a_quarter_turn():
+    arrived = ravine(np.array([60.0])).target(0, OCTA10)
+    np.testing.assert_allclose(arrived[[0, 2, 4]], [[35, -23, 6], [37, -21, 6], [35, -21, 8]], atol=0.01)
+
+
+def test_ravine_moves_without_jumps_in_velocity():
+    dt = 0.01
+    targets = ravine(np.arange(0, 62, dt)).target(np.arange(6200)[:, None], OCTA10)
+    assert np.linalg.norm(np.diff(targets, axis=0), axis=-1).max() < 2.0 * dt
+    assert np.linalg.norm(np.diff(targets, n=2, axis=0), axis=-1).max() < dt**2  # 1 m/s2
 
 
 def test_hover_holds_the_nominal_formation():
@@ -108,8 +163,35 @@ def test_velocity_carries_the_target_of_this_tick_to_the_next():
     np.testing.assert_allclose(arrived, flown.target(41, NOMINAL), atol=1e-12)
 
 
+def test_acceleration_is_what_the_velocity_gains():
+    # Offsets that grow with the square of the tick, and a scale that grows with its cube.
+    ticks = np.arange(6.0)
+    curve = Manoeuvre(ticks[:, None, None] ** 3 * np.eye(2), ticks[:, None] ** 2 * [1.0, -2.0])
+    nominal = np.array([[1.0, 0.0], [0.0, 2.0]])
+    gained = np.array([[2.0 + 6 * 3, -4.0], [2.0, -4.0 + 12 * 3]])
+    np.testing.assert_allclose(curve.acceleration(3, nominal, 0.5), gained / 0.5**2)
+    np.testing.assert_allclose(curve.acceleration(np.array([[3], [2]]), nominal, 0.5)[0], gained / 0.5**2)
+
+
+def test_a_manoeuvre_starts_from_rest_and_ends_at_rest_at_once():
+    moving = corridor(np.arange(10.0, 30.0, 0.5))
+    last = len(moving.theta) - 1
+    first, final = moving.velocity(0, NOMINAL, 0.5), moving.velocity(last - 1, NOMINAL, 0.5)
+    assert (np.linalg.norm([first, final], axis=-1) > 0.5).all()
+    np.testing.assert_allclose(moving.acceleration(0, NOMINAL, 0.5), first / 0.5)
+    np.testing.assert_allclose(moving.acceleration(last, NOMINAL, 0.5), -final / 0.5)
+
+
 FLOWN = keyframes(np.arange(0.0, 21.0, 0.5), TIMES, THETA, OFFSET)
 LAST = len(FLOWN.theta) - 1
+
+
+def test_before_its_first_tick_a_manoeuvre_rests():
+    begun = FLOWN.target(0, NOMINAL)
+    assert (begun != FLOWN.target(LAST, NOMINAL)).any()
+    for early in (-1, -1000):
+        np.testing.assert_array_equal(FLOWN.target(early, NOMINAL), begun)
+        np.testing.assert_array_equal(FLOWN.velocity(early, NOMINAL, 0.5), 0.0)
 
 
 def test_after_its_last_tick_a_manoeuvre_rests():

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ import pytest
 from affinet import plan, scenario, stability
 from affinet.plan import PlanError
 from affinet.sections import ScenarioError
+from agents.brief import Own
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity
 from agents.estimators.base import Estimate, Heard
+from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
+from world.dynamics import double_integrator, single_integrator
 from world.formation import PRESETS
 from world.stress import laplacian, solve
 
@@ -52,7 +56,7 @@ def shipped():
 
 
 def test_every_shipped_scenario_can_fly(shipped):
-    assert {"corridor", "hexa", "partition", "switching"} <= set(shipped)
+    assert {"corridor", "hexa", "partition", "ravine", "switching"} <= set(shipped)
     assert not [finding for made in shipped.values() for finding in made.findings if finding.level != "ok"]
 
 
@@ -144,10 +148,16 @@ def test_agents_that_do_not_exist_cannot_lead(key):
         ("constant-velocity", {"alpha": 209.0}, 0.01),
         ("constant-velocity", {"alpha": 10.0, "eta": 400.0}, 0.01),
         ("varying-velocity", {"alpha": 10.0}, 1.0),
+        ("double-constant-velocity", {"velocity_gain": 209.0}, 0.01),
+        # Damping must exceed half a tick of the pull, 15.
+        ("double-constant-velocity", {"position_gain": 3000.0, "velocity_gain": 14.0}, 0.01),
+        ("double-varying-velocity", {"position_gain": 25.0, "velocity_gain": 20.0}, 0.01),
     ],
 )
 def test_a_step_too_long_for_the_gains_cannot_fly(law, gains, dt):
     overrides = [f"agents.parameters.{law}.{name}={value}" for name, value in gains.items()]
+    if law.startswith("double"):
+        overrides.append("dynamics.model=double-integrator")
     with pytest.raises(PlanError, match=r"step: radius \d+\.\d+ >= 1 .* the step is too long for the gains"):
         make("switching", f"agents.law={law}", f"time.dt={dt}", *overrides)
 
@@ -155,6 +165,14 @@ def test_a_step_too_long_for_the_gains_cannot_fly(law, gains, dt):
 @pytest.mark.parametrize(("alpha", "dt"), [(208.0, 0.01), (20.8, 0.1)])
 def test_a_step_just_short_enough_can_fly(alpha, dt):
     made = make("switching", "agents.law=static", f"time.dt={dt}", f"agents.parameters.static.alpha={alpha}")
+    assert findings(made)["step"].level == "ok"
+
+
+@pytest.mark.parametrize(("pull", "damping"), [(10.0, 208.0), (3000.0, 16.0)])
+def test_a_step_just_short_enough_for_double_integrators_can_fly(pull, damping):
+    gains = f"{{position_gain={pull}, velocity_gain={damping}}}"
+    law = ("agents.law=double-constant-velocity", f"agents.parameters.double-constant-velocity={gains}")
+    made = make("switching", "dynamics.model=double-integrator", *law)
     assert findings(made)["step"].level == "ok"
 
 
@@ -244,15 +262,22 @@ def test_all_that_is_fatal_is_said_at_once_and_nothing_else():
 # The radii against what the laws do
 
 
-def tick_of(made, law, state, position, velocity):
+def tick_of(made, law, state, position, own):
     """One tick of the followers under the law itself, leaders at rest and estimates perfect."""
     brief, links = made.brief, made.world.links
-    apart, closing = (rows[:, None] - rows[links.neighbours] for rows in (position, velocity))
+    apart, closing = (rows[:, None] - rows[links.neighbours] for rows in (position, own.velocity))
     estimate = Estimate(apart, brief.present, np.zeros((*apart.shape, 2)), np.zeros(links.agents), closing)
-    said = Heard({"velocity": velocity[links.neighbours]}, brief.present)
-    state, velocity = law.command(brief, state, 0, velocity, estimate, said)
-    velocity = np.where(brief.leader[:, None], 0.0, velocity)
-    return state, position + brief.dt * velocity, velocity
+    said = {"velocity": own.velocity[links.neighbours], "acceleration": own.input[links.neighbours]}
+    state, flown = law.command(brief, state, 0, own, estimate, Heard(said, brief.present))
+    flown = np.where(brief.leader[:, None], 0.0, flown)
+    if law.order == 1:
+        return state, single_integrator(position, flown, brief.dt, 0.0), Own(flown, flown)
+    position = double_integrator(position, own.velocity, flown, brief.dt, 0.0)
+    return state, position, Own(own.velocity + brief.dt * flown, flown)
+
+
+def at_rest(made):
+    return Own(*np.zeros((2, *made.brief.nominal.shape)))
 
 
 def follower_block(made):
@@ -272,7 +297,29 @@ LAWS = [
     (VaryingVelocity(alpha=5.0, source="estimated"), True),
     (VaryingVelocity(alpha=100.0, source="feed-forward"), True),
     (VaryingVelocity(alpha=110.0, source="feed-forward"), False),
+    (DoubleConstantVelocity(position_gain=300.0, velocity_gain=150.0), True),
+    (DoubleConstantVelocity(position_gain=300.0, velocity_gain=215.0), False),
+    # Damped, but less than the step needs.
+    (DoubleConstantVelocity(position_gain=3000.0, velocity_gain=10.0, source="estimated"), False),
+    (DoubleVaryingVelocity(position_gain=4.0, velocity_gain=4.0), True),
+    (DoubleVaryingVelocity(position_gain=25.0, velocity_gain=20.0), False),
+    (DoubleVaryingVelocity(position_gain=25.0, velocity_gain=20.0, relaxation=0.5), True),
+    (DoubleVaryingVelocity(position_gain=3000.0, velocity_gain=10.0, source="estimated"), False),
 ]
+
+
+def carried(law, offset, own, state):
+    """What a tick hands to the next."""
+    match law:
+        case ConstantVelocity():
+            return offset, state.force
+        case VaryingVelocity():
+            return offset, own.input
+        case DoubleConstantVelocity():
+            return offset, own.velocity
+        case DoubleVaryingVelocity():
+            return offset, own.velocity, own.input
+    return (offset,)
 
 
 @pytest.fixture(scope="module")
@@ -284,13 +331,13 @@ def hovering():
 def test_the_step_matrix_is_one_tick_of_the_law(law, hovering):
     rng, nominal = np.random.default_rng(1), hovering.brief.nominal
     offset, velocity, force = np.where(hovering.brief.leader[:, None], 0.0, rng.normal(size=(3, 7, 2)))
-    before, state = [offset], law.init(hovering.brief, (7,))
+    state = law.init(hovering.brief, (7,))
     if isinstance(law, ConstantVelocity):
-        before, state = [offset, force], state._replace(force=force)
-    if isinstance(law, VaryingVelocity):
-        before = [offset, velocity]
-    state, position, flown = tick_of(hovering, law, state, nominal + offset, velocity)
-    after = [position - nominal, state.force if isinstance(law, ConstantVelocity) else flown][: len(before)]
+        state = state._replace(force=force)
+    own = Own(velocity, velocity if law.order == 1 else force)
+    before = carried(law, offset, own, state)
+    state, position, own = tick_of(hovering, law, state, nominal + offset, own)
+    after = carried(law, position - nominal, own, state)
     step = stability.step_matrix(law, *follower_block(hovering), 0.01)
     np.testing.assert_allclose(step @ np.concatenate([x[3:] for x in before]), np.concatenate([x[3:] for x in after]))
 
@@ -298,10 +345,10 @@ def test_the_step_matrix_is_one_tick_of_the_law(law, hovering):
 @pytest.mark.parametrize(("law", "settles"), LAWS, ids=str)
 def test_a_formation_settles_when_the_radius_of_its_step_is_below_one(law, settles, hovering):
     position = np.where(hovering.brief.leader[:, None], 0.0, np.random.default_rng(1).normal(size=(7, 2)))
-    position, velocity = position + hovering.brief.nominal, np.zeros((7, 2))
+    position, own = position + hovering.brief.nominal, at_rest(hovering)
     state = law.init(hovering.brief, (7,))
     for _ in range(600):
-        state, position, velocity = tick_of(hovering, law, state, position, velocity)
+        state, position, own = tick_of(hovering, law, state, position, own)
     off = np.abs(position - hovering.brief.nominal).max()
     assert off < 0.05 if settles else off > 1e3
     assert (stability.radius(stability.step_matrix(law, *follower_block(hovering), 0.01)) < 1) == settles
@@ -315,23 +362,28 @@ def test_leaders_and_relaxation_decide_whether_velocities_heard_late_settle(lead
     made = make("hexa", "manoeuvre={preset='hover'}", f"formation.leaders={leaders}", "agents.law=static")
     law = VaryingVelocity(alpha=1.0, relaxation=relaxation)
     position = np.where(made.brief.leader[:, None], 0.0, np.random.default_rng(1).normal(size=(10, 2)))
-    position, velocity, state = position + made.brief.nominal, np.zeros((10, 2)), law.init(made.brief, (10,))
+    position, own, state = position + made.brief.nominal, at_rest(made), law.init(made.brief, (10,))
     for _ in range(600):
-        state, position, velocity = tick_of(made, law, state, position, velocity)
+        state, position, own = tick_of(made, law, state, position, own)
     off = np.abs(position - made.brief.nominal).max()
     assert off < 0.05 if settles else off > 1e3
     assert (stability.one_tick_radius(*follower_block(made), relaxation) < 1) == settles
 
 
 @pytest.mark.parametrize("relaxation", [1.0, 0.9, 0.5])
-def test_the_one_tick_radius_is_the_rate_of_the_velocity_iteration(relaxation, shipped):
+@pytest.mark.parametrize(
     # Without a pull, the law only repeats what it hears.
-    law, made = VaryingVelocity(alpha=0.0, relaxation=relaxation), shipped["hexa"]
-    velocity = np.where(made.brief.leader[:, None], 0.0, np.random.default_rng(1).normal(size=(10, 2)))
-    state, size = law.init(made.brief, (10,)), []
+    "idle",
+    [VaryingVelocity(alpha=0.0), DoubleVaryingVelocity(position_gain=0.0, velocity_gain=0.0)],
+    ids=["velocity", "acceleration"],
+)
+def test_the_one_tick_radius_is_the_rate_of_the_iteration_of_inputs(idle, relaxation, shipped):
+    law, made = replace(idle, relaxation=relaxation), shipped["hexa"]
+    flown = np.where(made.brief.leader[:, None], 0.0, np.random.default_rng(1).normal(size=(10, 2)))
+    state, own, size = law.init(made.brief, (10,)), Own(flown, flown), []
     for _ in range(400):
-        state, _, velocity = tick_of(made, law, state, made.brief.nominal, velocity)
-        size.append(np.linalg.norm(velocity))
+        state, _, own = tick_of(made, law, state, made.brief.nominal, own)
+        size.append(np.linalg.norm(own.input))
     rate = (size[399] / size[299]) ** (1 / 100)
     assert rate == pytest.approx(stability.one_tick_radius(*follower_block(made), relaxation), abs=1e-4)
 

@@ -58,6 +58,51 @@ def test_every_kind_of_air_and_agent_agrees(air, out):
     assert outcome.digest == digest_of("corridor", *overrides)
 
 
+BRIEFLY = "time.duration=0.4"
+
+
+@pytest.mark.parametrize(
+    "agents",
+    [
+        ('agents.estimator="imm"',),
+        ('agents.estimator="ral"',),
+        ('agents.estimator="conral"', 'agents.parameters.conral.constraint="similarity"'),
+        ('agents.parameters.ga-rkf.constraint="rotation"', 'agents.parameters.ga-rkf.geometry="ral"'),
+        ('agents.estimator="rkf"', 'agents.parameters.rkf.model="constant-velocity"'),
+    ],
+    ids=["imm", "ral", "conral-similarity", "ga-rkf-rotation", "rkf-constant-velocity"],
+)
+def test_every_kind_of_estimator_agrees(agents, out):
+    outcome = processes(out, "corridor", BRIEFLY, *agents)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("corridor", BRIEFLY, *agents)
+    # A setting that does nothing agrees as well.
+    assert outcome.digest not in {digest_of("corridor", BRIEFLY, *agents[:-1]), digest_of("corridor", BRIEFLY)}
+
+
+@pytest.mark.parametrize(
+    "agents",
+    [
+        (
+            'timeline=[{verb="pause",at=0.1,until=0.3,agents=[4]},{verb="kill",at=0.2,agents=[2,5]},'
+            '{verb="restart",at=0.4,agents=[5]},{verb="gust",at=0.3,agents=[7],velocity=[1,0,2]}]',
+        ),
+        (
+            'agents.law="double-constant-velocity"',
+            'agents.parameters.double-constant-velocity.source="estimated"',
+            "agents.limit=0.5",
+        ),
+    ],
+    ids=["faults", "estimated"],
+)
+def test_double_integrators_agree_too(agents, out):
+    overrides = ("time.duration=0.6", "time.dt=0.02")
+    outcome = processes(out, "ravine", *overrides, *agents)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("ravine", *overrides, *agents)
+    assert outcome.digest not in {digest_of("ravine", *overrides, *agents[:-1]), digest_of("ravine", *overrides)}
+
+
 OCTAHEDRON = """
 [formation]
 nodes = [[1,0,0], [-1,0,0], [0,1,0], [0,-1,0], [0,0,1], [0,0,-1], [0.3,0.2,0.1]]

@@ -84,8 +84,8 @@ def test_every_shipped_scenario_loads_and_can_fly(name):
     assert not any(finding.fatal for finding in made.findings)
 
 
-def test_four_scenarios_are_shipped():
-    assert {"corridor", "hexa", "partition", "switching"} <= set(scenario.shipped())
+def test_five_scenarios_are_shipped():
+    assert {"corridor", "hexa", "partition", "ravine", "switching"} <= set(scenario.shipped())
 
 
 def test_a_scenario_flies_as_it_is_written(file):
@@ -268,7 +268,7 @@ WRONG_OVERRIDES = [
     ('time.dt="0.01"', "time.dt", "valid number"),
     ("seed=", "seed", "valid integer"),
     ("time.dt=0.007", "time", "duration 1 s is not a whole number of ticks of 0.007 s"),
-    ("formation.preset=zhao8", "formation", "there are zhao7, hexa10"),
+    ("formation.preset=zhao8", "formation", "there are zhao7, hexa10, octa10"),
     ("agents.estimator=kalman", "agents.estimator", "there are conral, ga-rkf, imm, none, ral, rkf"),
     ("agents.parameters.rkf.sigma=1", "agents.parameters.rkf.sigma", "rkf has sigma_w"),
     ("formation.leaders=[1, 2, 9]", "formation.leaders", "agents are 1 to 7"),
@@ -296,7 +296,7 @@ def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_ri
 
 VERBS = (
     "cut, partition, lose, delay, degrade, heal, kill, restart, pause, resume, clock, depart, rejoin, "
-    "gust, bias, outlier, dropout, freeze, lie"
+    "replace, gust, bias, outlier, dropout, freeze, lie"
 )
 WRONG = [
     # keys
@@ -332,7 +332,7 @@ WRONG = [
     ("dt = 0.01", "dt = inf", "time.dt", "finite number, got inf"),
     ("duration = 1.0", "duration = 1.005", "time", "1.005 s is not a whole number of ticks of 0.01 s"),
     # formation
-    ('preset = "zhao7"', 'preset = "zhao8"', "formation", "no preset 'zhao8'; there are zhao7, hexa10"),
+    ('preset = "zhao7"', 'preset = "zhao8"', "formation", "no preset 'zhao8'; there are zhao7, hexa10, octa10"),
     ('preset = "zhao7"', f'preset = "zhao7"\n{OWN}', "formation", "give a preset, or nodes and edges, not both"),
     ('preset = "zhao7"', "scale = 2.0", "formation", "give a preset, or nodes, edges and leaders"),
     ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[nan, 1.0]]"), "formation.nodes.4.1", "finite number"),
@@ -351,7 +351,7 @@ WRONG = [
         "[manoeuvre]",
         '[manoeuvre]\npreset = "hover"',
         "manoeuvre",
-        "give a preset ('hover', 'corridor'), or keyframes",
+        "give a preset ('hover', 'corridor', 'ravine'), or keyframes",
     ),
     ("offset = [1.0, 0.0]", "offset = [1.0]", "manoeuvre.keyframes.2.offset", "must be 2 numbers"),
     ("1.0]], offset = [1", "1.0, 2.0]], offset = [1", "manoeuvre.keyframes.2.theta", "must be 2 x 2 numbers"),
@@ -367,7 +367,12 @@ WRONG = [
     # agents
     ('"rkf"', '"kalman"', "agents.estimator", "no 'kalman'; there are conral, ga-rkf, imm, none, ral, rkf, or give"),
     ('"rkf"', '"no.such:Thing"', "agents.estimator", "cannot load no.such:Thing"),
-    ('"static"', '"statik"', "agents.law", "no 'statik'; there are constant-velocity, static, varying-velocity"),
+    (
+        '"static"',
+        '"statik"',
+        "agents.law",
+        "no 'statik'; there are constant-velocity, double-constant-velocity, double-varying-velocity, static, varying-velocity",
+    ),
     ("sigma_w = 0.5", "sigma = 0.5", "agents.parameters.rkf.sigma", "rkf has sigma_w, prior_position"),
     ("sigma_w = 0.5", 'sigma_w = "much"', "agents.parameters.rkf.sigma_w", "valid number"),
     ("[agents.parameters.rkf]", "[agents.parameters.rfk]", "agents.parameters.rfk", "rkf"),

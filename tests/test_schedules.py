@@ -50,7 +50,7 @@ def strange(run):
     """What is not finite in a run though it should be."""
     arrays = run.arrays
     said = {name: arrays[name][arrays["known"]] for name in ("estimate", "covariance")}
-    flown = {name: arrays[name] for name in ("position", "velocity")}
+    flown = {name: arrays[name] for name in ("position", "input")}
     return [name for name, values in (flown | said).items() if not np.isfinite(values).all()]
 
 

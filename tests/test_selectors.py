@@ -297,7 +297,7 @@ def test_the_critical_link_is_the_first_that_cannot_be_spared_not_the_first():
 @pytest.mark.parametrize("formation", PRESETS.values(), ids=PRESETS)
 def test_the_critical_agent_is_the_first_without_whom_no_stress_stabilises_or_no_leaders_span(formation):
     fragile = [one for one in range(1, formation.agents + 1) if one in formation.leaders or not goes_on(formation, one)]
-    assert agents("critical", formation=formation) == (fragile[0],)  # three leaders in the plane: none to spare
+    assert agents("critical", formation=formation) == (fragile[0],)  # D + 1 leaders: none to spare
     assert [one for one in range(1, formation.agents + 1) if not stress.survives(formation, agent=one)] == fragile
 
 

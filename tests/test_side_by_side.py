@@ -30,19 +30,23 @@ AIRS = {
 }
 
 
-@pytest.mark.parametrize("air", AIRS.values(), ids=AIRS)
-def test_every_run_of_a_batch_is_the_run_alone(air):
-    batch = side_by_side(plan_of("corridor", *SHORT, *air), SEEDS)
+FLIGHTS = [*(("corridor", air) for air in AIRS.values()), ("ravine", ("dynamics.disturbance=0.01",))]
+
+
+@pytest.mark.parametrize(("name", "air"), FLIGHTS, ids=[*AIRS, "double-integrators"])
+def test_every_run_of_a_batch_is_the_run_alone(name, air):
+    plan = plan_of(name, *SHORT, *air)
+    batch, size, width = side_by_side(plan, SEEDS), plan.world.formation.agents, len(plan.world.links)
     together = History(batch.world, len(batch.channels))
     Swarm(batch).fly(together.extend, 20)
     flown = together.arrays()
     for place, seed in enumerate(SEEDS):
-        alone = rehearse(plan_of("corridor", *SHORT, *air, f"seed={seed}")).arrays
-        agents, links = slice(7 * place, 7 * place + 7), slice(24 * place, 24 * place + 24)
-        for name in ("position", "velocity", "estimate", "covariance", "psi", "known"):
-            np.testing.assert_array_equal(flown[name][:, agents], alone[name], name)
-        for name in ("fates", "newest"):
-            np.testing.assert_array_equal(flown[name][..., links], alone[name], name)
+        alone = rehearse(plan_of(name, *SHORT, *air, f"seed={seed}")).arrays
+        agents, links = slice(size * place, size * (place + 1)), slice(width * place, width * (place + 1))
+        for array in ("position", "input", "estimate", "covariance", "psi", "known"):
+            np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
+        for array in ("fates", "newest"):
+            np.testing.assert_array_equal(flown[array][..., links], alone[array], array)
 
 
 def test_the_runs_of_a_study_are_those_runs():

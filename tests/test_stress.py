@@ -9,7 +9,7 @@ from scipy.linalg import null_space
 from world.formation import PRESETS, Formation
 from world.stress import NotRigid, equilibrium, incidence, laplacian, solve
 
-ZHAO7, HEXA10 = PRESETS["zhao7"], PRESETS["hexa10"]
+ZHAO7, HEXA10, OCTA10 = PRESETS["zhao7"], PRESETS["hexa10"], PRESETS["octa10"]
 # 12:4 13:4 14:-2 15:-2 24:8 27:-2 35:8 36:-2 45:1 46:4 57:4 67:2
 KNOWN = np.array([4, 4, -2, -2, 8, -2, 8, -2, 1, 4, 4, 2]) / np.sqrt(213)
 
@@ -22,6 +22,11 @@ def zhao7():
 @pytest.fixture(scope="module")
 def hexa10():
     return solve(HEXA10)
+
+
+@pytest.fixture(scope="module")
+def octa10():
+    return solve(OCTA10)
 
 
 def follower_targets(weights, p):
@@ -87,7 +92,27 @@ def test_the_stress_matrix_of_hexa10_is_semidefinite_of_rank_7(hexa10):
     assert spectrum[3] > 0.1
 
 
-@pytest.mark.parametrize("preset", ["zhao7", "hexa10"])
+def test_octa10_is_balanced(octa10):
+    L = laplacian(OCTA10, octa10)
+    np.testing.assert_allclose(L @ OCTA10.nominal, 0.0, atol=1e-10)
+    np.testing.assert_allclose(L.sum(axis=1), 0.0, atol=1e-10)
+
+
+def test_the_stress_matrix_of_octa10_is_semidefinite_of_rank_6_and_well_conditioned(octa10):
+    spectrum = np.linalg.eigvalsh(laplacian(OCTA10, octa10))
+    np.testing.assert_allclose(spectrum[:4], 0.0, atol=1e-10)
+    np.testing.assert_allclose(spectrum[[4, -1]], [0.960, 1.067], atol=5e-4)
+
+
+def test_followers_of_octa10_stand_where_the_leaders_put_them(octa10):
+    L, leader = laplacian(OCTA10, octa10), OCTA10.is_leader
+    theta, offset = np.random.default_rng(1).normal(size=(3, 3)), np.array([5.0, -1.0, 2.0])
+    mapped = OCTA10.nominal @ theta.T + offset
+    targets = np.linalg.solve(L[np.ix_(~leader, ~leader)], -L[np.ix_(~leader, leader)] @ mapped[leader])
+    np.testing.assert_allclose(targets, mapped[~leader], atol=1e-9)
+
+
+@pytest.mark.parametrize("preset", ["zhao7", "hexa10", "octa10"])
 def test_the_stress_has_unit_norm(preset, request):
     assert np.linalg.norm(request.getfixturevalue(preset)) == pytest.approx(1.0, abs=1e-6)
 

@@ -92,6 +92,7 @@ WHAT = {
     "clock": {"agents": [1], "rate": 1.0},
     "depart": {"agents": [5]},
     "rejoin": {"agents": [5]},
+    "replace": {"agents": [5]},
     "gust": {"agents": [5], "velocity": [1.0, 0.0]},
     "bias": {"links": ["2->4"], "by": [0.3, 0.0]},
     "outlier": {"links": ["2->4"], "p": 1.0, "sigma": 1.0},
@@ -99,7 +100,7 @@ WHAT = {
     "freeze": {"links": ["2->4"]},
     "lie": {"agents": [4], "matrix": MIRROR},
 }
-ENDED_BY = {"heal": "cut", "restart": "kill", "resume": "pause", "rejoin": "depart"}
+ENDED_BY = {"heal": "cut", "restart": "kill", "resume": "pause", "rejoin": "depart", "replace": "depart"}
 # What differs first from a run without the verb, when it comes in tick 20, and of whom.
 FIRST = {
     "cut": (20, "fates", "sense on 2->4"),
@@ -112,9 +113,10 @@ FIRST = {
     "restart": (20, "error", ""),
     "pause": (20, "fates", "sense on 1->5"),  # it takes part; its ears are closed
     "resume": (20, "fates", "sense on 1->5"),
-    "clock": (21, "velocity", "agent 1"),  # one second per second: a tick ahead after a tick
+    "clock": (21, "input", "agent 1"),  # one second per second: a tick ahead after a tick
     "depart": (20, "error", ""),
     "rejoin": (20, "error", ""),
+    "replace": (19, "fates", "sense on 5->1"),  # its process is killed in the last tick of its absence
     "gust": (21, "position", "agent 5"),
     "bias": (20, "estimate", "agent 4"),
     "outlier": (20, "estimate", "agent 4"),
@@ -145,8 +147,9 @@ def test_a_verb_changes_what_it_says_and_nothing_before_its_time(verb, flown):
     entries = scripted(verb, 1.0)
     with_it, without = flown(*entries), flown(*entries[:-1])
     assert with_it.outcome.verdict == "pass", with_it.outcome.reasons
-    (bite,) = with_it.outcome.faults
-    assert bite.touched > 0
+    bite, *death = with_it.outcome.faults
+    assert all(one.touched > 0 for one in (bite, *death))
+    assert len(death) == (verb == "replace")  # of the process whose place is taken
     assert bite.at == (0.5 if verb in ENDED_BY else 1.0)
     assert part(without, with_it) == FIRST[verb]
 
@@ -158,8 +161,7 @@ def test_a_verb_whose_condition_never_comes_makes_the_run_vacuous_and_changes_no
     last = {**last, "after": "never"} if before else {**last, "when": NEVER}
     flight = flown(*waiting, last)
     assert flight.outcome.verdict == "vacuous"
-    (bite,) = flight.outcome.faults
-    assert (bite.at, bite.touched) == (None, 0)
+    assert {(bite.at, bite.touched) for bite in flight.outcome.faults} == {(None, 0)}
     assert flight.outcome.digest == flown().outcome.digest
 
 
@@ -248,7 +250,7 @@ VACUOUS = {
     "lie of a paused agent": ([{"verb": "pause", "at": 0.5, "agents": [4]}, *scripted("lie", 1.0)], ()),
 }
 # A death takes the agent's messages whatever else holds, so only a condition that never comes makes it touch nothing.
-ALWAYS_BITE = {"kill", "restart"}
+ALWAYS_BITE = {"kill", "restart", "replace"}
 
 
 def test_every_verb_that_can_touch_nothing_has_a_way_to():
@@ -394,6 +396,25 @@ def test_the_body_of_a_departed_agent_holds_where_it_was(body, flown):
     assert way[30].any()
 
 
+def test_who_takes_the_place_of_a_departed_agent_knows_nothing(flown):
+    away = {"verb": "depart", "at": 0.5, "agents": [5]}
+    same, other = (flown(away, {"verb": verb, "at": 1.0, "agents": [5]}, over=RKF) for verb in ("rejoin", "replace"))
+    known = [flight.arrays["known"][19:22, 4].any(axis=-1).tolist() for flight in (same, other)]
+    assert known == [
+        [True, True, True],
+        [False, True, True],
+    ]  # it keeps its filters; it has not been yet, and begins anew
+    alone = flown(
+        away,
+        {"verb": "kill", "at": 0.95, "agents": [5]},
+        {"verb": "restart", "at": 1.0, "agents": [5]},
+        {"verb": "rejoin", "at": 1.0, "agents": [5]},
+        over=RKF,
+    )
+    assert alone.outcome.digest == other.outcome.digest
+    assert (same.arrays["covariance"][20, 4, 0, 0] < other.arrays["covariance"][20, 4, 0, 0]).all()
+
+
 def test_a_body_that_vanishes_is_gone_until_its_agent_rejoins(flown):
     flight = flown(*scripted("depart", 1.0, body="vanish"))
     gone = [flight.plan.timeline.at(tick).vanished.tolist() for tick in (19, 20, 29, 30)]
@@ -405,7 +426,7 @@ def test_a_body_that_vanishes_is_gone_until_its_agent_rejoins(flown):
 def test_a_body_that_nobody_steers_flies_on_with_its_last_input(entry, flown):
     verb, more = entry
     flight = flown(*scripted(verb, 1.0, **more))
-    velocity, way = flight.arrays["velocity"][:, 4], moved(flight, 5)
+    velocity, way = flight.arrays["input"][:, 4], moved(flight, 5)
     assert velocity[19].any()
     assert (velocity[20:30] == velocity[19]).all()
     assert way[20:30] == pytest.approx(np.tile(DT * velocity[19], (10, 1)))
@@ -415,7 +436,7 @@ def test_a_body_that_nobody_steers_flies_on_with_its_last_input(entry, flown):
 def test_a_gust_carries_a_body_along_and_is_no_input(flown):
     calm, windy = flown(), flown(*scripted("gust", 1.0))
     assert moved(windy, 5)[20] - moved(calm, 5)[20] == pytest.approx([DT, 0.0])
-    assert np.array_equal(calm.arrays["velocity"][20], windy.arrays["velocity"][20])
+    assert np.array_equal(calm.arrays["input"][20], windy.arrays["input"][20])
     others = [0, 1, 2, 3, 5, 6]
     assert np.array_equal(calm.arrays["position"][21, others], windy.arrays["position"][21, others])
 

@@ -62,6 +62,8 @@ SCRIPTS = {
             {"verb": "rejoin", "at": 0.9, "agents": [5]},
             {"verb": "pause", "at": 0.4, "every": 0.5, "lasts": 0.2, "times": 2, "agents": [4]},
             {"verb": "pause", "at": 0.4, "lasts": 0.2, "agents": [1], "in_flight": "drop"},
+            {"verb": "depart", "at": 0.6, "agents": [3]},
+            {"verb": "replace", "at": 1.1, "agents": [3]},
             {"verb": "lie", "at": 0.2, "agents": [6], "matrix": MIRROR},
             {"verb": "kill", "at": 0.5, "agents": [2]},
             {"verb": "restart", "at": 0.7, "agents": [2], "state": "warm"},
@@ -103,7 +105,7 @@ def test_both_runtimes_give_the_same_bits_and_count_the_same_bites(twice):
 
 def test_every_process_ends_as_it_was_told(twice):
     name, (_, many), _ = twice
-    killed = [entry["agents"] for entry in SCRIPTS[name][1] if entry["verb"] == "kill"]
+    killed = [entry["agents"] for entry in SCRIPTS[name][1] if entry["verb"] in ("kill", "replace")]
     ends = [process["exit"] for process in many.processes]
     assert ends.count(-9) == sum(map(len, killed))
     assert set(ends) == {0, -9}

@@ -29,10 +29,25 @@ def name(message):
 
 MESSAGES = [
     wire.Sense(
-        k=7, src="world", seq=7, last=False, measured=[[0.5, -1.0]], position=[[1.0, 2.0], [0.5, 3.0]], fired=[1]
+        k=7,
+        src="world",
+        seq=7,
+        last=False,
+        measured=[[0.5, -1.0]],
+        position=[[1.0, 2.0], [0.5, 3.0]],
+        velocity=[[0.25, 0.0], [0.0, -4.0]],
+        fired=[1],
     ),
     wire.SenseInbox(
-        k=7, src="netem", seq=14, phase=Phase.SENSE, clock=9, neighbours=[2], measured=[[0.5, 1.0]], position=None
+        k=7,
+        src="netem",
+        seq=14,
+        phase=Phase.SENSE,
+        clock=9,
+        neighbours=[2],
+        measured=[[0.5, 1.0]],
+        position=None,
+        velocity=[0.25, 0.0],
     ),
     wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
     wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
@@ -41,11 +56,12 @@ MESSAGES = [
         k=7,
         src=3,
         seq=7,
-        velocity=[1.0, 2.0],
+        input=[1.0, 2.0],
         estimate=[[1.0, 0.0]],
         known=[True],
         covariance=[[0.5, 0.0, 0.5]],
         psi=0.25,
+        feasible=True,
         heard=12,
     ),
     wire.Journal(
@@ -102,8 +118,13 @@ def test_an_undefined_indicator_travels_as_nan():
 
 def test_numbers_arrive_bit_for_bit():
     numbers = [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf]
-    arrived = wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(velocity=np.array(numbers)))).velocity
+    arrived = wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(input=np.array(numbers)))).input
     assert np.array(arrived).tobytes() == np.array(numbers).tobytes()
+
+
+@pytest.mark.parametrize("message", MESSAGES[:2], ids=name)
+def test_single_integrators_are_told_no_velocity(message):
+    assert wire.unpack(type(message), wire.pack(message._replace(velocity=None))).velocity is None
 
 
 def test_a_whole_number_will_do_for_a_number():
@@ -145,7 +166,7 @@ def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
         ("k", True, "Act: k: expected an integer, got True"),
         ("psi", None, "Act: psi: expected a number, got None"),
         ("psi", True, "Act: psi: expected a number, got True"),
-        ("velocity", 1.0, "Act: velocity: expected a list, got 1.0"),
+        ("input", 1.0, "Act: input: expected a list, got 1.0"),
     ],
 )
 def test_no_type_is_taken_for_another(field, wrong, match):
@@ -318,6 +339,7 @@ AGENT = AgentBrief(
     estimator=Choice("agents.estimators.none:NoEstimator", {}),
     law=Choice("agents.controllers:Static", {"alpha": 2.0}),
     leader_gain=1.0,
+    limit=3.0,
     brief=BRIEF,
     checkpoint="/tmp/agent-2.npz",
     remembers=True,
@@ -331,10 +353,19 @@ def plain_of(brief):
 @pytest.mark.parametrize(
     "brief",
     [
-        *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, checkpoint=None, remembers=False)),
+        *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, limit=None, checkpoint=None, remembers=False)),
         *(MEDIUM, *MEDIUM.faults, *MEDIUM.triggers),
     ],
-    ids=["place", "no mission", "agent", "no checkpoint", "medium", *(f.verb for f in MEDIUM.faults), "above", "below"],
+    ids=[
+        "place",
+        "no mission",
+        "agent",
+        "no limit, no checkpoint",
+        "medium",
+        *(f.verb for f in MEDIUM.faults),
+        "above",
+        "below",
+    ],
 )
 def test_a_brief_survives_the_trip(brief):
     arrived = from_plain(type(brief), plain_of(brief))

@@ -46,6 +46,7 @@ def world():
         seed=1,
         dt=0.01,
         ticks=6000,
+        order=1,
         formation=ZHAO7,
         links=SEVEN,
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
@@ -241,6 +242,80 @@ def test_everybody_starts_at_rest_with_a_true_picture(world):
     begun = world.start()
     np.testing.assert_array_equal(begun.velocity, REST)
     np.testing.assert_array_equal(begun.measured, begun.position[SEVEN.dst - 1] - begun.position[SEVEN.src - 1])
+
+
+# ---- double integrators
+
+
+@pytest.fixture
+def heavy(world):
+    return replace(world, order=2)
+
+
+def test_a_double_integrator_gains_velocity_and_a_half_of_it_already_moves_it(heavy):
+    z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
+    z[3], v[3], u[3] = (1.0, 2.0), (10.0, 0.0), (200.0, -400.0)
+    after = heavy.step(0, scene(z, velocity=v), BEFORE, u, QUIET)
+    np.testing.assert_allclose(after.position[3], [1.0 + 0.1 + 0.01, 2.0 - 0.02], atol=1e-15)
+    np.testing.assert_allclose(after.velocity[3], [12.0, -4.0], atol=1e-14)
+    np.testing.assert_allclose(after.position, z + 0.01 * v + 0.01**2 / 2 * u, atol=1e-15)
+    np.testing.assert_allclose(after.velocity, v + 0.01 * u, atol=1e-15)
+    np.testing.assert_array_equal(after.measured, BEFORE)
+
+
+def test_only_double_integrators_are_told_how_fast_they_are(world, heavy):
+    v = np.random.default_rng(1).normal(size=(7, 2))
+    np.testing.assert_array_equal(heavy.odometry(scene(REST, velocity=v)), v)
+    assert world.odometry(scene(REST, velocity=v)) is None
+
+
+@pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
+def test_double_integrators_that_nobody_steers_keep_their_velocity(heavy, fault):
+    z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
+    flown = heavy.flown(scene(z, velocity=v), u, under(fault))
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+    np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
+    after = heavy.step(0, scene(z, velocity=v), UNSEEN, flown, under(fault))
+    np.testing.assert_array_equal(after.velocity[ABSENT], v[ABSENT])
+    np.testing.assert_allclose(after.position[ABSENT], (z + 0.01 * v)[ABSENT], atol=1e-15)
+    assert (after.velocity != v).all(axis=1).tolist() == (~ABSENT).tolist()
+
+
+def test_a_double_integrator_gains_nothing_for_as_long_as_its_agent_is_paused(heavy):
+    timeline = Timeline(SEVEN, [Fault(Verb.PAUSE, 2, 5, agents=(4,), under_way=UnderWay.HOLD)])
+    here, speed = scene(ZHAO7.nominal), []
+    for tick in range(7):
+        now = timeline.at(tick)
+        here = heavy.step(tick, here, here.measured, heavy.flown(here, np.full((7, 2), 100.0), now), now)
+        speed.append(here.velocity[[3, 4], 0])
+    np.testing.assert_allclose(speed, np.transpose([[1, 2, 2, 2, 2, 3, 4], [1, 2, 3, 4, 5, 6, 7]]), atol=1e-12)
+
+
+@HELD
+def test_absent_double_integrators_stop_at_once_whatever_happens(heavy, fault):
+    z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
+    gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
+    flown = heavy.flown(scene(z, velocity=v), u, under(fault))
+    after = replace(heavy, disturbance=0.1).step(0, scene(z, velocity=v), UNSEEN, flown, under(fault, gust))
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+    np.testing.assert_array_equal(after.position[ABSENT], z[ABSENT])
+    np.testing.assert_array_equal(after.velocity[ABSENT], 0.0)
+    assert (after.position[~ABSENT] != z[~ABSENT]).all()
+    np.testing.assert_allclose(after.velocity[~ABSENT], (v + 0.01 * u)[~ABSENT], atol=1e-15)
+
+
+def test_gusts_and_disturbances_displace_a_double_integrator_and_give_it_no_velocity(heavy):
+    z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
+    gust, push = Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)), np.zeros((7, 2))
+    push[[1, 4]] = (3.0, -1.0)
+    here = scene(z, velocity=v)
+    calm = heavy.step(0, here, UNSEEN, u, QUIET)
+    windy = heavy.step(0, here, UNSEEN, heavy.flown(here, u, under(gust)), under(gust))
+    shaken = replace(heavy, disturbance=0.2).step(0, here, UNSEEN, u, QUIET)
+    np.testing.assert_allclose(windy.position - calm.position, 0.01 * push, atol=1e-15)
+    assert (shaken.position != calm.position).all()
+    np.testing.assert_array_equal(windy.velocity, calm.velocity)
+    np.testing.assert_array_equal(shaken.velocity, calm.velocity)
 
 
 # ---- sensors that fail

@@ -1,4 +1,4 @@
-"""Single-integrator dynamics (paper 000, eq. 4), and bodies that do not obey."""
+"""Single integrators (paper 000, eq. 4), double integrators, and bodies that do not obey."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ def single_integrator(position: Array, velocity: Array, dt: float, disturbance: 
     return position + dt * velocity + disturbance
 
 
-def flown(commanded: Array, before: Array, now: Conditions) -> Array:
-    """The inputs that bodies fly, shape (N, D), in metres per second.
+def double_integrator(position: Array, velocity: Array, acceleration: Array, dt: float, disturbance: Array) -> Array:
+    """z_k+1 = z_k + dt zdot_k + dt^2 / 2 u_k + w_k, shape (..., N, D), in metres; w is a displacement per tick."""
+    return position + dt * velocity + 0.5 * dt**2 * acceleration + disturbance
+
+
+def flown(commanded: Array, coasting: Array, now: Conditions) -> Array:
+    """The inputs that bodies fly, shape (N, D).
 
     Parameters
     ----------
-    commanded, before
-        What their agents command, and what they flew in the tick before, shape (N, D).
+    commanded, coasting
+        What their agents command, and what a body without a command flies, so that it goes on as it did, shape (N, D).
     now
-        A body without a command flies on as it did; one that holds does not fly at all.
+        Who has none; a body that holds does not fly at all.
     """
-    return np.where(now.coasting[:, None], before, np.where(now.still[:, None], 0.0, commanded))
+    return np.where(now.coasting[:, None], coasting, np.where(now.still[:, None], 0.0, commanded))

@@ -70,4 +70,20 @@ PRESETS: dict[str, Formation] = {
         ),
         leaders=(2, 6, 8),
     ),
+    # An octahedron with its diagonals and a tetrahedron in it, in three dimensions. Its stress is well conditioned (.960 to
+    # 1.067); 152 of 189 admissible sets of leaders are stable under one-tick varying-velocity control, this one at radius .648.
+    "octa10": Formation(
+        nominal=np.array(
+            [
+                *([2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 2], [0, 0, -2]),
+                *([0.5, 0.5, 0.5], [0.5, -0.5, -0.5], [-0.5, 0.5, -0.5], [-0.5, -0.5, 0.5]),
+            ],
+            dtype=np.float64,
+        ),
+        edges=_edges(
+            "1-2 3-4 5-6 1-3 1-4 1-5 1-6 2-3 2-4 2-5 2-6 3-5 3-6 4-5 4-6 1-7 3-7 5-7 1-8 4-8 6-8 2-9 3-9 6-9 2-10 4-10 5-10 "
+            "7-8 7-9 7-10 8-9 8-10 9-10"
+        ),
+        leaders=(1, 3, 6, 10),
+    ),
 }

@@ -26,11 +26,12 @@ FILE = "arrays.npz"  # in a run directory
 
 _BY_TICK = (
     "position",
-    "velocity",
+    "input",
     "estimate",
     "known",
     "covariance",
     "psi",
+    "feasible",
     "fates",
     "newest",
     "copies",
@@ -39,6 +40,7 @@ _BY_TICK = (
     "target",
     "error",
 )
+UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
 _MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
 
 
@@ -47,13 +49,15 @@ class Moment(NamedTuple):
 
     Parameters
     ----------
-    position, velocity
-        Where the agents are, and their inputs, shape (N, D), in metres and metres per second.
+    position, input
+        Where the agents are, and what they fly, shape (N, D), in metres, and metres per second or per second squared.
     estimate, known, covariance
         Estimated relative positions, shape (N, n, D), in metres, where there are any, shape (N, n), and the upper triangles of
         their covariances, shape (N, n, D (D + 1) / 2), in square metres.
     psi
         Convergence indicators, shape (N,), NaN where undefined.
+    feasible
+        Whether what an agent sees determines a local map, 1 or 0, or `UNTOLD`, shape (N,).
     fates
         Verdicts, shape (C, L).
     odd
@@ -65,11 +69,12 @@ class Moment(NamedTuple):
     """
 
     position: Any
-    velocity: Any
+    input: Any
     estimate: Any
     known: Any
     covariance: Any
     psi: Any
+    feasible: Any
     fates: Any
     odd: Any
     apart: Any
@@ -103,11 +108,12 @@ class Moments:
 
     first: int
     position: Array
-    velocity: Array
+    input: Array
     estimate: Array
     known: Mask
     covariance: Array
     psi: Array
+    feasible: NDArray[np.int8]
     fates: Fates
     newest: NDArray[np.int32]
     copies: NDArray[np.int64]
@@ -135,11 +141,12 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
     return Moments(
         first=first,
         position=where,
-        velocity=np.array([moment.velocity for moment in moments]),
+        input=np.array([moment.input for moment in moments]),
         estimate=np.array([moment.estimate for moment in moments]),
         known=np.array([moment.known for moment in moments], dtype=bool),
         covariance=np.array([moment.covariance for moment in moments]),
         psi=np.array([moment.psi for moment in moments]),
+        feasible=np.array([moment.feasible for moment in moments], dtype=np.int8),
         fates=fates,
         newest=_newest(ticks, fates, entries, moments),
         copies=np.array([np.count_nonzero(entry.odd[:, _COPY_DUE] >= 0) for entry in entries]),
@@ -197,11 +204,12 @@ class History:
         self.position = np.zeros((ticks + 1, agents, dimension))
         self.target = np.zeros((ticks, agents, dimension))
         self.error = np.full(ticks, np.nan)
-        self.velocity = np.zeros((ticks, agents, dimension))
+        self.input = np.zeros((ticks, agents, dimension))
         self.estimate = np.zeros((ticks, agents, width, dimension))
         self.known = np.zeros((ticks, agents, width), dtype=bool)
         self.covariance = np.zeros((ticks, agents, width, dimension * (dimension + 1) // 2))
         self.psi = np.full((ticks, agents), np.nan)
+        self.feasible = np.full((ticks, agents), UNTOLD, dtype=np.int8)
         self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
         self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)
         self.copies = np.zeros(ticks, dtype=np.int64)

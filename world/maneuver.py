@@ -52,6 +52,37 @@ def corridor(seconds: Array) -> Manoeuvre:
     return Manoeuvre(theta, course - theta @ _ANCHOR)
 
 
+def ravine(seconds: Array) -> Manoeuvre:
+    """60 s in three dimensions: a climb, a narrow slot, a quarter turn, and a low ceiling that leaves everybody in a plane.
+
+    Parameters
+    ----------
+    seconds
+        Times of the ticks, shape (T,).
+
+    Returns
+    -------
+    Manoeuvre
+        In three dimensions, written for the nominal positions of `octa10`.
+    """
+
+    def blend(start: float, duration: float) -> Array:
+        return _bell_step(seconds, start, duration)
+
+    turned = 0.5 * np.pi * blend(34, 10)
+    cosine, sine, nothing, one = np.cos(turned), np.sin(turned), np.zeros_like(turned), np.ones_like(turned)
+    yaw = _matrix([[cosine, sine, nothing], [-sine, cosine, nothing], [nothing, nothing, one]])
+    width = 1.0 - 0.6 * (blend(12, 8) - blend(24, 8))
+    height = 1.0 - blend(44, 6) + blend(53, 6)
+    course = [
+        _travel(seconds, 0, 8) - _travel(seconds, 34, 10),
+        -_travel(seconds, 34, 10),
+        0.5 * (_travel(seconds, 3, 6) - _travel(seconds, 15, 6)),
+    ]
+    scale = _matrix([[one, nothing, nothing], [nothing, width, nothing], [nothing, nothing, height]])
+    return Manoeuvre(yaw @ scale, np.stack(course, axis=-1))
+
+
 def hover(seconds: Array, dimension: int) -> Manoeuvre:
     """The nominal formation at rest."""
     ticks = len(seconds)
@@ -80,6 +111,11 @@ def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
     slopes = PchipInterpolator(times, values).derivative()(times)
     slopes[0], slopes[-1] = 0.0, 0.0  # from rest, and to rest
     return CubicHermiteSpline(times, values, slopes)
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    """Entries over time, each (T,), as matrices (T, D, D)."""
+    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def _bell_step(seconds: Array, start: float, duration: float) -> Array:

@@ -21,7 +21,7 @@ from netem.timeline import Conditions, Timeline
 from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
-from world.history import History, Moment, Vigil, gather
+from world.history import UNTOLD, History, Moment, Vigil, gather
 from world.world import Scene
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Theatre:
         dimension = brief.world.formation.dimension
         self._unknown = [[0.0] * dimension] * brief.world.links.slots.shape[1]
         self._unsure = [[0.0] * (dimension * (dimension + 1) // 2)] * brief.world.links.slots.shape[1]
-        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, 0)
+        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, None, 0)
         self._vigil = Vigil(brief.world)
         self.uninstructed = 0
         self.history = History(brief.world, len(brief.channels))
@@ -77,9 +77,9 @@ class Theatre:
             moment = self._moment(scene, journal, acts, now)
             self._moments.append(moment)
             self._vigil.see(tick, scene.position, self._timeline)
-            scene = self._world.step(tick, scene, measured, moment.velocity, now)
+            scene = self._world.step(tick, scene, measured, moment.input, now)
         self._write_down(self._world.ticks, scene, logbook)
-        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], [])
+        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, [])
         self._sense.put(wire.pack(end))
 
     def _fire(self, tick: int) -> list[int]:
@@ -105,7 +105,8 @@ class Theatre:
             self._heard[agent] = 0
 
     def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
-        sense = wire.Sense(tick, WORLD, self._numbers.next("sense"), False, measured, scene.position, fired)
+        number, velocity = self._numbers.next("sense"), self._world.odometry(scene)
+        sense = wire.Sense(tick, WORLD, number, False, measured, scene.position, velocity, fired)
         self._sense.put(wire.pack(sense))
 
     def _read_journal(self, tick: int) -> wire.Journal:
@@ -142,11 +143,12 @@ class Theatre:
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
         return Moment(
             position=scene.position,
-            velocity=self._world.flown(scene, np.array([act.velocity for act in everybody]), now),
+            input=self._world.flown(scene, np.array([act.input for act in everybody]), now),
             estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
             known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
             covariance=[act.covariance + self._unsure[len(act.covariance) :] for act in everybody],
             psi=[act.psi for act in everybody],
+            feasible=[UNTOLD if act.feasible is None else int(act.feasible) for act in everybody],
             fates=journal.fates,
             odd=journal.odd,
             apart=journal.apart,

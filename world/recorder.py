@@ -96,6 +96,8 @@ class Recorder:
         self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
+        numbers = np.arange(1.0, self._formation.agents + 1.0)
+        self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
         self._log_realised(time, realised)
 
@@ -117,6 +119,7 @@ class Recorder:
             ("swarm/graph/functional", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.8))),
             ("metrics/tracking_error", rr.SeriesLines(names="tracking error (m²)", colors=0xFFFFFFFF)),
             ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),
+            ("metrics/infeasible", rr.SeriesPoints(names=[f"agent {number}" for number in numbers], marker_sizes=2.0)),
             (
                 "graph/connectivity",
                 rr.SeriesLines(
@@ -229,21 +232,25 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-8.0),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
+    flat = formation.dimension == 2
     swarm = rrb.Spatial3DView(
         origin="swarm",
         name="swarm",
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
-            position=(0.0, -0.01 * reach, 2.6 * reach),
+            position=(0.0, -0.01 * reach, 2.6 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
             look_target=(0.0, 0.0, 0.0),
-            eye_up=(0.0, 1.0, 0.0),
+            eye_up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0),
             tracking_entity="swarm/agents",
         ),
         overrides={"swarm/trail": rrb.VisibleTimeRanges([trail])},
     )
     plots = rrb.Vertical(
         rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
-        rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
+        rrb.Tabs(
+            rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
+            rrb.TimeSeriesView(origin="metrics/infeasible", name="agents whose neighbours determine no local map"),
+        ),
         rrb.TimeSeriesView(origin="metrics/messages", name="messages per tick, by verdict"),
         rrb.Tabs(
             rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),

@@ -26,7 +26,7 @@ class Scene(NamedTuple):
     position
         Of the agents, shape (N, D), in metres.
     velocity
-        The inputs they flew in the tick before, shape (N, D), in metres per second.
+        Theirs, shape (N, D), in metres per second: of single integrators, the input they flew in the tick before.
     measured
         What was measured in the tick before, shape (L, D), in metres.
     """
@@ -48,6 +48,8 @@ class World:
         Tick, in seconds.
     ticks
         How many there are.
+    order
+        Of the bodies: single integrators (1) or double integrators (2).
     formation, links, manoeuvre
         Who flies, who is linked to whom, and what the leaders fly.
     covariance
@@ -61,6 +63,7 @@ class World:
     seed: Seed
     dt: float
     ticks: int
+    order: int
     formation: Formation
     links: Links
     manoeuvre: Manoeuvre
@@ -93,13 +96,24 @@ class World:
         return sensors.stray(draw, now)
 
     def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
-        """The inputs that the bodies fly when their agents command these, shape (N, D), in metres per second."""
-        return dynamics.flown(commanded, scene.velocity, now)
+        """The inputs that the bodies fly when their agents command these, shape (N, D)."""
+        coasting = scene.velocity if self.order == 1 else np.zeros_like(scene.velocity)
+        return dynamics.flown(commanded, coasting, now)
+
+    def odometry(self, scene: Scene) -> Array | None:
+        """The velocities that agents are told, shape (N, D), in metres per second; single integrators know their input."""
+        return None if self.order == 1 else scene.velocity
 
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
-        moved = dynamics.single_integrator(scene.position, flown + now.push, self.dt, self._disturbances.at(tick))
-        return Scene(np.where(now.still[:, None], scene.position, moved), flown, measured)
+        noise, still = self._disturbances.at(tick), now.still[:, None]
+        if self.order == 1:
+            velocity = flown
+            moved = dynamics.single_integrator(scene.position, flown + now.push, self.dt, noise)
+        else:
+            velocity = np.where(still, 0.0, scene.velocity + self.dt * flown)
+            moved = dynamics.double_integrator(scene.position, scene.velocity + now.push, flown, self.dt, noise)
+        return Scene(np.where(still, scene.position, moved), velocity, measured)
 
     @cached_property
     def _sensor_noise(self) -> Tape:

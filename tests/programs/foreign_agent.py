@@ -54,8 +54,8 @@ def main() -> None:
                     broadcasts[name].put(msgpack.packb(envelope))
                 continue
             heard += len(message["messages"])
-            belief = {"estimate": [], "known": [], "covariance": [], "psi": float("nan")}
-            decision = {"velocity": [0.0, 0.0], "heard": heard} | belief
+            belief = {"estimate": [], "known": [], "covariance": [], "psi": float("nan"), "feasible": None}
+            decision = {"input": [0.0, 0.0], "heard": heard} | belief
             act.put(msgpack.packb({"k": message["k"], "src": me, "seq": seq} | decision))
             seq += 1
 

@@ -1,0 +1,153 @@
+"""The control laws for double integrators (Zhao 2018, Affine formation maneuver control of multiagent systems), and a pilot.
+
+They are the laws of paper 000, Table II, one derivative up: the input is an acceleration, and relative velocities damp what
+relative positions drive. A neighbour's velocity is what it communicated last, or what the estimator makes of its motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own, Reading
+from agents.controllers import stress_force, weighted
+from agents.estimators.base import Estimate, Heard
+from analysis.affine import Manoeuvre
+
+Source = Literal["communicated", "estimated"]
+
+
+class LastSaid(NamedTuple):
+    """The neighbours' velocities and accelerations as last heard, (..., n, D), and who was ever heard, shape (..., n)."""
+
+    velocity: Array
+    acceleration: Array
+    ever: Mask
+
+
+@dataclass(frozen=True)
+class DoubleConstantVelocity:
+    """u_i = -sum_j l_ij (k_p zhat_ij + k_v (zdot_i - zdot_j)), for leaders at rest or at constant velocity.
+
+    Parameters
+    ----------
+    position_gain
+        k_p, per second squared.
+    velocity_gain
+        k_v, per second.
+    source
+        Where zdot_j comes from.
+    """
+
+    order: ClassVar[int] = 2
+    position_gain: float = 10.0
+    velocity_gain: float = 30.0
+    source: Source = "communicated"
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastSaid:
+        """Nobody heard yet."""
+        return _silence(brief, batch)
+
+    def command(
+        self,
+        brief: Brief,
+        state: LastSaid,
+        tick: Reading,  # noqa: ARG002
+        own: Own,
+        estimate: Estimate,
+        inputs: Heard,
+    ) -> tuple[LastSaid, Array]:
+        """Fall toward the formation, damped."""
+        heard = _hear(state, inputs)
+        closing = _closing(brief, self.source, own, estimate, heard)
+        return heard, -self.position_gain * stress_force(brief, estimate) - self.velocity_gain * closing
+
+
+@dataclass(frozen=True)
+class DoubleVaryingVelocity:
+    """u_i = -(1 / gamma_i) sum_j l_ij (k_p zhat_ij + k_v (zdot_i - zdot_j) - zddot_j), gamma_i = sum_j l_ij.
+
+    For leaders that accelerate. As with velocities in Table II, the neighbours' accelerations are heard one tick late: an
+    iteration that need not converge (`affinet check` gives the radius).
+
+    Parameters
+    ----------
+    position_gain
+        k_p, per second squared.
+    velocity_gain
+        k_v, per second.
+    source
+        Where zdot_j comes from.
+    relaxation
+        eta in u <- (1 - eta) u_before + eta u_law, in (0, 1].
+    """
+
+    order: ClassVar[int] = 2
+    position_gain: float = 1.0
+    velocity_gain: float = 2.0
+    source: Source = "communicated"
+    relaxation: float = 1.0
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastSaid:
+        """Nobody heard yet."""
+        return _silence(brief, batch)
+
+    def command(
+        self,
+        brief: Brief,
+        state: LastSaid,
+        tick: Reading,  # noqa: ARG002
+        own: Own,
+        estimate: Estimate,
+        inputs: Heard,
+    ) -> tuple[LastSaid, Array]:
+        """Accelerate as the neighbours do, and fall toward the formation, damped."""
+        heard = _hear(state, inputs)
+        closing = _closing(brief, self.source, own, estimate, heard)
+        pull = self.position_gain * stress_force(brief, estimate) + self.velocity_gain * closing
+        law = (weighted(brief.stress, heard.acceleration) - pull) / brief.degree[..., None]
+        return heard, (1.0 - self.relaxation) * own.input + self.relaxation * law
+
+
+def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array, velocity: Array) -> Array:
+    """A leader's input: the target's acceleration, and a critically damped pull, shape (..., D), in metres per second squared.
+
+    Parameters
+    ----------
+    gain
+        Natural frequency of the pull, per second.
+    position, velocity
+        The leader's own, shape (..., D), in metres and metres per second.
+    """
+    acceleration = mission.acceleration(tick, brief.nominal, brief.dt)
+    # The velocity at the tick itself; that from one tick to the next would be half a tick ahead.
+    wanted = mission.velocity(tick, brief.nominal, brief.dt) - 0.5 * brief.dt * acceleration
+    astray = mission.target(tick, brief.nominal) - position
+    pull = gain**2 * astray + 2.0 * gain * (wanted - velocity)
+    return acceleration + pull
+
+
+def _silence(brief: Brief, batch: tuple[int, ...]) -> LastSaid:
+    rest = np.zeros((*batch, *brief.relative.shape[-2:]))
+    return LastSaid(rest, rest, np.zeros(rest.shape[:-1], dtype=bool))
+
+
+def _hear(state: LastSaid, inputs: Heard) -> LastSaid:
+    fresh = inputs.fresh[..., None]
+    return LastSaid(
+        np.where(fresh, inputs.fields["velocity"], state.velocity),
+        np.where(fresh, inputs.fields["acceleration"], state.acceleration),
+        state.ever | inputs.fresh,
+    )
+
+
+def _closing(brief: Brief, source: Source, own: Own, estimate: Estimate, heard: LastSaid) -> Array:
+    """sum_j l_ij (zdot_i - zdot_j) over the neighbours whose velocity is known, shape (..., D), in metres per second."""
+    if source == "communicated":
+        stress = np.where(heard.ever, brief.stress, 0.0)
+        return weighted(stress, own.velocity[..., None, :] - heard.velocity)
+    if estimate.relative_velocity is None:
+        raise ValueError("the velocity source 'estimated' needs an estimator that tracks relative velocities")
+    return weighted(np.where(estimate.known, brief.stress, 0.0), estimate.relative_velocity)
