@@ -268,15 +268,13 @@ def agreement(level: float, by: float = 0.0) -> Checker:
 
 
 def energy(level: float) -> Checker:
-    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s."""
+    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s (m2/s3 of accelerations)."""
     name = f"energy({level:g})"
 
     def check(evidence: Evidence) -> Finding:
         power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
         spent = np.cumsum(power) * evidence.dt
-        return _every(
-            name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} m²/s are spent"
-        )
+        return _every(name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} are spent")
 
     return Checker(name, check)
 

@@ -219,6 +219,10 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
 
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
+    if getattr(law, "order", None) not in (1, 2):
+        raise ScenarioError(
+            f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations"
+        )
     if law.order != given.dynamics.order:
         steers = ("velocities", "accelerations")[law.order - 1]
         fits = ("single-integrator", "double-integrator")[law.order - 1]

@@ -1,6 +1,6 @@
 """The control laws for double integrators on cases small enough to work out by hand, and the ravine they fly through."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -77,6 +77,22 @@ def test_varying_velocity_accelerates_as_the_neighbours_say_falls_and_is_damped(
     _, u = command(VARYING)
     np.testing.assert_allclose(u, [(3.0 + 2.0 - 0.5) / 2, (1.0 - 14.0 - 1.5) / 2])
     np.testing.assert_allclose(u, (GAINED - 2.0 * FORCE - 0.5 * CLOSING) / (3 - 1))
+
+
+@dataclass(frozen=True)
+class Orderless:
+    """A law that does not say whether it steers velocities or accelerations."""
+
+    def init(self, brief, batch):
+        raise NotImplementedError
+
+    def command(self, brief, state, tick, own, estimate, inputs):
+        raise NotImplementedError
+
+
+def test_a_law_that_does_not_say_its_order_is_refused():
+    with pytest.raises(ScenarioError, match=r"agents.law: .*Orderless has no 'order'"):
+        plan_of("corridor", f'agents.law="{__name__}:Orderless"')
 
 
 @LAWS
@@ -245,7 +261,7 @@ def octa10():
 
 
 def drawn(brief, seed=1):
-    """A tick of everybody: measured, and own position and velocity; what is heard of accelerations is far too much."""
+    """A tick of everybody: measured, own position and velocity, and what is heard of the neighbours."""
     rng = np.random.default_rng(seed)
     apart = brief.relative + np.where(brief.present[..., None], 0.1 * rng.normal(size=brief.relative.shape), 0.0)
     position, velocity = rng.normal(size=(2, 10, 3))
