@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
 _LOST = 1.0  # m²
+_LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,9 @@ def _draw(panel: Axes, case: Curve, label: str) -> None:
     error = _finite(case.error)
     mean, deviation = error.mean(axis=0), error.std(axis=0)
     (line,) = panel.plot(case.seconds, mean, lw=1.0, label=label)
-    panel.fill_between(
-        case.seconds, _positive(mean - deviation), mean + deviation, color=line.get_color(), alpha=0.15, lw=0
-    )
+    # A band that reaches zero has no lower end on a logarithmic axis.
+    low = np.maximum(mean - deviation, _LOWEST * mean)
+    panel.fill_between(case.seconds, low, mean + deviation, color=line.get_color(), alpha=0.15, lw=0)
 
 
 def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:

@@ -24,7 +24,12 @@ def test_flat(means, holds):
 
 @pytest.mark.parametrize(
     ("means", "others", "holds"),
-    [((0.9, 0.3), (1.0, 1.0), True), ((0.3, 0.9), (1.0, 1.0), False), ((0.4, 0.3), (1.0, 1.0), False)],
+    [
+        ((0.9, 0.3), (1.0, 1.0), True),
+        ((0.3, 0.9), (1.0, 1.0), False),
+        ((0.4, 0.1), (1.0, 1.0), False),
+        ((0.9, 0.6), (1.0, 1.0), False),
+    ],
 )
 def test_approaches(means, others, holds):
     assert claims.approaches("says", runs(*means), runs(*others), 0.5).holds is holds

@@ -5,8 +5,9 @@ import pytest
 from flying import plan_of
 from rerun.chunk import RrdReader
 
-from affinet.run import fly
+from affinet.run import fly, rehearse
 from netem.fate import Fate
+from world.history import UNTOLD
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,7 @@ def test_it_holds_the_swarm_the_graphs_the_target_and_the_metrics(chunks):
         "/swarm/graph/functional",
         "/metrics/tracking_error",
         "/metrics/psi",
+        "/metrics/infeasible",
         "/metrics/messages",
         "/events",
     } <= {str(chunk.entity_path) for chunk in chunks}
@@ -83,3 +85,23 @@ def test_colours_tell_leaders_from_followers_from_the_dead(chunks):
 def test_colours_tell_what_became_of_an_edge(chunks):
     colours = column(chunks, "/swarm/graph/functional", "LineStrips3D:colors")
     assert len({colour for moment in colours for colour in moment}) >= 5  # delivered, lost, cut, dead, partition
+
+
+def test_agents_whose_neighbours_determine_no_map_are_told_tick_by_tick():
+    plan = plan_of("corridor", "time.duration=1", "network.availability=0.4", "record.enabled=false")
+    evidence, links = rehearse(plan), plan.world.links
+    seen = (evidence.arrays["fates"][:, 0] == Fate.DELIVERED)[:, links.slots] & links.present
+    rank = np.linalg.matrix_rank(np.where(seen[..., None], plan.brief.relative, 0.0))
+    assert set(rank.ravel().tolist()) == {0, 1, 2}
+    np.testing.assert_array_equal(evidence.arrays["feasible"], rank == 2)
+
+
+def test_an_estimator_without_maps_and_a_dead_agent_tell_none():
+    dead = 'timeline=[{verb="kill",at=0.1,agents=[5]}]'
+    mute, killed = (
+        rehearse(plan_of("corridor", "time.duration=0.2", "record.enabled=false", over)).arrays["feasible"]
+        for over in ('agents.estimator="rkf"', dead)
+    )
+    assert (mute == UNTOLD).all()
+    assert (killed[:, 4] == UNTOLD).tolist() == [False] * 10 + [True] * 10
+    assert (np.delete(killed, 4, axis=1) != UNTOLD).all()

@@ -101,3 +101,58 @@ def test_what_is_wrong_in_a_study_is_said(old, new, says, tiny):
 def test_an_unknown_study_is_named_with_those_there_are():
     with pytest.raises(ScenarioError, match="paper-000-fig10"):
         study.load("paper-000-fig99")
+
+
+MAP = """
+title = "Tiny map"
+source = "nobody"
+figure = "map"
+scenario = "corridor"
+set = ["time.dt=0.05", "time.duration=0.5"]
+full = { runs = 2 }
+quick = { runs = 2 }
+skip = [{ law = "static", estimator = "rkf" }]
+
+[[axes]]
+name = "loss"
+values = { none = [], half = ["network.availability=0.5"] }
+
+[[axes]]
+name = "law"
+values = { static = ['agents.law="static"'], varying = [] }
+
+[[axes]]
+name = "estimator"
+values = { none = ['agents.estimator="none"'], rkf = ['agents.estimator="rkf"'] }
+
+[[claims]]
+says = "losses cost nothing"
+each = ["law"]
+check = "lower"
+of = { loss = "half", estimator = "none" }
+to = { loss = "none", estimator = "none" }
+"""
+
+
+def test_a_map_leaves_out_what_it_is_told_to_and_a_claim_is_judged_for_each_label(tmp_path):
+    path = tmp_path / "map.toml"
+    path.write_text(MAP)
+    mapped = study.load(str(path))
+    cases = [tuple(case.labels.values()) for case in study.cases(mapped, quick=True)]
+    assert len(cases) == 6
+    assert ("none", "static", "rkf") not in cases
+    results = study.run(mapped, quick=True, watch=lambda _: None)
+    verdicts = study.judge(mapped, results)
+    assert [verdict.says for verdict in verdicts] == ["static: losses cost nothing", "varying: losses cost nothing"]
+    study.save(tmp_path / "out", mapped, results, verdicts)
+    with Image.open(tmp_path / "out" / "figure.png") as figure:
+        assert min(figure.size) > 200
+
+
+def test_a_case_that_cannot_fly_is_named_before_any_has_flown(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text(MAP.replace("none = [], half", "none = ['time.dt=0.3'], half"))
+    flown = []
+    with pytest.raises(ScenarioError, match=r"case \{'loss': 'none'.*not a whole number of ticks"):
+        study.run(study.load(str(path)), quick=True, watch=flown.append)
+    assert flown == []
