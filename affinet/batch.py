@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from affinet.inprocess import Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
-from analysis.metrics import tracking_error
+from analysis import metrics
 from world.formation import Array
 from world.history import Moments
 
@@ -34,12 +35,26 @@ class Runs:
         Its mean over all ticks of each run, shape (R,).
     psi
         Convergence indicators (16) in those ticks, shape (R, T, N).
+    procrustes, estimation_error, covariance_trace
+        As in `analysis.metrics`, in those ticks, shape (R, T), in metres, metres and square metres.
     """
 
     seconds: Array
     error: Array
     mean_error: Array
     psi: Array
+    procrustes: Array
+    estimation_error: Array
+    covariance_trace: Array
+
+    def together(self, other: Runs) -> Runs:
+        """These runs and others of the same ticks."""
+        joined = {
+            field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
+            for field in fields(self)
+            if field.name != "seconds"
+        }
+        return Runs(self.seconds, **joined)
 
 
 def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
@@ -58,33 +73,40 @@ def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         When the plan cannot be flown side by side.
     """
     parts = [_fly(plan, seeds[first : first + _AT_ONCE], every) for first in range(0, len(seeds), _AT_ONCE)]
-    return Runs(
-        parts[0].seconds,
-        np.concatenate([part.error for part in parts]),
-        np.concatenate([part.mean_error for part in parts]),
-        np.concatenate([part.psi for part in parts]),
-    )
+    return reduce(Runs.together, parts)
 
 
 def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
-    runs, agents = len(seeds), plan.world.formation.agents
-    errors: list[Array] = []
-    indicators: list[Array] = []
+    runs, formation, links = len(seeds), plan.world.formation, plan.world.links
+    seen: list[dict[str, Array]] = []
 
     def see(moments: Moments, _: Array) -> None:
         def of_runs(array: Any) -> Any:
-            return array.reshape(len(array), runs, agents, *array.shape[2:])
+            return array.reshape(len(array), runs, formation.agents, *array.shape[2:])
 
-        present = swarm.timeline.present(moments.ticks.tolist())
-        errors.append(tracking_error(of_runs(moments.position), of_runs(moments.target), of_runs(present)))
-        indicators.append(of_runs(moments.psi)[-moments.first % every :: every])
+        position = of_runs(moments.position)
+        present = of_runs(swarm.timeline.present(moments.ticks.tolist()))
+        kept = slice(-moments.first % every, None, every)
+        estimate, known, triangles = (
+            of_runs(array[kept]) for array in (moments.estimate, moments.known, moments.covariance)
+        )
+        seen.append(
+            {
+                "error": metrics.tracking_error(position, of_runs(moments.target), present),
+                "psi": of_runs(moments.psi)[kept],
+                "procrustes": metrics.procrustes_error(position[kept], formation.nominal, present[kept]),
+                "estimation_error": metrics.estimation_error(estimate, position[kept], links.neighbours, known),
+                "covariance_trace": metrics.covariance_trace(triangles, formation.dimension),
+            }
+        )
 
     swarm = Swarm(side_by_side(plan, seeds))
     swarm.fly(see, _TICKS_AT_ONCE)
-    error = np.concatenate(errors).T
+    by_run = {name: np.moveaxis(np.concatenate([part[name] for part in seen]), 0, 1) for name in seen[0]}
+    error = by_run.pop("error")
     return Runs(
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
         error=error[:, ::every],
         mean_error=error.mean(axis=1),
-        psi=np.moveaxis(np.concatenate(indicators), 0, 1),
+        **by_run,
     )

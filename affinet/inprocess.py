@@ -62,7 +62,7 @@ class Swarm:
         vigil = Vigil(world)
         moments: list[Moment] = []
         with np.errstate(over="ignore", invalid="ignore"):
-            scene, state = world.start(), fresh
+            scene, state = world.begin(), fresh
             for tick in range(world.ticks):
                 self._fire(tick, vigil)
                 timeline = self.timeline

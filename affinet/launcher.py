@@ -219,6 +219,7 @@ class Launcher:
             neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
             estimator=plan.estimator,
             law=plan.law,
+            leaders=plan.scenario.agents.leaders,
             leader_gain=plan.scenario.agents.leader_gain,
             limit=plan.scenario.agents.limit,
             brief=replace(whole.of(row), mission=whole.mission if told else None),

@@ -28,6 +28,7 @@ from netem.timeline import Timeline
 from netem.trigger import Trigger
 from world import maneuver, stress
 from world.brief import Books
+from world.disturbance import Disturbance, Kernel
 from world.formation import PRESETS, Formation
 from world.world import World
 
@@ -102,7 +103,8 @@ class Plan:
     @cached_property
     def told_mission(self) -> Mask:
         """Which agents know the manoeuvre, and fly it by their clocks, shape (N,)."""
-        return self.world.formation.is_leader | needs_mission(self.law.build())
+        piloted = self.world.formation.is_leader & (self.scenario.agents.leaders == "pilot")
+        return piloted | needs_mission(self.law.build())
 
     @property
     def agents(self) -> Agent:
@@ -233,7 +235,8 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
 
 
 def _agents(given: Scenario, brief: Brief, estimator: Choice, law: Choice) -> Agent:
-    return Agent(brief, estimator.build(), law.build(), given.agents.leader_gain, given.agents.limit)
+    flown = given.agents
+    return Agent(brief, estimator.build(), law.build(), flown.leaders, flown.leader_gain, flown.limit)
 
 
 def _try_out(agents: Agent) -> None:
@@ -282,9 +285,17 @@ def _world(given: Scenario, formation: Formation) -> World:
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
         covariance=sections.covariance(given.sensing, formation.dimension),
-        disturbance=given.dynamics.disturbance,
+        disturbance=_disturbance(given, formation.dimension),
+        start=given.formation.start,
         spread=given.formation.spread,
+        swarms=1,
     )
+
+
+def _disturbance(given: Scenario, dimension: int) -> Disturbance:
+    section = given.dynamics
+    kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
+    return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
 
 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
@@ -318,10 +329,23 @@ def _brief(world: World, L: Array) -> Brief:
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,
         stress=np.where(links.present, weights, 0.0),
+        leads=links.present & formation.is_leader[links.neighbours],
         covariance=world.covariance,
+        process=_process(world),
         leader=formation.is_leader,
         mission=world.manoeuvre,
     )
+
+
+def _process(world: World) -> Array:
+    """B_i^T Q B_i of every agent's edges, shape (N, n D, n D): what they know of the disturbances."""
+    links, Q_D = world.links, world.disturbance.covariance
+    Q_A = world.disturbance.between(world.formation.nominal)
+    own, theirs = np.arange(links.agents)[:, None], links.neighbours
+    first, second = theirs[:, :, None], theirs[:, None, :]
+    edges = Q_A[own, own][..., None] - Q_A[own, theirs][:, :, None] - Q_A[own, theirs][:, None, :] + Q_A[first, second]
+    real = links.present[:, :, None] & links.present[:, None, :]
+    return np.asarray(np.kron(np.where(real, edges, 0.0), Q_D), dtype=np.float64)
 
 
 def _tick(seconds: float, dt: float) -> int:

@@ -51,6 +51,7 @@ class Formation(Section):
     edges: list[Edge] | None = None
     leaders: list[int] | None = None
     scale: Positive = 1.0
+    start: Literal["targets", "origin"] = "targets"
     spread: NotNegative = 1.0
 
     @model_validator(mode="after")
@@ -114,8 +115,12 @@ class Time(Section):
 
 
 class Sensing(Section):
-    """The relative position sensor: a standard deviation in metres, or a covariance in square metres."""
+    """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
+    It makes `samples` of them in a tick, and reports their mean.
+    """
+
+    samples: Annotated[int, Field(ge=1)] = 1
     sigma: NotNegative | None = None
     covariance: Matrix | None = None
 
@@ -128,11 +133,31 @@ class Sensing(Section):
         return self
 
 
+class Kernel(Section):
+    """How disturbances of two agents are correlated by their distance; `length` in metres, 2 for paper 004 (4.14)."""
+
+    shape: Literal["exponential", "squared-exponential"] = "exponential"
+    length: Positive
+    positions: Literal["nominal", "true"] = "nominal"
+
+
 class Dynamics(Section):
-    """What the bodies are; `disturbance` is the standard deviation of their displacement in a tick, per axis, in metres."""
+    """What the bodies are, and what displaces them in a tick: a standard deviation per axis, in metres, or a covariance, in m2.
+
+    `kernel` correlates agents, `persistence` successive ticks.
+    """
 
     model: Literal["single-integrator", "double-integrator"] = "single-integrator"
-    disturbance: NotNegative = 0.0
+    disturbance: NotNegative | None = None
+    covariance: Matrix | None = None
+    kernel: Kernel | None = None
+    persistence: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _one(self) -> Dynamics:
+        if self.disturbance is not None and self.covariance is not None:
+            raise ValueError("give disturbance (m) or covariance (m2), not both")
+        return self
 
     @property
     def order(self) -> int:
@@ -148,6 +173,7 @@ class Agents(Section):
 
     estimator: str
     law: str
+    leaders: Literal["pilot", "distances"] = "pilot"
     leader_gain: NotNegative = 1.0
     limit: Positive | None = None
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -225,18 +251,35 @@ class Scenario(Section):
 
 
 def covariance(sensing: Sensing, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """R of one relative measurement, shape (D, D), in square metres.
+    """Of the mean of a tick's relative measurements of one edge, R / T, shape (D, D), in square metres.
 
     Raises
     ------
     ScenarioError
         When it is no covariance of this dimension.
     """
-    if sensing.covariance is None:
-        return float(sensing.sigma or 0.0) ** 2 * np.eye(dimension)
-    matrix = array("sensing.covariance", sensing.covariance, (dimension, dimension))
+    return _covariance("sensing", sensing.sigma, sensing.covariance, dimension) / sensing.samples
+
+
+def displacement(dynamics: Dynamics, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Q_D of one agent in a tick, shape (D, D), in square metres.
+
+    Raises
+    ------
+    ScenarioError
+        When it is no covariance of this dimension.
+    """
+    return _covariance("dynamics", dynamics.disturbance, dynamics.covariance, dimension)
+
+
+def _covariance(
+    section: str, sigma: float | None, given: Matrix | None, dimension: int
+) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if given is None:
+        return float(sigma or 0.0) ** 2 * np.eye(dimension)
+    matrix = array(f"{section}.covariance", given, (dimension, dimension))
     if (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
-        raise ScenarioError("sensing.covariance: must be symmetric and positive definite, in m2")
+        raise ScenarioError(f"{section}.covariance: must be symmetric and positive definite, in m2")
     return matrix
 
 

@@ -46,6 +46,7 @@ def side_by_side(plan: Plan, seeds: Sequence[int]) -> Plan:
             seed=np.repeat(np.array(seeds, dtype=np.uint64), size),
             formation=_formation(world.formation, number),
             links=links,
+            swarms=number,
         ),
         profiles=tuple(_profile(profile, number) for profile in plan.profiles),
         faults=tuple(_fault(fault, number, size) for fault in plan.faults),
@@ -86,6 +87,8 @@ def _brief(one: Brief, number: int) -> Brief:
         present=np.tile(one.present, (number, 1)),
         stress=tiled(one.stress),
         leader=np.tile(one.leader, number),
+        leads=np.tile(one.leads, (number, 1)),
+        process=tiled(one.process),
     )
 
 

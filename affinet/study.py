@@ -33,7 +33,14 @@ from netem.links import Mask
 from world.formation import Array
 
 Labels = dict[str, str]
+Quantity = Literal["error", "procrustes", "estimation_error", "covariance_trace"]
 
+NAMES: dict[Quantity, str] = {
+    "error": "tracking error (m²)",
+    "procrustes": "Procrustes error (m)",
+    "estimation_error": "estimation error (m)",
+    "covariance_trace": "trace of the covariances (m²)",
+}
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
 
@@ -50,10 +57,12 @@ class Claim(Section):
 
     says: str
     each: list[str] = Field(default_factory=list)
-    check: Literal["flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower"]
+    check: Literal["flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower", "ratio"]
     of: Labels
     to: Labels | None = None
+    quantity: Quantity | None = None
     level: float | None = None
+    between: tuple[float, float] | None = None
     since: float = 0.0
     until: float | None = None
 
@@ -72,6 +81,7 @@ class Study(Section):
     source: str
     figure: Literal["curves", "sweep", "indicator", "map"]
     scenario: str
+    quantity: Quantity = "error"
     set: list[str] = Field(default_factory=list)
     full: Size
     quick: Size
@@ -173,7 +183,11 @@ def _fly(name: str, case: Case, runs: int) -> Result:
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:
     """The verdict on each of its claims."""
-    return [_judge(one, results) for claim in study.claims for one in _spelled_out(study, claim)]
+    return [
+        _judge(one, results, one.quantity or study.quantity)
+        for claim in study.claims
+        for one in _spelled_out(study, claim)
+    ]
 
 
 def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
@@ -187,24 +201,31 @@ def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
         )
 
 
-def _judge(claim: Claim, results: list[Result]) -> Verdict:
+def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     chosen = [one for one in results if _selected(one, claim.of)]
     if not chosen:
         raise ScenarioError(f"claim {claim.says!r}: no case has the labels {claim.of}")
     span = (claim.since, claim.until)
+
+    def means(of: list[Result]) -> Array:
+        return np.array([_mean_of(one.runs, quantity, span) for one in of])
+
+    other = [one for one in results if _selected(one, claim.to or {})]
+    seconds = chosen[0].runs.seconds
+    values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
     match claim.check:
         case "flat":
-            return claims.flat(claim.says, _means(chosen), claim.level or 2.0)
+            return claims.flat(claim.says, means(chosen), claim.level or 2.0)
         case "approaches":
-            other = [one for one in results if _selected(one, claim.to or {})]
-            return claims.approaches(claim.says, _means(chosen), _means(other), claim.level or 0.5)
+            return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
         case "lower":
-            other = [one for one in results if _selected(one, claim.to or {})]
-            return claims.lower(claim.says, _means(chosen), _means(other))
+            return claims.lower(claim.says, means(chosen), means(other))
+        case "ratio":
+            return claims.ratio(claim.says, means(chosen)[0], means(other)[0], claim.between or (0.0, 1.0))
         case "stays_below":
-            return claims.stays_below(claim.says, *_curves(chosen), claim.level or 1.0, span)
+            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span)
         case "leaves":
-            return claims.leaves(claim.says, *_curves(chosen), claim.level or 1.0, span)
+            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span)
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs
@@ -216,12 +237,12 @@ def _selected(one: Case | Result, labels: Mapping[str, str]) -> bool:
     return all(one.labels[name] == label for name, label in labels.items())
 
 
-def _means(results: list[Result]) -> Array:
-    return np.array([one.runs.mean_error for one in results])
-
-
-def _curves(results: list[Result]) -> tuple[Array, Array]:
-    return results[0].runs.seconds, np.concatenate([one.runs.error for one in results])
+def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
+    """The mean of each run over a span of seconds, shape (R,); of the tracking error over all of it, every tick counts."""
+    if quantity == "error" and span == (0.0, None):
+        return runs.mean_error
+    values: Array = getattr(runs, quantity)
+    return values[:, claims.within(runs.seconds, span)].mean(axis=1)
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
@@ -232,9 +253,14 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     out.mkdir(parents=True, exist_ok=True)
     study_tables.write(out, results)
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
-    curves = [figures.Curve(one.labels, one.runs.seconds, one.runs.error, one.runs.mean_error) for one in results]
+    curves = [
+        figures.Curve(one.labels, one.runs.seconds, getattr(one.runs, study.quantity), one.runs.mean_error)
+        for one in results
+    ]
     if study.figure == "curves":
-        figures.curves(out / "figure.png", study.title, curves, [axis.name for axis in study.axes])
+        figures.curves(
+            out / "figure.png", study.title, curves, [axis.name for axis in study.axes], NAMES[study.quantity]
+        )
     elif study.figure == "sweep":
         figures.sweep(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], study.along or "")
     elif study.figure == "map":

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from affinet.study import Result
 
 
+QUANTITIES = ("error", "procrustes", "estimation_error", "covariance_trace")
+
+
 def write(out: Path, results: list[Result]) -> None:
     """`curves.parquet` with mean and standard deviation over the runs, and `runs.parquet` with the mean error of each run."""
     pq.write_table(pa.concat_tables([_curves(one) for one in results]), out / "curves.parquet")
@@ -21,10 +24,12 @@ def write(out: Path, results: list[Result]) -> None:
 
 def _curves(one: Result) -> pa.Table:
     number = len(one.runs.seconds)
+    columns = {name: [label] * number for name, label in one.labels.items()} | {"seconds": one.runs.seconds}
     with np.errstate(invalid="ignore", over="ignore"):
-        mean, deviation = one.runs.error.mean(axis=0), one.runs.error.std(axis=0)
-    labels = {name: [label] * number for name, label in one.labels.items()}
-    return pa.table(labels | {"seconds": one.runs.seconds, "mean_error": mean, "std_error": deviation})
+        for name in QUANTITIES:
+            values = getattr(one.runs, name)
+            columns |= {f"mean_{name}": values.mean(axis=0), f"std_{name}": values.std(axis=0)}
+    return pa.table(columns)
 
 
 def _runs(one: Result) -> pa.Table:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from agents import second_order
 from agents.brief import Array, Brief, Mask, Own, Reading
-from agents.controllers import Law, pilot, saturated
+from agents.controllers import Law, hold_distances, pilot, saturated
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
 from analysis.affine import Manoeuvre
 from netem.channels import INPUT
@@ -41,8 +41,10 @@ class Agent:
         Its place in the formation; with leading axes, the places of many.
     estimator, law
         What it runs.
+    leaders
+        What leaders do: fly the manoeuvre, or keep their distances from each other.
     leader_gain
-        How hard a leader pulls toward its target, per second.
+        How hard a leader pulls toward its target, per second; or toward its distances, per second and square metre.
     limit
         The longest input its body takes, in metres per second, or per second squared; None for any.
     """
@@ -50,6 +52,7 @@ class Agent:
     brief: Brief
     estimator: Estimator[Any]
     law: Law[Any]
+    leaders: Literal["pilot", "distances"]
     leader_gain: float
     limit: float | None
 
@@ -92,9 +95,12 @@ class Agent:
         """
         brief = self.brief
         own = Own(state.input if velocity is None else velocity, state.input)
-        estimator, estimate = self.estimator.fuse(brief, state.estimator, heard)
+        estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
         law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
-        if position is not None and brief.mission is not None:
+        if self.leaders == "distances":
+            held = hold_distances(brief, self.leader_gain, estimate)
+            steered = np.where(brief.leader[..., None], held, steered)
+        elif position is not None and brief.mission is not None:
             led = self._led(brief.mission, tick, position, own.velocity)
             steered = np.where(brief.leader[..., None], led, steered)
         if self.limit is not None:

@@ -47,8 +47,12 @@ class Brief:
         Which neighbour slots are real, shape (..., n).
     stress
         Weights l_ij, shape (..., n); 0 in padding.
+    leads
+        Which neighbours are leaders, shape (..., n).
     covariance
         Of one relative measurement, shape (D, D), in square metres.
+    process
+        B_i^T Q B_i, of what displaces the edges in a tick, all together, shape (..., n D, n D), in square metres; 0 in padding.
     leader
         Whether it follows the mission rather than its neighbours, shape (...).
     mission
@@ -60,7 +64,9 @@ class Brief:
     relative: Array
     present: Mask
     stress: Array
+    leads: Mask
     covariance: Array
+    process: Array
     leader: Mask
     mission: Manoeuvre | None
 
@@ -72,6 +78,8 @@ class Brief:
             relative=self.relative[row],
             present=self.present[row],
             stress=self.stress[row],
+            leads=self.leads[row],
+            process=self.process[row],
             leader=self.leader[row],
         )
 

@@ -190,6 +190,21 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
     return mission.velocity(tick, brief.nominal, brief.dt) + gain * astray
 
 
+def hold_distances(brief: Brief, gain: float, estimate: Estimate) -> Array:
+    """A leader's input among leaders that keep their distances, shape (..., D), in metres per second (paper 004, section 3.5).
+
+    The gradient of sum_j (|z_ij|^2 - |p_ij|^2)^2 / 4 over the other leaders, which all know each other.
+
+    Parameters
+    ----------
+    gain
+        Per second and square metre.
+    """
+    z, p = estimate.relative, brief.relative
+    stretch = (z * z).sum(axis=-1) - (p * p).sum(axis=-1)
+    return -gain * weighted(np.where(brief.leads & estimate.known, stretch, 0.0), z)
+
+
 def saturated(command: Array, limit: float) -> Array:
     """Inputs (..., D) shortened to this length, in their unit, where they are longer."""
     length = np.sqrt((command * command).sum(axis=-1, keepdims=True))

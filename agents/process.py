@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import zenoh
@@ -45,7 +45,7 @@ class AgentBrief:
         Where it connects, and as whom.
     agent, neighbours
         Its number, and the numbers of the agents in its neighbour slots.
-    estimator, law, leader_gain, limit, brief
+    estimator, law, leaders, leader_gain, limit, brief
         What `Agent` is made of.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
@@ -57,6 +57,7 @@ class AgentBrief:
     neighbours: tuple[int, ...]
     estimator: Choice
     law: Choice
+    leaders: Literal["pilot", "distances"]
     leader_gain: float
     limit: float | None
     brief: Brief
@@ -71,7 +72,9 @@ class Node:
         self._number = brief.agent
         self._neighbours = brief.neighbours
         self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
-        self._agent = Agent(brief.brief, brief.estimator.build(), brief.law.build(), brief.leader_gain, brief.limit)
+        self._agent = Agent(
+            brief.brief, brief.estimator.build(), brief.law.build(), brief.leaders, brief.leader_gain, brief.limit
+        )
         self._width, self._dimension = brief.brief.relative.shape
         self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
         self._state: AgentState = self._agent.init(())

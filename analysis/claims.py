@@ -48,17 +48,33 @@ def lower(says: str, mean_errors: Array, others: Array) -> Verdict:
     )
 
 
+def ratio(says: str, values: Array, others: Array, between: tuple[float, float]) -> Verdict:
+    """The mean of runs (R,) over that of others lies in an interval, and so does its 95 % confidence interval in part.
+
+    Runs are paired by their draws; the confidence interval is the delta method's.
+    """
+    found = float(values.mean() / others.mean())
+    deviation = (values - found * others).std(ddof=1) / np.sqrt(len(values)) / abs(others.mean())
+    low, high = found - 1.96 * deviation, found + 1.96 * deviation
+    holds = bool(low <= between[1] and high >= between[0])
+    return Verdict(
+        says,
+        holds,
+        f"ratio {found:.3g}, 95 % confidence {low:.3g} to {high:.3g} (asked {between[0]:g} to {between[1]:g})",
+    )
+
+
 def stays_below(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
     """In most runs (R, T) the error stays below a level all through a span of seconds."""
-    within = _within(seconds, span)
-    below = (error[:, within] < level).all(axis=1)
+    inside = within(seconds, span)
+    below = (error[:, inside] < level).all(axis=1)
     return Verdict(says, bool(below.mean() >= _MOST), f"{below.mean():.0%} of the runs stay below {level:g} m²")
 
 
 def leaves(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
     """In most runs (R, T) the error comes above a level at some time in a span of seconds, or is no number any more."""
-    within = _within(seconds, span)
-    above = ~(error[:, within] < level).all(axis=1)
+    inside = within(seconds, span)
+    above = ~(error[:, inside] < level).all(axis=1)
     return Verdict(says, bool(above.mean() >= _MOST), f"{above.mean():.0%} of the runs come above {level:g} m²")
 
 
@@ -85,7 +101,8 @@ def _mean(runs: Array) -> Array:
     return means
 
 
-def _within(seconds: Array, span: Span) -> NDArray[np.bool_]:
+def within(seconds: Array, span: Span) -> NDArray[np.bool_]:
+    """Which moments lie in a span."""
     since, until = span
     return (seconds >= since) & (seconds <= (np.inf if until is None else until))
 

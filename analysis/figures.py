@@ -29,8 +29,8 @@ class Curve:
     mean_error: Array
 
 
-def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) -> None:
-    """Error over time: a panel for each label of the first axis and each of the second, a curve for each of the third."""
+def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], quantity: str) -> None:
+    """A quantity over time: a panel for each label of the first axis and each of the second, a curve for each of the third."""
     across, down, each = axes
     columns, rows = _labels(cases, across), _labels(cases, down)
     figure = Figure(figsize=(3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
@@ -39,7 +39,7 @@ def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) 
         panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
         _draw(panel, case, case.labels[each])
         panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
-    _finish(figure, panels, title, "time (s)", "tracking error (m²)", each)
+    _finish(figure, panels, title, "time (s)", quantity, each)
     figure.savefig(path)
 
 

@@ -27,3 +27,63 @@ def tracking_error(position: Array, target: Array, present: NDArray[np.bool_]) -
     number = present.sum(axis=-1)
     total = np.where(present, squared, 0.0).sum(axis=-1)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def procrustes_error(position: Array, nominal: Array, present: NDArray[np.bool_]) -> Array:
+    """How far a swarm is from its nominal shape, turned, mirrored and moved at will (paper 004, definition 2.9).
+
+    Parameters
+    ----------
+    position
+        Shape (..., N, D), in metres.
+    nominal
+        Shape (N, D), in metres.
+    present
+        Agents that take part, shape (..., N).
+
+    Returns
+    -------
+    Array
+        min |Z Omega + 1 t^T - P|_F / N over those present, shape (...), in metres; NaN where a position is no number.
+    """
+    number = np.maximum(present.sum(axis=-1), 1)
+    Z, P = _centred(position, present), _centred(np.broadcast_to(nominal, position.shape), present)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(Z).all(axis=(-2, -1)))
+    spread: Array = np.swapaxes(np.where(finite[..., None, None], Z, 0.0), -1, -2) @ P
+    U, _, Vt = np.linalg.svd(spread)
+    squared = ((Z @ (U @ Vt) - P) ** 2).sum(axis=(-2, -1))
+    return np.where(finite, np.sqrt(squared) / number, np.nan)
+
+
+def estimation_error(estimate: Array, position: Array, neighbours: NDArray[np.intp], known: NDArray[np.bool_]) -> Array:
+    """The length of all errors of the relative positions together (paper 004, eq. 4.34), shape (...), in metres.
+
+    Parameters
+    ----------
+    estimate
+        Shape (..., N, n, D), in metres.
+    position
+        True, shape (..., N, D), in metres.
+    neighbours
+        Rows of the agents in the slots, shape (N, n).
+    known
+        Which edges have an estimate, shape (..., N, n).
+    """
+    true = position[..., :, None, :] - position[..., neighbours, :]
+    squared = ((estimate - true) ** 2).sum(axis=-1)
+    total: Array = np.sqrt(np.where(known, squared, 0.0).sum(axis=(-2, -1)))
+    return total
+
+
+def covariance_trace(triangles: Array, dimension: int) -> Array:
+    """The trace of the covariances of all edges, from their upper triangles (..., N, n, D (D + 1) / 2), shape (...), in m2."""
+    diagonal = np.cumsum([0, *range(dimension, 1, -1)])
+    total: Array = triangles[..., diagonal].sum(axis=(-3, -2, -1))
+    return total
+
+
+def _centred(points: Array, present: NDArray[np.bool_]) -> Array:
+    taking_part = present[..., None]
+    centre = np.where(taking_part, points, 0.0).sum(axis=-2, keepdims=True)
+    centre = centre / np.maximum(present.sum(axis=-1), 1)[..., None, None]
+    return np.where(taking_part, points - centre, 0.0)

@@ -61,7 +61,7 @@ class Theatre:
 
     def run(self, logbook: Logbook) -> None:
         """Fly all ticks, and write them down."""
-        scene = self._world.start()
+        scene = self._world.begin()
         for tick in range(self._world.ticks):
             fired = self._fire(tick)
             self._move_processes(tick)

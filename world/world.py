@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from netem.draws import Purpose, Seed, Tape, uniform
 from netem.links import Integers, Links, Mask
 from netem.timeline import Conditions
 from world import dynamics, sensors
+from world.disturbance import Disturbance
 from world.formation import Array, Formation
 from world.noise import normal
 
@@ -29,11 +30,14 @@ class Scene(NamedTuple):
         Theirs, shape (N, D), in metres per second: of single integrators, the input they flew in the tick before.
     measured
         What was measured in the tick before, shape (L, D), in metres.
+    disturbance
+        What displaced them from the tick before, shape (N, D), in metres.
     """
 
     position: Array
     velocity: Array
     measured: Array
+    disturbance: Array
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,13 @@ class World:
     covariance
         Of a relative measurement, shape (D, D), in square metres.
     disturbance
-        Standard deviation of the displacement that disturbs an agent in a tick, per axis, in metres.
+        What displaces the agents in every tick.
+    start
+        Where they begin: leaders on their targets and followers scattered about theirs, or all about the origin.
     spread
-        Standard deviation of the followers' initial offset from their targets, per axis, in metres.
+        Standard deviation of that scatter, per axis, in metres.
+    swarms
+        How many swarms fly side by side, each with its own disturbances.
     """
 
     seed: Seed
@@ -68,14 +76,21 @@ class World:
     links: Links
     manoeuvre: Manoeuvre
     covariance: Array
-    disturbance: float
+    disturbance: Disturbance
+    start: Literal["targets", "origin"]
     spread: float
+    swarms: int
 
-    def start(self) -> Scene:
-        """The scene in tick 0: leaders on their targets, followers scattered about theirs, everybody at rest."""
-        offset = normal(self.seed, Purpose.INITIAL_POSITION, src=self._numbers, axes=self.formation.dimension)
-        position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, self.spread * offset)
-        return Scene(position, np.zeros_like(position), sensors.relative(position, self.links))
+    def begin(self) -> Scene:
+        """The scene in tick 0: everybody where the scatter puts it, at rest."""
+        offset = self.spread * normal(
+            self.seed, Purpose.INITIAL_POSITION, src=self._numbers, axes=self.formation.dimension
+        )
+        position = offset
+        if self.start == "targets":
+            position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
+        rest = np.zeros_like(position)
+        return Scene(position, rest, sensors.relative(position, self.links), rest)
 
     def target(self, tick: int | NDArray[np.int64]) -> Array:
         """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
@@ -106,14 +121,14 @@ class World:
 
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
-        noise, still = self._disturbances.at(tick), now.still[:, None]
+        noise, still = self._disturb(tick, scene), now.still[:, None]
         if self.order == 1:
             velocity = flown
             moved = dynamics.single_integrator(scene.position, flown + now.push, self.dt, noise)
         else:
             velocity = np.where(still, 0.0, scene.velocity + self.dt * flown)
             moved = dynamics.double_integrator(scene.position, scene.velocity + now.push, flown, self.dt, noise)
-        return Scene(np.where(still, scene.position, moved), velocity, measured)
+        return Scene(np.where(still, scene.position, moved), velocity, measured, noise)
 
     @cached_property
     def _sensor_noise(self) -> Tape:
@@ -128,17 +143,23 @@ class World:
     def _numbers(self) -> Integers:
         return self.links.own_number(np.arange(1, self.formation.agents + 1))
 
+    def _disturb(self, tick: int, scene: Scene) -> Array:
+        size = self.formation.agents // self.swarms
+
+        def by_swarm(of_agents: Array) -> Array:
+            return of_agents.reshape(self.swarms, size, -1)
+
+        pushed = self.disturbance.next(
+            by_swarm(scene.disturbance),
+            by_swarm(self._pushes.at(tick)),
+            by_swarm(scene.position),
+            self.formation.nominal[:size],
+        )
+        return pushed.reshape(scene.position.shape)
+
     @cached_property
-    def _disturbances(self) -> Tape:
+    def _pushes(self) -> Tape:
+        axes = self.formation.dimension
         return Tape(
-            lambda ticks: (
-                self.disturbance
-                * normal(
-                    self.seed,
-                    Purpose.PROCESS_NOISE,
-                    tick=ticks[:, None],
-                    src=self._numbers,
-                    axes=self.formation.dimension,
-                )
-            )
+            lambda ticks: normal(self.seed, Purpose.PROCESS_NOISE, tick=ticks[:, None], src=self._numbers, axes=axes)
         )

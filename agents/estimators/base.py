@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.small import triangle
 
 State = TypeVar("State")
@@ -88,8 +88,8 @@ class Estimator(Protocol[State]):
     def sense(self, brief: Brief, state: State, measured: Array, seen: Mask) -> tuple[State, Mapping[str, Fields]]:
         """Take in the measurements y_ij (..., n, D) of the edges `seen` (..., n); say what to broadcast on each channel."""
 
-    def fuse(self, brief: Brief, state: State, heard: Mapping[str, Heard]) -> tuple[State, Estimate]:
-        """Take in what the neighbours broadcast, and estimate."""
+    def fuse(self, brief: Brief, state: State, heard: Mapping[str, Heard], own: Own) -> tuple[State, Estimate]:
+        """Take in what the neighbours broadcast, and estimate; `own` is what the agent itself flew from the tick before."""
 
 
 def no_indicator(known: Mask) -> Array:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
 from agents.estimators.constraints import MAPS, Constraint
@@ -76,7 +76,13 @@ class ConsensusLocalization:
         }
         return state._replace(perceived=Perceived(measured, seen, local), consensus=consensus), {THETA: said}
 
-    def fuse(self, brief: Brief, state: Agreement, heard: Mapping[str, Heard]) -> tuple[Agreement, Estimate]:
+    def fuse(
+        self,
+        brief: Brief,
+        state: Agreement,
+        heard: Mapping[str, Heard],
+        own: Own,  # noqa: ARG002
+    ) -> tuple[Agreement, Estimate]:
         """One step of consensus; complete the measurements by its map."""
         said = heard[THETA]
         voices = said.fresh & said.fields["started"]

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Estimator, Fields, Heard
 from agents.estimators.conral import Agreement, ConsensusLocalization
 from agents.estimators.constraints import Constraint
@@ -64,10 +64,10 @@ class GeometryAwareFilter(EdgeFilters):
         shape, said = self._shaper.sense(brief, state.shape, measured, seen)
         return state._replace(shape=shape), said
 
-    def fuse(self, brief: Brief, state: Fusion, heard: Mapping[str, Heard]) -> tuple[Fusion, Estimate]:
+    def fuse(self, brief: Brief, state: Fusion, heard: Mapping[str, Heard], own: Own) -> tuple[Fusion, Estimate]:
         """Correct every edge by its measurement, or else by its place in the perceived shape."""
         seen = _perceived(state.shape).seen
-        shape, observed = self._shaper.fuse(brief, state.shape, heard)
+        shape, observed = self._shaper.fuse(brief, state.shape, heard, own)
         trusted = np.isfinite(observed.psi)
         R = observed.covariance
         if self.constraint != "affine":

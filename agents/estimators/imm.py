@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
 from agents.estimators.small import determinant, inverse
@@ -90,6 +90,7 @@ class InteractingMultipleModel:
         brief: Brief,
         state: Modes,
         heard: Mapping[str, Heard],  # noqa: ARG002
+        own: Own,  # noqa: ARG002
     ) -> tuple[Modes, Estimate]:
         """The mean over the models, and the covariance about it."""
         mixed = _mix(state.mean, state.covariance, state.probability[..., :, None])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
 
 
@@ -47,6 +47,7 @@ class NoEstimator:
         brief: Brief,
         state: Measured,
         heard: Mapping[str, Heard],  # noqa: ARG002
+        own: Own,  # noqa: ARG002
     ) -> tuple[Measured, Estimate]:
         """The measurements."""
         covariance = np.broadcast_to(brief.covariance, (*state.seen.shape, *brief.covariance.shape))

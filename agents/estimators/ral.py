@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import geometry
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
 from agents.estimators.constraints import MAPS, Constraint
@@ -60,7 +60,13 @@ class RelativeAffineLocalization:
         local = MAPS[self.constraint].fit(brief.relative, measured, seen)
         return Perceived(measured, seen, local), {THETA: {"local": local.theta, "feasible": local.feasible}}
 
-    def fuse(self, brief: Brief, state: Perceived, heard: Mapping[str, Heard]) -> tuple[Perceived, Estimate]:
+    def fuse(
+        self,
+        brief: Brief,
+        state: Perceived,
+        heard: Mapping[str, Heard],
+        own: Own,  # noqa: ARG002
+    ) -> tuple[Perceived, Estimate]:
         """Complete the measurements by the local map."""
         said = heard[THETA]
         psi = geometry.indicator(state.local, said.fields["local"], said.fresh & said.fields["feasible"])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask
+from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
 
@@ -92,6 +92,7 @@ class RelativeKalmanFilter(EdgeFilters):
         brief: Brief,
         state: Tracks,
         heard: Mapping[str, Heard],  # noqa: ARG002
+        own: Own,  # noqa: ARG002
     ) -> tuple[Tracks, Estimate]:
         """The filters' positions."""
         return state, self.estimate(brief, state, no_indicator(state.known))

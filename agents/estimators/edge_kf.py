@@ -1,0 +1,95 @@
+"""The edge Kalman filter (paper 001, (5a)-(5g); paper 004, Algorithms 5 and 8): an edge moves as the inputs of its ends say.
+
+A neighbour says what it flew from the tick before. Where that is lost, an autoregressive model predicts it from what was heard
+earlier, and (6.3) widens the covariance, with the dt^2 that the printed algorithms leave out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own
+from agents.estimators import inputs, kalman
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.geometry import identity
+from netem.channels import INPUT
+
+
+class Edges(NamedTuple):
+    """The filters: mean (..., n, D), covariance (..., n, D, D), the neighbours' inputs, and what was measured in this tick."""
+
+    mean: Array
+    covariance: Array
+    flown: inputs.Flown
+    measured: Array
+    seen: Mask
+
+
+@dataclass(frozen=True)
+class EdgeKalmanFilter:
+    """One filter an edge, predicted by communicated inputs.
+
+    Parameters
+    ----------
+    prior_position
+        Standard deviation of an agent's initial position, per axis, in metres; that of an edge is twice as uncertain (5b).
+    coefficients
+        Of the autoregressive model for inputs that are not heard (6.5), the latest first: 1 holds the last, none takes
+        the neighbour for at rest.
+    sigma_n
+        Standard deviation of what drives that model, per axis, in metres per second.
+    """
+
+    prior_position: float = 1.0
+    coefficients: Sequence[float] = (1.0,)
+    sigma_n: float = 0.0
+
+    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+        """Nothing beyond the inputs that every agent broadcasts."""
+        return {}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Edges:
+        """Everybody at the same place, as far as is known (5a)."""
+        shape = (*batch, brief.relative.shape[-2])
+        prior = 2.0 * self.prior_position**2 * identity(brief.dimension)
+        return Edges(
+            mean=np.zeros((*shape, brief.dimension)),
+            covariance=np.broadcast_to(prior, (*shape, *prior.shape)).copy(),
+            flown=inputs.at_rest(shape, brief.dimension, len(self.coefficients)),
+            measured=np.zeros((*shape, brief.dimension)),
+            seen=np.zeros(shape, dtype=bool),
+        )
+
+    def sense(
+        self,
+        brief: Brief,  # noqa: ARG002
+        state: Edges,
+        measured: Array,
+        seen: Mask,
+    ) -> tuple[Edges, Mapping[str, Fields]]:
+        """Keep the measurements until it is known how the edges have moved."""
+        return state._replace(measured=measured, seen=seen), {}
+
+    def fuse(self, brief: Brief, state: Edges, heard: Mapping[str, Heard], own: Own) -> tuple[Edges, Estimate]:
+        """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g)."""
+        flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
+        theirs, doubt = flown.last
+        mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
+        covariance = state.covariance + of_edges(brief) + brief.dt**2 * doubt
+        filters = kalman.correct(mean, covariance, state.measured, brief.covariance, state.seen)
+        estimate = Estimate(
+            filters[0], np.broadcast_to(brief.present, state.seen.shape), filters[1], no_indicator(state.seen)
+        )
+        return state._replace(mean=filters[0], covariance=filters[1], flown=flown), estimate
+
+
+def of_edges(brief: Brief) -> Array:
+    """Q_ij = B_ij^T Q B_ij of every edge by itself, shape (..., n, D, D): the diagonal blocks of the agent's."""
+    slots, dimension = brief.relative.shape[-2:]
+    blocks = brief.process.reshape(*brief.process.shape[:-2], slots, dimension, slots, dimension)
+    diagonal: Array = np.moveaxis(np.diagonal(blocks, axis1=-4, axis2=-2), -1, -3)
+    return diagonal

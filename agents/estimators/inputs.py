@@ -1,0 +1,64 @@
+"""What the neighbours flew from the tick before: as heard, or predicted from what was heard before (paper 004, section 6.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array
+from agents.estimators.base import Heard
+
+
+class Flown(NamedTuple):
+    """Inputs of the neighbours in the last p ticks, newest first, (..., n, p, D), and their covariances (..., n, p, D, D)."""
+
+    inputs: Array
+    covariance: Array
+
+    @property
+    def last(self) -> tuple[Array, Array]:
+        """The newest, shape (..., n, D), and its covariance, shape (..., n, D, D)."""
+        return self.inputs[..., 0, :], self.covariance[..., 0, :, :]
+
+
+def at_rest(shape: tuple[int, ...], dimension: int, order: int) -> Flown:
+    """Everybody at rest so far, surely; `shape` is (..., n)."""
+    past = (*shape, max(order, 1), dimension)
+    return Flown(np.zeros(past), np.zeros((*past, dimension)))
+
+
+def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float) -> Flown:
+    """The inputs a tick later: those said are known, the others follow an autoregressive model (6.5).
+
+    Parameters
+    ----------
+    flown
+        As of the tick before.
+    said
+        What arrived on the channel of inputs.
+    coefficients
+        a_1 .. a_p of the model, the same for all axes; none leaves who is not heard at rest.
+    sigma
+        Standard deviation of what drives the model, per axis, in metres per second.
+
+    Raises
+    ------
+    ValueError
+        When the neighbours' inputs are accelerations.
+    """
+    if "acceleration" in said.fields:
+        raise ValueError("this estimator predicts by inputs that are velocities; it is for single integrators")
+    dimension = flown.inputs.shape[-1]
+    a = np.array(coefficients, dtype=np.float64)
+    # One-step prediction (6.6) with its covariance (6.18), which is that of (6.10) where the past is known.
+    expected = (flown.inputs[..., : len(a), :] * a[:, None]).sum(axis=-2)
+    spread = (flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None]).sum(axis=-3)
+    spread = spread + (sigma**2 if len(a) else 0.0) * np.eye(dimension)
+    newest = np.where(said.fresh[..., None], said.fields["velocity"], expected)
+    doubt = np.where(said.fresh[..., None, None], 0.0, spread)
+    return Flown(
+        np.concatenate([newest[..., None, :], flown.inputs[..., :-1, :]], axis=-2),
+        np.concatenate([doubt[..., None, :, :], flown.covariance[..., :-1, :, :]], axis=-3),
+    )

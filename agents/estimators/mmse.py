@@ -1,0 +1,62 @@
+"""The MMSE filter (paper 004, Algorithm 4, with the sign of (4.21) put right): the last estimate is the prior of the next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own
+from agents.estimators import kalman
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.geometry import identity
+
+
+class Recent(NamedTuple):
+    """The estimates, shape (..., n, D), and their covariances, shape (..., n, D, D)."""
+
+    mean: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class MinimumMeanSquareError:
+    """Each tick's measurement, drawn toward the last estimate, which begins at zero; an edge not measured stays as it was.
+
+    Parameters
+    ----------
+    sigma_prior
+        Standard deviation of the prior about the last estimate, per axis, in metres.
+    """
+
+    sigma_prior: float = 0.1
+
+    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+        """Nothing."""
+        return {}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Recent:
+        """Everybody at the same place."""
+        square = (*batch, brief.relative.shape[-2], brief.dimension, brief.dimension)
+        return Recent(np.zeros(square[:-1]), np.broadcast_to(self._prior(brief), square).copy())
+
+    def sense(self, brief: Brief, state: Recent, measured: Array, seen: Mask) -> tuple[Recent, Mapping[str, Fields]]:
+        """Correct the last estimates (4.20)."""
+        prior = np.broadcast_to(self._prior(brief), state.covariance.shape)
+        return Recent(*kalman.correct(state.mean, prior, measured, brief.covariance, seen)), {}
+
+    def fuse(
+        self,
+        brief: Brief,
+        state: Recent,
+        heard: Mapping[str, Heard],  # noqa: ARG002
+        own: Own,  # noqa: ARG002
+    ) -> tuple[Recent, Estimate]:
+        """The estimates."""
+        known = np.broadcast_to(brief.present, state.mean.shape[:-1])
+        return state, Estimate(state.mean, known, state.covariance, no_indicator(known))
+
+    def _prior(self, brief: Brief) -> Array:
+        return self.sigma_prior**2 * identity(brief.dimension)
