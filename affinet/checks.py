@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -39,6 +40,16 @@ class Finding:
 def framework(formation: Formation) -> list[Finding]:
     """Whether graph, positions and leaders can carry an affine formation at all."""
     return [_connected(formation), _edges(formation), _leaders(formation)]
+
+
+def leaders_apart(formation: Formation) -> Finding:
+    """Whether all leaders see each other, as those that keep their distances must."""
+    seen = {frozenset(edge) for edge in formation.edges}
+    missing = [f"{i}-{j}" for i, j in combinations(sorted(formation.leaders), 2) if frozenset((i, j)) not in seen]
+    if missing:
+        says = f"leaders that keep their distances must all see each other: there is no edge {', '.join(missing)}"
+        return Finding("leaders apart", "error", says)
+    return Finding("leaders apart", "ok", "the leaders all see each other, and can keep their distances")
 
 
 def not_rigid(why: str) -> Finding:

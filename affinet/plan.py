@@ -178,6 +178,8 @@ def _make(given: Scenario) -> Plan:
     law = _choice(given, registry.LAWS, "law", given.agents.law)
     _check_order(given, law.build())
     findings = checks.framework(formation)
+    if given.agents.leaders == "distances":
+        findings.append(checks.leaders_apart(formation))
     if any(finding.fatal for finding in findings):
         raise PlanError(findings)
     try:
@@ -225,6 +227,8 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
         raise ScenarioError(
             f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations"
         )
+    if given.agents.leaders == "distances" and law.order != 1:
+        raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if law.order != given.dynamics.order:
         steers = ("velocities", "accelerations")[law.order - 1]
         fits = ("single-integrator", "double-integrator")[law.order - 1]
