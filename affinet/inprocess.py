@@ -14,6 +14,7 @@ import numpy as np
 from affinet.plan import Plan
 from agents.agent import Action, AgentState, chosen, renew
 from agents.brief import Reading
+from agents.centre import Centre
 from agents.estimators.base import Fields, Heard
 from analysis.affine import Array
 from netem import channels, lie
@@ -48,6 +49,9 @@ class Swarm:
         self._medium = Medium(plan.world.seed, plan.channels, plan.profiles, self.timeline, plan.recorded())
         self._said: dict[int, Broadcasts] = {}
         self._air = self._medium.begin()
+        self._centre = plan.centre
+        if self._centre:
+            self._whole = self._centre.begin((plan.world.swarms,))
 
     @property
     def in_flight(self) -> int:
@@ -92,11 +96,21 @@ class Swarm:
         self._said[tick] = self._as_told(said, now)
         self._air, delivery = self._medium.deliver(air, tick, verdicts)
         heard = {name: self._hear(name, delivery) for name in self._fields}
+        if self._centre:
+            heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, velocity)
         if now.idle.any():
             state = renew(state, before, now.idle)
         self._forget(tick)
         return state, self._moment(tick, scene, now, action, verdicts, delivery)
+
+    def _from_the_centre(self, centre: Centre, measured: Array, seen: Mask, inputs: Array) -> Heard:
+        def of_swarms(array: Any) -> Any:
+            return array.reshape(self._plan.world.swarms, len(centre.neighbours), *array.shape[1:])
+
+        self._whole, told = centre.step(self._whole, of_swarms(measured), of_swarms(seen), of_swarms(inputs))
+        fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in told._asdict().items()}
+        return Heard(fields, seen)
 
     def _reading(self, tick: int) -> Reading:
         """What the clocks say; one reading for all, where they agree, spares looking up the manoeuvre for each."""

@@ -13,9 +13,11 @@ from typing import Any
 from affinet.inject import Access
 from affinet.plan import Plan
 from affinet.supervision import Child, Crew, RunFailed, module
+from agents.centre import Centre
+from agents.centre_process import CentreBrief
 from agents.process import AgentBrief
 from netem.process import MediumBrief
-from netem.session import CONTROL, HUB, WORLD, Login, agent_name
+from netem.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name
 from world.brief import WorldBrief
 
 # The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
@@ -109,13 +111,22 @@ class Launcher:
         self._logins = self._make_logins(private)
         crew.start("world", module("world"), self._world_brief(self._logins[WORLD]))
         crew.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
+        if self._plan.centre:
+            login = self._logins[CENTRE]
+            crew.start("centre", module("agents.centre_process"), self._centre_brief(self._plan.centre, login))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(crew, number)
         self._await_ready(crew, crew.children)
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
         endpoint = f"unixsock-stream/{private}/z.sock"
-        names = [HUB, WORLD, CONTROL, *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1))]
+        names = [
+            HUB,
+            WORLD,
+            CONTROL,
+            CENTRE,
+            *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1)),
+        ]
         logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
         users = private / "users"
         users.touch(mode=0o600)
@@ -207,6 +218,9 @@ class Launcher:
             leaders=self._plan.world.formation.is_leader,
             patience_s=_MEDIUM_PATIENCE_S,
         )
+
+    def _centre_brief(self, centre: Centre, login: Login) -> CentreBrief:
+        return CentreBrief(self._run, login, self._plan.world.ticks, centre, _MEDIUM_PATIENCE_S)
 
     def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
         plan, row = self._plan, number - 1

@@ -15,12 +15,14 @@ from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
 from agents.brief import Brief, Mask
+from agents.centre import Centre
 from agents.controllers import Law, needs_mission
 from agents.estimators.base import Heard
+from agents.estimators.centralized import CentralizedFilter
 from agents.process import Choice
 from analysis.affine import Array, Manoeuvre
 from netem import channels
-from netem.fault import Fault
+from netem.fault import Fault, Verb
 from netem.links import Links
 from netem.medium import Verdicted, recorded
 from netem.profile import Profile
@@ -105,6 +107,23 @@ class Plan:
         """Which agents know the manoeuvre, and fly it by their clocks, shape (N,)."""
         piloted = self.world.formation.is_leader & (self.scenario.agents.leaders == "pilot")
         return piloted | needs_mission(self.law.build())
+
+    @cached_property
+    def centre(self) -> Centre | None:
+        """The filter that hears everybody, where the estimator wants one; of one swarm, however many fly side by side."""
+        estimator, world = self.estimator.build(), self.world
+        if not isinstance(estimator, CentralizedFilter):
+            return None
+        size, links = world.formation.agents // world.swarms, world.links
+        Q_A = world.disturbance.between(world.formation.nominal[:size])
+        return Centre(
+            dt=world.dt,
+            neighbours=links.neighbours[:size],
+            present=links.present[:size],
+            measurement=world.covariance,
+            process=np.asarray(np.kron(Q_A, world.disturbance.covariance), dtype=np.float64),
+            prior_position=estimator.prior_position,
+        )
 
     @property
     def agents(self) -> Agent:
@@ -193,6 +212,8 @@ def _make(given: Scenario) -> Plan:
     world = _world(given, formation)
     brief = _brief(world, L)
     played = script.write(given, formation, world.links)
+    if isinstance(estimator.build(), CentralizedFilter):
+        _refuse_absences(played.faults)
     agents = _agents(given, brief, estimator, law)
     with sections.said_at("agents"):
         _try_out(agents)
@@ -243,6 +264,13 @@ def _agents(given: Scenario, brief: Brief, estimator: Choice, law: Choice) -> Ag
     return Agent(brief, estimator.build(), law.build(), flown.leaders, flown.leader_gain, flown.limit)
 
 
+def _refuse_absences(faults: Sequence[Fault]) -> None:
+    if any(fault.verb in (Verb.KILL, Verb.PAUSE) for fault in faults):
+        raise ScenarioError(
+            "timeline: the centralized filter waits for every agent in every tick; nobody can be killed or paused"
+        )
+
+
 def _try_out(agents: Agent) -> None:
     """One tick in silence: what law and estimator want of each other shows before anything starts."""
     brief, batch = agents.brief, agents.brief.present.shape[:1]
@@ -253,7 +281,8 @@ def _try_out(agents: Agent) -> None:
         channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
         for channel, fields in agents.channels().items()
     }
-    agents.act(state, 0, silence, nowhere, velocity)
+    told = {"relative": np.zeros_like(brief.relative), "covariance": np.zeros((*nobody.shape, *brief.covariance.shape))}
+    agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
 
 
 def formation_of(given: Scenario) -> Formation:

@@ -62,7 +62,7 @@ class Claim(Section):
     to: Labels | None = None
     quantity: Quantity | None = None
     level: float | None = None
-    between: tuple[float, float] | None = None
+    between: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     since: float = 0.0
     until: float | None = None
 
@@ -221,7 +221,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
         case "lower":
             return claims.lower(claim.says, means(chosen), means(other))
         case "ratio":
-            return claims.ratio(claim.says, means(chosen)[0], means(other)[0], claim.between or (0.0, 1.0))
+            return claims.ratio(claim.says, means(chosen)[0], means(other)[0], claim.between or [0.0, 1.0])
         case "stays_below":
             return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span)
         case "leaves":
@@ -242,7 +242,10 @@ def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
     if quantity == "error" and span == (0.0, None):
         return runs.mean_error
     values: Array = getattr(runs, quantity)
-    return values[:, claims.within(runs.seconds, span)].mean(axis=1)
+    inside = claims.within(runs.seconds, span)
+    if not inside.any():
+        raise ScenarioError(f"a claim looks at {span[0]:g} s and later, but the runs end at {runs.seconds[-1]:g} s")
+    return values[:, inside].mean(axis=1)
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:

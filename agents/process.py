@@ -15,6 +15,7 @@ from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Array, Brief
 from agents.estimators.base import Heard
+from agents.estimators.centralized import CentralizedFilter
 from netem import channels, wire
 from netem.keys import Keys
 from netem.sequence import Numbering, Sequences
@@ -95,6 +96,10 @@ class Node:
         spoken = sorted([channels.MEASUREMENT, *self._channels])
         self._broadcasts = {name: session.declare_publisher(keys.broadcast(self._number, name)) for name in spoken}
         self._act = session.declare_publisher(keys.act(self._number))
+        centralized = isinstance(self._agent.estimator, CentralizedFilter)
+        ears: Any = zenoh.handlers.FifoChannel(64)
+        self._told = session.declare_subscriber(keys.told(self._number), ears) if centralized else None
+        self._tellings = Sequences("the centre's")
 
     def await_everybody(self) -> None:
         """Wait until the medium and the world listen."""
@@ -129,7 +134,8 @@ class Node:
 
     def _exchange(self, inbox: wire.ExchangeInbox, sensed: wire.SenseInbox) -> None:
         self._heard += len(inbox.messages)
-        heard, position, velocity = self._gather(inbox.messages), _numbers(sensed.position), _numbers(sensed.velocity)
+        heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
+        position, velocity = _numbers(sensed.position), _numbers(sensed.velocity)
         self._state, action = self._agent.act(self._state, sensed.clock, heard, position, velocity)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
@@ -147,6 +153,16 @@ class Node:
             heard=self._heard,
         )
         self._act.put(wire.pack(act))
+
+    def _from_the_centre(self, tick: int) -> Mapping[str, Heard]:
+        if self._told is None:
+            return {}
+        told = wire.unpack(wire.Told, self._told.recv().payload.to_bytes())
+        self._tellings.check("told", told.seq)
+        if told.k != tick:
+            raise wire.WireError(f"the centre told of tick {told.k} in tick {tick}")
+        fields = {name: np.array(getattr(told, name), dtype=np.float64) for name in ("relative", "covariance")}
+        return {channels.CENTRE: Heard(fields, np.ones(self._width, dtype=bool))}
 
     def _gather(self, messages: wire.Rows) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ def lower(says: str, mean_errors: Array, others: Array) -> Verdict:
     )
 
 
-def ratio(says: str, values: Array, others: Array, between: tuple[float, float]) -> Verdict:
+def ratio(says: str, values: Array, others: Array, between: Sequence[float]) -> Verdict:
     """The mean of runs (R,) over that of others lies in an interval, and so does its 95 % confidence interval in part.
 
     Runs are paired by their draws; the confidence interval is the delta method's.

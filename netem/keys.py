@@ -23,6 +23,10 @@ class Keys:
         """An agent's control input, and what it reports about itself (agent to world)."""
         return f"affinet/{self.run}/agent/{agent}/act"
 
+    def told(self, agent: int | str) -> str:
+        """What a centralized filter tells an agent (centre to agent, past the medium)."""
+        return f"affinet/{self.run}/agent/{agent}/told"
+
     @property
     def sense(self) -> str:
         """The world's raw sensing of a tick (world to medium)."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgpack
 import numpy as np
@@ -78,6 +78,8 @@ def _reader(hint: Any) -> Reader:
         return _array(hint)
     if origin is tuple:
         return _tuple(hint)
+    if origin is Literal:
+        return _word(get_args(hint))
     if origin in (dict, Mapping):
         return _map(hint)
     if origin is list:
@@ -122,6 +124,15 @@ def _list(value: Any) -> list[Any]:
     if type(value) is not list:
         raise _refuse("a list", value)
     return value
+
+
+def _word(words: tuple[str, ...]) -> Reader:
+    def read(value: Any) -> str:
+        if type(value) is not str or value not in words:
+            raise _refuse(f"one of {list(words)}", value)
+        return value
+
+    return read
 
 
 def _enum(kind: type[Enum]) -> Reader:

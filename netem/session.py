@@ -13,11 +13,13 @@ from typing import Any
 
 import zenoh
 
+from netem.channels import INPUT, MEASUREMENT
 from netem.keys import Keys
 
 HUB = "netem"
 WORLD = "world"
 CONTROL = "control"
+CENTRE = "centre"
 
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
 _RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
@@ -114,10 +116,16 @@ def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
             _rights(
                 agent_name(agent),
                 says=[keys.broadcast(agent, "*"), keys.act(agent)],
-                hears=[keys.inbox(agent)],
+                hears=[keys.inbox(agent), keys.told(agent)],
                 learns=[keys.broadcast("*", "*"), keys.act("*")],
             )
             for agent in agents
+        ),
+        _rights(
+            CENTRE,
+            says=[keys.told("*")],
+            hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
+            learns=[keys.told("*")],
         ),
         _controls(keys),
     ]

@@ -125,6 +125,20 @@ class Act(NamedTuple):
     heard: int
 
 
+class Told(NamedTuple):
+    """Centre to agent: its edges as the centralized filter sees them.
+
+    `relative` has a row for each slot, shape (n, D), in metres, 0 in padding, `covariance` theirs, shape (n, D, D), in square
+    metres.
+    """
+
+    k: int
+    src: str
+    seq: int
+    relative: Array | Rows
+    covariance: Array | Rows
+
+
 class Journal(NamedTuple):
     """Medium to world: the verdicts of tick k.
 

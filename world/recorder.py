@@ -13,6 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from analysis.metrics import procrustes_error
 from netem.fate import REASONS, Fate, Fates
 from netem.links import Links
 from netem.timeline import Conditions, Timeline
@@ -95,6 +96,9 @@ class Recorder:
         self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], moments.position[kept])
         self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
+        present = timeline.present(moments.ticks[kept].tolist())
+        shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
+        self._scalars("metrics/procrustes", time, shape[:, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
         numbers = np.arange(1.0, self._formation.agents + 1.0)
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
@@ -118,6 +122,7 @@ class Recorder:
             ),
             ("swarm/graph/functional", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.8))),
             ("metrics/tracking_error", rr.SeriesLines(names="tracking error (m²)", colors=0xFFFFFFFF)),
+            ("metrics/procrustes", rr.SeriesLines(names="Procrustes error (m)", colors=0xFFFFFFFF)),
             ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),
             ("metrics/infeasible", rr.SeriesPoints(names=[f"agent {number}" for number in numbers], marker_sizes=2.0)),
             (
@@ -246,7 +251,10 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
         overrides={"swarm/trail": rrb.VisibleTimeRanges([trail])},
     )
     plots = rrb.Vertical(
-        rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
+        rrb.Tabs(
+            rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
+            rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
+        ),
         rrb.Tabs(
             rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
             rrb.TimeSeriesView(origin="metrics/infeasible", name="agents whose neighbours determine no local map"),

@@ -1,0 +1,60 @@
+"""An agent's end of the centralized filter: it takes its edges as the centre tells them (`agents/centre.py`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from netem.channels import CENTRE
+
+
+class Nothing(NamedTuple):
+    """It remembers nothing: the centre does."""
+
+
+@dataclass(frozen=True)
+class CentralizedFilter:
+    """CRKF, or C-Edge-KF: a process of its own hears all measurements and inputs, past the medium, and tells everybody.
+
+    Parameters
+    ----------
+    prior_position
+        Standard deviation of an agent's initial position, per axis, in metres.
+    """
+
+    prior_position: float = 1.0
+
+    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+        """Nothing."""
+        return {}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+        """Nothing to remember."""
+        return Nothing()
+
+    def sense(
+        self,
+        brief: Brief,  # noqa: ARG002
+        state: Nothing,
+        measured: Array,  # noqa: ARG002
+        seen: Mask,  # noqa: ARG002
+    ) -> tuple[Nothing, Mapping[str, Fields]]:
+        """What is measured goes to the centre with every agent's measurements."""
+        return state, {}
+
+    def fuse(
+        self,
+        brief: Brief,
+        state: Nothing,
+        heard: Mapping[str, Heard],
+        own: Own,  # noqa: ARG002
+    ) -> tuple[Nothing, Estimate]:
+        """What the centre tells."""
+        told = heard[CENTRE].fields
+        known = np.broadcast_to(brief.present, told["relative"].shape[:-1])
+        return state, Estimate(told["relative"], known, told["covariance"], no_indicator(known))
