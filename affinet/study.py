@@ -35,11 +35,11 @@ from world.formation import Array
 Labels = dict[str, str]
 Quantity = Literal["error", "procrustes", "estimation_error", "covariance_trace"]
 
-NAMES: dict[Quantity, str] = {
-    "error": "tracking error (m²)",
-    "procrustes": "Procrustes error (m)",
-    "estimation_error": "estimation error (m)",
-    "covariance_trace": "trace of the covariances (m²)",
+NAMES: dict[Quantity, tuple[str, str]] = {
+    "error": ("tracking error", "m²"),
+    "procrustes": ("Procrustes error", "m"),
+    "estimation_error": ("estimation error", "m"),
+    "covariance_trace": ("trace of the covariances", "m²"),
 }
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
@@ -205,7 +205,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     chosen = [one for one in results if _selected(one, claim.of)]
     if not chosen:
         raise ScenarioError(f"claim {claim.says!r}: no case has the labels {claim.of}")
-    span = (claim.since, claim.until)
+    span, unit = (claim.since, claim.until), NAMES[quantity][1]
 
     def means(of: list[Result]) -> Array:
         return np.array([_mean_of(one.runs, quantity, span) for one in of])
@@ -215,17 +215,17 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
     match claim.check:
         case "flat":
-            return claims.flat(claim.says, means(chosen), claim.level or 2.0)
+            return claims.flat(claim.says, means(chosen), claim.level or 2.0, unit)
         case "approaches":
             return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
         case "lower":
-            return claims.lower(claim.says, means(chosen), means(other))
+            return claims.lower(claim.says, means(chosen), means(other), unit)
         case "ratio":
             return claims.ratio(claim.says, means(chosen)[0], means(other)[0], claim.between or [0.0, 1.0])
         case "stays_below":
-            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span)
+            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "leaves":
-            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span)
+            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs
@@ -261,9 +261,8 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
         for one in results
     ]
     if study.figure == "curves":
-        figures.curves(
-            out / "figure.png", study.title, curves, [axis.name for axis in study.axes], NAMES[study.quantity]
-        )
+        what, unit = NAMES[study.quantity]
+        figures.curves(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], f"{what} ({unit})")
     elif study.figure == "sweep":
         figures.sweep(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], study.along or "")
     elif study.figure == "map":

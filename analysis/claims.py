@@ -25,11 +25,13 @@ class Verdict:
     found: str
 
 
-def flat(says: str, mean_errors: Array, factor: float) -> Verdict:
+def flat(says: str, mean_errors: Array, factor: float, unit: str) -> Verdict:
     """Over the cases (S, R), the mean over the runs varies by no more than a factor."""
     means = _mean(mean_errors)
     ratio = float(means.max() / means.min())
-    return Verdict(says, ratio <= factor, f"largest over smallest {ratio:.2f} (allowed {factor:g}): {_list(means)} m²")
+    return Verdict(
+        says, ratio <= factor, f"largest over smallest {ratio:.2f} (allowed {factor:g}): {_list(means)} {unit}"
+    )
 
 
 def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Verdict:
@@ -40,12 +42,12 @@ def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Ve
     return Verdict(says, bool(ratio[0] >= share and growth >= _DOUBLE), found)
 
 
-def lower(says: str, mean_errors: Array, others: Array) -> Verdict:
+def lower(says: str, mean_errors: Array, others: Array, unit: str) -> Verdict:
     """In every case (S, R), the mean is below the other's by three standard errors; runs are paired by their draws."""
     difference = others - mean_errors
     mean, error = _mean(difference), difference.std(axis=1, ddof=1) / np.sqrt(difference.shape[1])
     return Verdict(
-        says, bool((mean > _STANDARD_ERRORS * error).all()), f"lower by {_list(mean)} m² (one s.e. {_list(error)})"
+        says, bool((mean > _STANDARD_ERRORS * error).all()), f"lower by {_list(mean)} {unit} (one s.e. {_list(error)})"
     )
 
 
@@ -65,18 +67,18 @@ def ratio(says: str, values: Array, others: Array, between: Sequence[float]) -> 
     )
 
 
-def stays_below(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
+def stays_below(says: str, seconds: Array, error: Array, level: float, span: Span, unit: str) -> Verdict:
     """In most runs (R, T) the error stays below a level all through a span of seconds."""
     inside = within(seconds, span)
     below = (error[:, inside] < level).all(axis=1)
-    return Verdict(says, bool(below.mean() >= _MOST), f"{below.mean():.0%} of the runs stay below {level:g} m²")
+    return Verdict(says, bool(below.mean() >= _MOST), f"{below.mean():.0%} of the runs stay below {level:g} {unit}")
 
 
-def leaves(says: str, seconds: Array, error: Array, level: float, span: Span) -> Verdict:
+def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, unit: str) -> Verdict:
     """In most runs (R, T) the error comes above a level at some time in a span of seconds, or is no number any more."""
     inside = within(seconds, span)
     above = ~(error[:, inside] < level).all(axis=1)
-    return Verdict(says, bool(above.mean() >= _MOST), f"{above.mean():.0%} of the runs come above {level:g} m²")
+    return Verdict(says, bool(above.mean() >= _MOST), f"{above.mean():.0%} of the runs come above {level:g} {unit}")
 
 
 def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Verdict:
