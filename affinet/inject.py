@@ -11,7 +11,7 @@ from pathlib import Path
 import zenoh
 
 from affinet import selectors
-from affinet.plan import formation_of
+from affinet.blueprint import formation_of
 from affinet.sections import Scenario
 from netem import wire
 from netem.control import Action, Answer, Order

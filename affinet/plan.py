@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from affinet import air, checks, registry, scenario, script, sections, selectors
+from affinet import air, checks, registry, scenario, script, sections
+from affinet.blueprint import brief_of, formation_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
@@ -20,22 +21,15 @@ from agents.controllers import Law, needs_mission
 from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from agents.process import Choice
-from analysis.affine import Array, Manoeuvre
 from netem import channels
 from netem.fault import Fault, Verb
-from netem.links import Links
 from netem.medium import Verdicted, recorded
 from netem.profile import Profile
 from netem.timeline import Timeline
 from netem.trigger import Trigger
-from world import maneuver, stress
+from world import stress
 from world.brief import Books
-from world.disturbance import Disturbance, Kernel
-from world.formation import PRESETS, Formation
 from world.world import World
-
-# Presets that are flown in so many dimensions.
-_MANOEUVRES = {"corridor": (2, maneuver.corridor), "ravine": (3, maneuver.ravine)}
 
 
 class PlanError(ValueError):
@@ -209,8 +203,8 @@ def _make(given: Scenario) -> Plan:
     findings += checks.closed_loop(formation, L, law.build(), estimator.build(), given.time.dt)
     if any(finding.fatal for finding in findings):
         raise PlanError(findings)
-    world = _world(given, formation)
-    brief = _brief(world, L)
+    world = world_of(given, formation)
+    brief = brief_of(world, L)
     played = script.write(given, formation, world.links)
     if isinstance(estimator.build(), CentralizedFilter):
         _refuse_absences(played.faults)
@@ -283,102 +277,6 @@ def _try_out(agents: Agent) -> None:
     }
     told = {"relative": np.zeros_like(brief.relative), "covariance": np.zeros((*nobody.shape, *brief.covariance.shape))}
     agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
-
-
-def formation_of(given: Scenario) -> Formation:
-    """Who flies.
-
-    Raises
-    ------
-    ScenarioError
-        When an edge or a leader is nobody.
-    """
-    section = given.formation
-    if section.preset:
-        preset = PRESETS[section.preset]
-        nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
-    else:
-        nodes = np.array(section.nodes, dtype=np.float64)
-        edges = tuple(selectors.edge(edge) for edge in section.edges or [])
-        leaders = ()
-    leaders = leaders if section.leaders is None else tuple(section.leaders)
-    for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
-        if strangers := sorted({agent for agent in numbers if not 1 <= agent <= len(nodes)}):
-            raise ScenarioError(f"formation.{key}: no agents {strangers}; agents are 1 to {len(nodes)}")
-    return Formation(section.scale * nodes, edges, leaders)
-
-
-def _world(given: Scenario, formation: Formation) -> World:
-    return World(
-        seed=given.seed,
-        dt=given.time.dt,
-        ticks=given.time.ticks,
-        order=given.dynamics.order,
-        formation=formation,
-        links=Links.both_ways(formation.agents, formation.edges),
-        manoeuvre=_manoeuvre(given, formation.dimension),
-        covariance=sections.covariance(given.sensing, formation.dimension),
-        disturbance=_disturbance(given, formation.dimension),
-        start=given.formation.start,
-        spread=given.formation.spread,
-        swarms=1,
-    )
-
-
-def _disturbance(given: Scenario, dimension: int) -> Disturbance:
-    section = given.dynamics
-    kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
-    return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
-
-
-def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
-    seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
-    section = given.manoeuvre
-    if section.preset == "hover":
-        return maneuver.hover(seconds, dimension)
-    if section.preset is not None:
-        flown_in, flown = _MANOEUVRES[section.preset]
-        if dimension != flown_in:
-            raise ScenarioError(
-                f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
-            )
-        return flown(seconds)
-    square = (dimension, dimension)
-    theta, offset = [], []
-    for number, frame in enumerate(section.keyframes, start=1):
-        key = f"manoeuvre.keyframes.{number}"
-        theta.append(sections.array(f"{key}.theta", frame.theta, square))
-        offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
-    return maneuver.keyframes(seconds, [frame.time for frame in section.keyframes], np.array(theta), np.array(offset))
-
-
-def _brief(world: World, L: Array) -> Brief:
-    formation, links = world.formation, world.links
-    relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
-    weights = -np.take_along_axis(L, links.neighbours, axis=1)
-    return Brief(
-        dt=world.dt,
-        nominal=formation.nominal,
-        relative=np.where(links.present[..., None], relative, 0.0),
-        present=links.present,
-        stress=np.where(links.present, weights, 0.0),
-        leads=links.present & formation.is_leader[links.neighbours],
-        covariance=world.covariance,
-        process=_process(world),
-        leader=formation.is_leader,
-        mission=world.manoeuvre,
-    )
-
-
-def _process(world: World) -> Array:
-    """B_i^T Q B_i of every agent's edges, shape (N, n D, n D): what they know of the disturbances."""
-    links, Q_D = world.links, world.disturbance.covariance
-    Q_A = world.disturbance.between(world.formation.nominal)
-    own, theirs = np.arange(links.agents)[:, None], links.neighbours
-    first, second = theirs[:, :, None], theirs[:, None, :]
-    edges = Q_A[own, own][..., None] - Q_A[own, theirs][:, :, None] - Q_A[own, theirs][:, None, :] + Q_A[first, second]
-    real = links.present[:, :, None] & links.present[:, None, :]
-    return np.asarray(np.kron(np.where(real, edges, 0.0), Q_D), dtype=np.float64)
 
 
 def _tick(seconds: float, dt: float) -> int:

@@ -12,7 +12,6 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from affinet import plan as planning
 from affinet.impairments import presets
 from affinet.sections import Scenario
 from netem.links import Links
@@ -37,14 +36,14 @@ def spans(given: Scenario, *, forever: bool = True) -> SearchStrategy[Entry]:
 
 def agents(given: Scenario) -> SearchStrategy[list[int | str]]:
     """Selectors of agents: one, those of a role, or a random few."""
-    size = planning.formation_of(given).agents
+    size = formation_of(given).agents
     one = st.integers(1, size).map(lambda agent: [agent])
     return st.one_of(one, st.sampled_from([["followers"], ["leaders"]]), st.sampled_from([["random 1"], ["random 2"]]))
 
 
 def links(given: Scenario) -> SearchStrategy[list[str]]:
     """Selectors of links: one, both ways of an edge, all of an agent, by role or by what the graph makes of itself."""
-    formation = planning.formation_of(given)
+    formation = formation_of(given)
     ways = Links.both_ways(formation.agents, formation.edges)
     one = [[f"{src}->{dst}"] for src, dst in zip(ways.src.tolist(), ways.dst.tolist(), strict=True)]
     edges = [[f"{i}-{j}"] for i, j in formation.edges]
@@ -103,12 +102,12 @@ def _kill(given: Scenario) -> SearchStrategy[Entries]:
         back = {"verb": "restart", "at": round(span["at"] + span["lasts"], 9), "agents": [agent], "state": state}
         return [killed, back]
 
-    size = planning.formation_of(given).agents
+    size = formation_of(given).agents
     return st.builds(entries, spans(given), st.integers(1, size), st.sampled_from(["cold", "warm"]))
 
 
 def _vectors(given: Scenario, key: str, *lengths: float) -> SearchStrategy[Entry]:
-    dimension = planning.formation_of(given).dimension
+    dimension = formation_of(given).dimension
     directions = [*np.eye(dimension).tolist(), *(-np.eye(dimension)).tolist()]
     return st.builds(
         lambda length, way: {key: [length * part for part in way]},
@@ -118,7 +117,7 @@ def _vectors(given: Scenario, key: str, *lengths: float) -> SearchStrategy[Entry
 
 
 def _lies(given: Scenario) -> SearchStrategy[Entry]:
-    dimension = planning.formation_of(given).dimension
+    dimension = formation_of(given).dimension
     mirror = np.diag([-1.0] + [1.0] * (dimension - 1))
     return _among("matrix", *(matrix.tolist() for matrix in (0.8 * np.eye(dimension), mirror, 0.0 * mirror)))
 

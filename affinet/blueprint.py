@@ -1,0 +1,122 @@
+"""Scenario -> the world that is flown, and what its agents are told of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from affinet import sections, selectors
+from affinet.sections import Scenario, ScenarioError
+from agents.brief import Brief
+from analysis.affine import Array, Manoeuvre
+from netem.links import Links
+from world import maneuver
+from world.disturbance import Disturbance, Kernel
+from world.formation import PRESETS, Formation
+from world.world import World
+
+# Presets that are flown in so many dimensions.
+_MANOEUVRES = {"corridor": (2, maneuver.corridor), "ravine": (3, maneuver.ravine)}
+
+
+def formation_of(given: Scenario) -> Formation:
+    """Who flies.
+
+    Raises
+    ------
+    ScenarioError
+        When an edge or a leader is nobody.
+    """
+    section = given.formation
+    if section.preset:
+        preset = PRESETS[section.preset]
+        nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
+    else:
+        nodes = np.array(section.nodes, dtype=np.float64)
+        edges = tuple(selectors.edge(edge) for edge in section.edges or [])
+        leaders = ()
+    leaders = leaders if section.leaders is None else tuple(section.leaders)
+    for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
+        if strangers := sorted({agent for agent in numbers if not 1 <= agent <= len(nodes)}):
+            raise ScenarioError(f"formation.{key}: no agents {strangers}; agents are 1 to {len(nodes)}")
+    return Formation(section.scale * nodes, edges, leaders)
+
+
+def world_of(given: Scenario, formation: Formation) -> World:
+    """Its physics, sensors and manoeuvre.
+
+    Raises
+    ------
+    ScenarioError
+        When a covariance or a manoeuvre does not fit the formation.
+    """
+    return World(
+        seed=given.seed,
+        dt=given.time.dt,
+        ticks=given.time.ticks,
+        order=given.dynamics.order,
+        formation=formation,
+        links=Links.both_ways(formation.agents, formation.edges),
+        manoeuvre=_manoeuvre(given, formation.dimension),
+        covariance=sections.covariance(given.sensing, formation.dimension),
+        disturbance=_disturbance(given, formation.dimension),
+        start=given.formation.start,
+        spread=given.formation.spread,
+        swarms=1,
+    )
+
+
+def _disturbance(given: Scenario, dimension: int) -> Disturbance:
+    section = given.dynamics
+    kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
+    return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
+
+
+def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
+    seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
+    section = given.manoeuvre
+    if section.preset == "hover":
+        return maneuver.hover(seconds, dimension)
+    if section.preset is not None:
+        flown_in, flown = _MANOEUVRES[section.preset]
+        if dimension != flown_in:
+            raise ScenarioError(
+                f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
+            )
+        return flown(seconds)
+    square = (dimension, dimension)
+    theta, offset = [], []
+    for number, frame in enumerate(section.keyframes, start=1):
+        key = f"manoeuvre.keyframes.{number}"
+        theta.append(sections.array(f"{key}.theta", frame.theta, square))
+        offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
+    return maneuver.keyframes(seconds, [frame.time for frame in section.keyframes], np.array(theta), np.array(offset))
+
+
+def brief_of(world: World, L: Array) -> Brief:
+    """The places of all agents, with the stress matrix L, shape (N, N)."""
+    formation, links = world.formation, world.links
+    relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
+    weights = -np.take_along_axis(L, links.neighbours, axis=1)
+    return Brief(
+        dt=world.dt,
+        nominal=formation.nominal,
+        relative=np.where(links.present[..., None], relative, 0.0),
+        present=links.present,
+        stress=np.where(links.present, weights, 0.0),
+        leads=links.present & formation.is_leader[links.neighbours],
+        covariance=world.covariance,
+        process=_process(world),
+        leader=formation.is_leader,
+        mission=world.manoeuvre,
+    )
+
+
+def _process(world: World) -> Array:
+    """B_i^T Q B_i of every agent's edges, shape (N, n D, n D): what they know of the disturbances."""
+    links, Q_D = world.links, world.disturbance.covariance
+    Q_A = world.disturbance.between(world.formation.nominal)
+    own, theirs = np.arange(links.agents)[:, None], links.neighbours
+    first, second = theirs[:, :, None], theirs[:, None, :]
+    edges = Q_A[own, own][..., None] - Q_A[own, theirs][:, :, None] - Q_A[own, theirs][:, None, :] + Q_A[first, second]
+    real = links.present[:, :, None] & links.present[:, None, :]
+    return np.asarray(np.kron(np.where(real, edges, 0.0), Q_D), dtype=np.float64)
