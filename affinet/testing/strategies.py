@@ -12,6 +12,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from affinet.blueprint import formation_of
 from affinet.impairments import presets
 from affinet.sections import Scenario
 from netem.links import Links
