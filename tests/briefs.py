@@ -2,25 +2,29 @@
 
 import numpy as np
 
-from agents.brief import Brief
+from agents.brief import Brief, Own
 from agents.estimators.base import Heard
-from netem.channels import THETA
+from netem.channels import INPUT, THETA
 from netem.links import Links
 
 HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
+REST = Own(np.zeros(1), np.zeros(1))  # an agent, in any dimension, that has flown nothing
 OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
 
 
-def brief(relative, covariance=None):
+def brief(relative, covariance=None, process=None):
     """An agent with neighbours at these nominal relative positions; with leading axes, many."""
     relative = np.asarray(relative, dtype=float)
+    size = relative.shape[-2] * relative.shape[-1]
     return Brief(
         dt=0.1,
         nominal=np.zeros((*relative.shape[:-2], relative.shape[-1])),
         relative=relative,
         present=(relative != 0).any(axis=-1),
         stress=np.ones(relative.shape[:-1]),
+        leads=np.zeros(relative.shape[:-1], dtype=bool),
         covariance=0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance,
+        process=np.zeros((*relative.shape[:-2], size, size)) if process is None else process,
         leader=np.zeros(relative.shape[:-2], dtype=bool),
         mission=None,
     )
@@ -33,8 +37,12 @@ def swarm(formation):
     return brief(np.where(links.present[..., None], relative, 0.0)), links
 
 
-def hears(who, **fields):
-    return {THETA: Heard({name: np.asarray(value) for name, value in fields.items()}, np.asarray(who))}
+def hears(who, velocity=(0.0,), **fields):
+    """What arrived from `who`: its inputs, and these fields of its map."""
+    who = np.asarray(who)
+    flown = np.broadcast_to(velocity, (*who.shape, np.shape(velocity)[-1]))
+    said = {name: np.asarray(value) for name, value in fields.items()}
+    return {THETA: Heard(said, who), INPUT: Heard({"velocity": flown}, who)}
 
 
 def silence(n, dimension=2):

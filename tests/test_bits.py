@@ -11,8 +11,11 @@ from agents.agent import Agent, renew
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity
 from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
+from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.imm import InteractingMultipleModel
+from agents.estimators.joint_kf import JointEdgeFilter
+from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
@@ -38,6 +41,9 @@ ESTIMATORS = {
     "rkf-constant-velocity": RelativeKalmanFilter(model="constant-velocity"),
     "ga-rkf-conral-random-walk": GeometryAwareFilter(model="random-walk"),
     "imm": InteractingMultipleModel(),
+    "mmse": MinimumMeanSquareError(),
+    "edge-kf": EdgeKalmanFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
+    "joint-kf": JointEdgeFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
 }
 LAWS = {
     "static": Static(),
@@ -72,6 +78,9 @@ keyframes = [
 [time]
 dt = 0.01
 duration = 1.0
+[dynamics]
+disturbance = 0.01
+kernel = {{ length = 2.0 }}
 [sensing]
 covariance = [[0.01, 0.003, 0.0], [0.003, 0.01, -0.001], [0.0, -0.001, 0.02]]
 [agents]
@@ -86,14 +95,22 @@ def plans(tmp_path_factory):
     file = tmp_path_factory.mktemp("scenarios") / "space.toml"
     file.write_text(SPACE)
     return {
-        2: plan.make(scenario.load("hexa", ["sensing={covariance=[[0.01, 0.003], [0.003, 0.02]]}"])),
+        2: plan.make(
+            scenario.load(
+                "hexa",
+                [
+                    "sensing={covariance=[[0.01, 0.003], [0.003, 0.02]]}",
+                    "dynamics={disturbance=0.01, kernel={length=2.0}}",
+                ],
+            )
+        ),
         3: plan.make(scenario.load(str(file))),
     }
 
 
 def agent_of(plan, estimator, law):
     limit = LIMIT if LAWS[law].order == 2 else None
-    return Agent(plan.brief, ESTIMATORS[estimator], LAWS[law], leader_gain=1.0, limit=limit)
+    return Agent(plan.brief, ESTIMATORS[estimator], LAWS[law], leaders="pilot", leader_gain=1.0, limit=limit)
 
 
 def draw(agent, links, seed, lead):

@@ -4,7 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from briefs import HEXA4, OCTAHEDRON, brief, hears, only, silence, swarm
+from briefs import HEXA4, OCTAHEDRON, REST, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -57,7 +57,7 @@ def test_a_fit_is_exact_on_its_own_class_wherever_it_is_feasible(constraint, dim
     z = relative @ theta.T
     ral, agent = RelativeAffineLocalization(constraint), brief(relative)
     state, said = ral.sense(agent, ral.init(agent, ()), np.where(seen[:, None], z, 0.0), seen)
-    _, estimate = ral.fuse(agent, state, silence(6, dimension))
+    _, estimate = ral.fuse(agent, state, silence(6, dimension), REST)
     assert said[THETA]["feasible"] == estimate.feasible == determined(constraint, relative[seen])
     if estimate.feasible:
         np.testing.assert_allclose(said[THETA]["local"], theta, atol=1e-9)
@@ -225,7 +225,7 @@ def test_conral_agrees_on_the_common_map_of_the_class_and_uses_one_of_it(constra
         measured = np.where(seen[..., None], agents.relative @ theta.T + noise, 0.0)
         state, said = conral.sense(agents, state, measured, seen)
         heard = hears(agents.present, **{name: field[slots] for name, field in said[THETA].items()})
-        state, estimate = conral.fuse(agents, state, heard)
+        state, estimate = conral.fuse(agents, state, heard, REST)
         if tick < 3:
             used = conral._in_use(state.consensus).theta
             np.testing.assert_allclose(MAPS[constraint].nearest(used), used, atol=1e-12)
@@ -237,7 +237,7 @@ def test_conral_agrees_on_the_common_map_of_the_class_and_uses_one_of_it(constra
 
 def test_what_an_infeasible_conral_does_not_know_is_zero():
     conral, agent = ConsensusLocalization(constraint="rotation"), brief(HEXA4)
-    _, estimate = conral.fuse(agent, conral.init(agent, ()), silence(6))
+    _, estimate = conral.fuse(agent, conral.init(agent, ()), silence(6), REST)
     assert not estimate.known.any()
     np.testing.assert_array_equal(estimate.relative, np.zeros((6, 2)))
 
@@ -249,7 +249,7 @@ def corrected(constraint, penalty=True):
     y = np.where(seen[:, None], [[0.0, 1.0], [0, 0], [0, 0]], 0.0)
     fusion, said = ga_rkf.sense(agent, ga_rkf.init(agent, ()), y, seen)
     theirs = np.array([said[THETA]["local"] + [[0.3, 0], [0, 0.4]]] * 3)
-    return ga_rkf.fuse(agent, fusion, hears(only(3, 1), local=theirs, feasible=only(3, 0, 1, 2)))[1]
+    return ga_rkf.fuse(agent, fusion, hears(only(3, 1), local=theirs, feasible=only(3, 0, 1, 2)), REST)[1]
 
 
 def test_ga_rkf_completes_from_one_neighbour_what_no_affine_map_could():
@@ -272,4 +272,4 @@ def test_without_the_penalty_an_edge_still_waits_until_psi_is_defined():
     agent, seen = brief(HEXA4), only(6, 0, 1, 2)
     ga_rkf = GeometryAwareFilter(geometry="ral", penalty=False)
     fusion, _ = ga_rkf.sense(agent, ga_rkf.init(agent, ()), np.where(seen[:, None], HEXA4, 0.0), seen)
-    np.testing.assert_array_equal(ga_rkf.fuse(agent, fusion, silence(6))[1].known, seen)
+    np.testing.assert_array_equal(ga_rkf.fuse(agent, fusion, silence(6), REST)[1].known, seen)

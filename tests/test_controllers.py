@@ -24,7 +24,9 @@ BRIEF = Brief(
     relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),
     stress=np.array([3.0, -1.0, 0.0]),
+    leads=np.zeros(3, dtype=bool),
     covariance=0.01 * np.eye(2),
+    process=np.zeros((6, 6)),
     leader=np.array(False),
     mission=None,
 )
@@ -148,7 +150,9 @@ def zhao7():
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,
         stress=np.where(links.present, stress, 0.0),
+        leads=links.present & formation.is_leader[links.neighbours],
         covariance=0.01 * np.eye(2),
+        process=np.zeros((7, 8, 8)),
         leader=formation.is_leader,
         mission=corridor(np.arange(0, 125, 0.01)),
     )
@@ -200,7 +204,7 @@ def test_pilot_halves_its_error_every_tick_at_gain_one_half_per_tick(zhao7):
 
 
 def test_leaders_follow_the_pilot_and_followers_the_law(zhao7):
-    agent = Agent(zhao7, NoEstimator(), Static(alpha=2.0), leader_gain=1.0, limit=None)
+    agent = Agent(zhao7, NoEstimator(), Static(alpha=2.0), leaders="pilot", leader_gain=1.0, limit=None)
     measured, position = np.random.default_rng(1).normal(size=(2, 7, 4, 2))
     position = position[:, 0]
     state, said = agent.sense(agent.init((7,)), measured, zhao7.present, None)

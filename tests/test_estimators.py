@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
-from briefs import HEXA4, OCTAHEDRON, brief, hears, only, silence, swarm
+from briefs import HEXA4, OCTAHEDRON, REST, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.estimators import geometry, kalman, small
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.constraints import MAPS
+from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.imm import InteractingMultipleModel
+from agents.estimators.joint_kf import JointEdgeFilter
+from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import THETA, RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
@@ -27,7 +30,7 @@ def test_none_says_what_is_measured_and_nothing_else():
     y, seen = np.array([[1.0, 2.0], [0.0, 0.0]]), np.array([True, False])
     four, none = brief([[1, 0], [0, 1]], R), NoEstimator()
     state, said = none.sense(four, none.init(four, ()), y, seen)
-    _, estimate = none.fuse(four, state, {})
+    _, estimate = none.fuse(four, state, {}, REST)
     assert said == {}
     np.testing.assert_array_equal(estimate.relative, y)
     np.testing.assert_array_equal(estimate.known, seen)
@@ -50,7 +53,7 @@ def test_ral_is_exact_on_affine_formations_wherever_it_is_feasible(relative, dat
     z = relative @ theta.reshape(dimension, dimension).T
     ral, agent = RelativeAffineLocalization(), brief(relative)
     state, said = ral.sense(agent, ral.init(agent, ()), np.where(seen[:, None], z, 0.0), seen)
-    _, estimate = ral.fuse(agent, state, silence(n, dimension))
+    _, estimate = ral.fuse(agent, state, silence(n, dimension), REST)
     if np.linalg.matrix_rank(relative[seen]) == dimension:
         assert said[THETA]["feasible"]
         np.testing.assert_allclose(said[THETA]["local"].ravel(), theta, atol=1e-9)
@@ -114,7 +117,7 @@ def test_ral_keeps_measured_edges_as_measured():
     y = np.where(seen[:, None], HEXA4 + np.random.default_rng(1).normal(size=(6, 2)), 0.0)
     ral, agent = RelativeAffineLocalization(), brief(HEXA4, R)
     state, said = ral.sense(agent, ral.init(agent, ()), y, seen)
-    _, estimate = ral.fuse(agent, state, silence(6))
+    _, estimate = ral.fuse(agent, state, silence(6), REST)
     np.testing.assert_array_equal(estimate.relative[seen], y[seen])
     np.testing.assert_array_equal(estimate.covariance[seen], np.broadcast_to(R, (4, 2, 2)))
     np.testing.assert_allclose(estimate.relative[~seen], HEXA4[~seen] @ said[THETA]["local"].T, atol=1e-12)
@@ -125,7 +128,7 @@ def test_ral_knows_no_edge_of_a_padded_slot():
     seen = only(8, 0, 1)
     ral = RelativeAffineLocalization()
     state, _ = ral.sense(padded, ral.init(padded, ()), np.where(seen[:, None], padded.relative, 0.0), seen)
-    _, estimate = ral.fuse(padded, state, silence(8))
+    _, estimate = ral.fuse(padded, state, silence(8), REST)
     np.testing.assert_array_equal(estimate.known, only(8, *range(6)))
 
 
@@ -139,7 +142,7 @@ def indicator(fresh, feasible, own_seen=(0, 1)):
     seen, agent = only(4, *own_seen), brief([[1, 0], [0, 1], [1, 1], [1, 2]])
     ral = RelativeAffineLocalization()
     state, _ = ral.sense(agent, ral.init(agent, ()), np.where(seen[:, None], agent.relative, 0.0), seen)
-    return ral.fuse(agent, state, hears(only(4, *fresh), local=THEIRS, feasible=only(4, *feasible)))[1].psi
+    return ral.fuse(agent, state, hears(only(4, *fresh), local=THEIRS, feasible=only(4, *feasible)), REST)[1].psi
 
 
 def test_indicator_is_the_mean_squared_distance_of_the_neighbours_maps():
@@ -169,7 +172,7 @@ def test_indicator_is_zero_in_an_affine_formation():
     ral = RelativeAffineLocalization()
     state, said = ral.sense(agents, ral.init(agents, (7,)), agents.relative @ theta.T, links.present)
     heard = {name: field[links.neighbours] for name, field in said[THETA].items()}
-    _, estimate = ral.fuse(agents, state, hears(links.present, **heard))
+    _, estimate = ral.fuse(agents, state, hears(links.present, **heard), REST)
     np.testing.assert_allclose(estimate.psi, 0.0, atol=1e-24)
 
 
@@ -188,7 +191,7 @@ def test_consensus_takes_one_step_of_eq_14():
     # The first is heard, with a map of its own; the second is heard, and infeasible; the third is not heard.
     local, agreed = np.array([theta + 1, theta + 77, theta + 99]), np.array([theta + 2, theta + 4, theta + 99])
     heard = hears(only(3, 0, 1), local=local, feasible=only(3, 0, 2), consensus=agreed, started=only(3, 0, 1, 2))
-    _, estimate = conral.fuse(agent, state, heard)
+    _, estimate = conral.fuse(agent, state, heard, REST)
     stepped = theta + 0.1 * ((2 + 4) + 1)
     np.testing.assert_allclose(estimate.relative, [[2, 0], [0, 3], stepped @ [1, 1]], atol=1e-12)
 
@@ -199,7 +202,7 @@ def test_conral_keeps_measured_edges_as_measured():
     conral, agent = ConsensusLocalization(), brief(HEXA4, R)
     state, _ = conral.sense(agent, conral.init(agent, ()), y, seen)
     maps, yes = np.full((6, 2, 2), 5.0), np.ones(6, dtype=bool)
-    _, estimate = conral.fuse(agent, state, hears(yes, local=maps, feasible=yes, consensus=maps, started=yes))
+    _, estimate = conral.fuse(agent, state, hears(yes, local=maps, feasible=yes, consensus=maps, started=yes), REST)
     np.testing.assert_array_equal(estimate.relative[seen], y[seen])
     assert not np.allclose(estimate.relative[~seen], HEXA4[~seen], atol=0.5)
 
@@ -216,7 +219,7 @@ def consensus_error(epsilon, ticks=300):
         measured = np.where(links.present[..., None], exact + noise, 0.0)
         state, said = conral.sense(agents, state, measured, links.present)
         heard = {name: field[links.neighbours] for name, field in said[THETA].items()}
-        state, _ = conral.fuse(agents, state, hears(links.present, **heard))
+        state, _ = conral.fuse(agents, state, hears(links.present, **heard), REST)
     return np.abs(state.consensus.theta - theta).max()
 
 
@@ -237,7 +240,7 @@ def test_an_agent_that_sees_too_little_adopts_what_its_neighbours_agree_on():
     a, b = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[3.0, 2.0], [1.0, 0.0]])
     maps = np.array([a, b, 99 * a])
     heard = hears(only(3, 0, 1), local=maps, feasible=only(3), consensus=maps, started=only(3, 0, 1, 2))
-    state, estimate = conral.fuse(agent, state, heard)
+    state, estimate = conral.fuse(agent, state, heard, REST)
     np.testing.assert_allclose(estimate.relative, [[7, 7], (a + b) / 2 @ [2, 0], (a + b) / 2 @ [0, 3]])
     assert estimate.known.all()
     _, said = conral.sense(agent, state, np.zeros((3, 2)), only(3))
@@ -249,7 +252,7 @@ def test_an_agent_that_nobody_tells_anything_knows_only_what_it_measures():
     conral, agent = ConsensusLocalization(), brief([[1, 0], [2, 0], [0, 3]])
     seen = only(3, 0)
     state, _ = conral.sense(agent, conral.init(agent, ()), np.where(seen[:, None], [7.0, 7.0], 0.0), seen)
-    _, estimate = conral.fuse(agent, state, silence(3))
+    _, estimate = conral.fuse(agent, state, silence(3), REST)
     np.testing.assert_array_equal(estimate.known, seen)
     assert np.isnan(estimate.psi)
 
@@ -258,9 +261,9 @@ def test_consensus_outlasts_ticks_in_which_nothing_is_seen_or_heard():
     conral, agent = ConsensusLocalization(), brief(HEXA4)
     state, _ = conral.sense(agent, conral.init(agent, ()), HEXA4 @ [[2.0, 0], [0, 2]], np.ones(6, dtype=bool))
     for _ in range(5):
-        state, estimate = conral.fuse(agent, state, silence(6))
+        state, estimate = conral.fuse(agent, state, silence(6), REST)
         state, _ = conral.sense(agent, state, np.zeros((6, 2)), np.zeros(6, dtype=bool))
-    _, estimate = conral.fuse(agent, state, silence(6))
+    _, estimate = conral.fuse(agent, state, silence(6), REST)
     np.testing.assert_allclose(estimate.relative, 2 * HEXA4, atol=1e-12)
 
 
@@ -295,7 +298,7 @@ def test_rkf_is_the_textbook_filter(dimension):
     filters = [textbook(dimension, measured[:, n], seen[:, n], 0.7, noise, [5.0, 3.0, 2.0]) for n in range(4)]
     for y, here in zip(measured, seen, strict=True):
         state, _ = rkf.sense(agent, state, np.where(here[:, None], y, 0.0), here)
-        state, estimate = rkf.fuse(agent, state, {})
+        state, estimate = rkf.fuse(agent, state, {}, REST)
         for n, (x, P) in enumerate(map(next, filters)):
             np.testing.assert_allclose(state.mean[n], x, atol=1e-10)
             np.testing.assert_allclose(state.covariance[n], P, atol=1e-10)
@@ -321,7 +324,7 @@ def test_rkf_coasts_at_constant_velocity_while_an_edge_is_lost():
     spread = state.covariance[0, 0, 0]
     for tick in range(300, 320):
         state, _ = rkf.sense(agent, state, np.zeros((1, 2)), only(1))
-        _, estimate = rkf.fuse(agent, state, {})
+        _, estimate = rkf.fuse(agent, state, {}, REST)
         np.testing.assert_allclose(estimate.relative, [[5.0, 5.0] + 0.1 * tick * velocity], atol=1e-3)
         assert estimate.known.all()
         assert estimate.covariance[0, 0, 0] > spread
@@ -332,13 +335,13 @@ def test_rkf_coasts_at_constant_velocity_while_an_edge_is_lost():
 def test_rkf_does_not_know_an_edge_before_it_was_seen_once():
     agent, rkf = brief([[1, 0], [0, 1]]), RelativeKalmanFilter()
     state, _ = rkf.sense(agent, rkf.init(agent, ()), np.array([[1.0, 0.0], [0.0, 0.0]]), only(2, 0))
-    np.testing.assert_array_equal(rkf.fuse(agent, state, {})[1].known, [True, False])
+    np.testing.assert_array_equal(rkf.fuse(agent, state, {}, REST)[1].known, [True, False])
 
 
 def test_rkf_is_set_by_its_first_measurement():
     agent, rkf = brief([[1, 0]], 1e-4 * np.eye(2)), RelativeKalmanFilter()
     state, _ = rkf.sense(agent, rkf.init(agent, ()), np.array([[3.0, -4.0]]), only(1, 0))
-    np.testing.assert_allclose(rkf.fuse(agent, state, {})[1].relative, [[3.0, -4.0]], atol=1e-4)
+    np.testing.assert_allclose(rkf.fuse(agent, state, {}, REST)[1].relative, [[3.0, -4.0]], atol=1e-4)
 
 
 # Geometry-aware filter
@@ -353,10 +356,10 @@ def test_ga_rkf_is_rkf_when_nothing_is_lost(shape):
     for _ in range(50):
         y = np.where(links.present[..., None], agents.relative + 0.1 * rng.normal(size=agents.relative.shape), 0.0)
         tracks, _ = rkf.sense(agents, tracks, y, links.present)
-        tracks, expected = rkf.fuse(agents, tracks, {})
+        tracks, expected = rkf.fuse(agents, tracks, {}, REST)
         fusion, said = ga_rkf.sense(agents, fusion, y, links.present)
         heard = {name: field[links.neighbours] for name, field in said[THETA].items()}
-        fusion, estimate = ga_rkf.fuse(agents, fusion, hears(links.present, **heard))
+        fusion, estimate = ga_rkf.fuse(agents, fusion, hears(links.present, **heard), REST)
         np.testing.assert_allclose(estimate.relative[links.present], expected.relative[links.present], atol=1e-9)
         np.testing.assert_allclose(estimate.covariance[links.present], expected.covariance[links.present], atol=1e-9)
 
@@ -370,7 +373,7 @@ def test_ga_rkf_propagates_an_unseen_edge_while_psi_is_undefined(shape):
         y = np.where(here[:, None], HEXA4, 0.0)
         tracks, _ = rkf.sense(agent, tracks, y, here)
         fusion, _ = ga_rkf.sense(agent, fusion, y, here)
-        fusion, estimate = ga_rkf.fuse(agent, fusion, silence(6))
+        fusion, estimate = ga_rkf.fuse(agent, fusion, silence(6), REST)
     assert np.isnan(estimate.psi)
     np.testing.assert_allclose(fusion.tracks.mean, tracks.mean, atol=1e-12)
     np.testing.assert_allclose(fusion.tracks.covariance, tracks.covariance, atol=1e-12)
@@ -380,7 +383,7 @@ def test_ga_rkf_does_not_know_an_unseen_edge_while_psi_is_undefined():
     agent, seen = brief(HEXA4), only(6, 0, 1, 2)
     ga_rkf = GeometryAwareFilter(geometry="ral")
     fusion, _ = ga_rkf.sense(agent, ga_rkf.init(agent, ()), np.where(seen[:, None], HEXA4, 0.0), seen)
-    _, estimate = ga_rkf.fuse(agent, fusion, silence(6))
+    _, estimate = ga_rkf.fuse(agent, fusion, silence(6), REST)
     np.testing.assert_array_equal(estimate.known, seen)
 
 
@@ -390,7 +393,7 @@ def test_ga_rkf_corrects_an_unseen_edge_by_its_place_in_the_shape_trusted_by_psi
     y = np.where(seen[:, None], [[1.5, 0.2], [0.1, 2.0], [0, 0]], 0.0)
     fusion, said = ga_rkf.sense(agent, ga_rkf.init(agent, ()), y, seen)
     theirs = np.array([said[THETA]["local"] + [[0.3, 0], [0, 0.4]]] * 3)  # psi = 0.09 + 0.16
-    _, estimate = ga_rkf.fuse(agent, fusion, hears(only(3, 1), local=theirs, feasible=only(3, 0, 1, 2)))
+    _, estimate = ga_rkf.fuse(agent, fusion, hears(only(3, 1), local=theirs, feasible=only(3, 0, 1, 2)), REST)
     assert estimate.psi == pytest.approx(0.25)
     place, trust = 2 * y[0] + y[1], 5 * R + 0.25 * np.eye(2)  # p = (2, 1): leverage 4 + 1
     for edge, observed, noise in ((0, y[0], R), (1, y[1], R), (2, place, trust)):
@@ -415,6 +418,9 @@ ESTIMATORS = [
     GeometryAwareFilter(constraint="similarity", penalty=False),
     RelativeKalmanFilter(model="random-walk"),
     InteractingMultipleModel(),
+    MinimumMeanSquareError(),
+    EdgeKalmanFilter(),
+    JointEdgeFilter(),
 ]
 
 
@@ -427,8 +433,9 @@ def test_fields_of_messages_that_did_not_arrive_change_nothing(estimator):
     rubbish = {name: np.array(field) for name, field in fields.items()}
     for field in rubbish.values():
         field[~fresh] = np.where(field.dtype == bool, True, 1e3)
-    _, clean = estimator.fuse(agent, state, hears(fresh, **fields))
-    _, littered = estimator.fuse(agent, state, hears(fresh, **rubbish))
+    flown = np.full((6, 2), 0.5)
+    _, clean = estimator.fuse(agent, state, hears(fresh, flown, **fields), REST)
+    _, littered = estimator.fuse(agent, state, hears(fresh, np.where(fresh[:, None], flown, 1e3), **rubbish), REST)
     np.testing.assert_array_equal(littered.relative, clean.relative)
     np.testing.assert_array_equal(littered.known, clean.known)
     np.testing.assert_array_equal(littered.psi, clean.psi)
@@ -455,7 +462,7 @@ def test_an_estimator_leaves_what_it_is_given_as_it_was(estimator):
     given, state = measured.copy(), estimator.init(agent, ())
     for _ in range(3):
         state, _ = estimator.sense(agent, state, measured, seen)
-        state, _ = estimator.fuse(agent, state, silence(6))
+        state, _ = estimator.fuse(agent, state, silence(6), REST)
     np.testing.assert_array_equal(measured, given)
     np.testing.assert_array_equal(seen, only(6, 0, 1, 2))
 

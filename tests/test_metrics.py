@@ -1,9 +1,11 @@
-"""The tracking error of paper 000, eq. 15."""
+"""The tracking error of paper 000, eq. 15, and the measures of paper 004."""
 
 import numpy as np
 import pytest
+from scipy.linalg import orthogonal_procrustes
 
-from analysis.metrics import tracking_error
+from agents.estimators.small import triangle
+from analysis.metrics import covariance_trace, estimation_error, procrustes_error, tracking_error
 
 TARGET = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 POSITION = np.array([[3.0, 4.0], [1.0, 2.0], [1.0, 1.0]])  # 5 m, 2 m and 1 m off
@@ -35,3 +37,91 @@ def test_tracking_error_keeps_the_leading_axes():
 def test_tracking_error_is_zero_on_target_in_three_dimensions():
     here = np.random.default_rng(1).normal(size=(5, 3))
     assert tracking_error(here, here, np.ones(5, dtype=bool)) == 0.0
+
+
+# How far a swarm is from its shape, wherever it is
+
+SQUARE = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+ALL = np.ones(4, dtype=bool)
+
+
+def orthogonal(dimension, *, mirrored):
+    Q, _ = np.linalg.qr(np.random.default_rng(dimension).normal(size=(dimension, dimension)))
+    return Q * np.where(np.arange(dimension) == 0, (-1 if mirrored else 1) * np.sign(np.linalg.det(Q)), 1.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_procrustes_error_of_a_turned_mirrored_and_moved_copy_is_zero(dimension, mirrored):
+    nominal = np.random.default_rng(1).normal(size=(6, dimension))
+    turn = orthogonal(dimension, mirrored=mirrored)
+    assert np.linalg.det(turn) == pytest.approx(-1 if mirrored else 1)
+    copy = nominal @ turn + np.arange(10.0, 10.0 + dimension)
+    assert procrustes_error(copy, nominal, np.ones(6, dtype=bool)) == pytest.approx(0.0, abs=1e-13)
+    assert procrustes_error(1.1 * copy, nominal, np.ones(6, dtype=bool)) > 0.01
+
+
+def test_procrustes_error_by_hand():
+    # No turn makes up for a stretch: of four agents each is 0.5 (1, 1) off, or half a metre to the side.
+    away = np.array([7.0, -3.0])
+    assert procrustes_error(1.5 * SQUARE + away, SQUARE, ALL) == pytest.approx(np.sqrt(4 * 0.5) / 4)
+    assert procrustes_error(SQUARE * [1.5, 1.0] + away, SQUARE, ALL) == pytest.approx(np.sqrt(4 * 0.25) / 4)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_procrustes_error_is_that_of_scipys_best_turn(dimension):
+    nominal, position = np.random.default_rng(dimension).normal(size=(2, 7, dimension))
+    Z, P = position - position.mean(axis=0), nominal - nominal.mean(axis=0)
+    turn, _ = orthogonal_procrustes(Z, P)
+    expected = np.linalg.norm(Z @ turn - P) / 7
+    assert procrustes_error(position, nominal, np.ones(7, dtype=bool)) == pytest.approx(expected)
+
+
+def test_absent_agents_are_left_out_of_the_shape():
+    present = np.array([True, True, False, True])
+    for lost in (99.0, np.nan):
+        position = np.where(present[:, None], SQUARE * [1.5, 1.0], lost)
+        few = procrustes_error(position[present], SQUARE[present], ALL[:3])
+        assert few > 0.1
+        assert procrustes_error(position, SQUARE, present) == pytest.approx(few)
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+def test_a_shape_with_a_position_that_is_no_number_has_no_error_and_the_other_ticks_keep_theirs(lost):
+    positions = np.stack([SQUARE, 1.5 * SQUARE, SQUARE])
+    positions[0, 2, 1] = lost
+    with np.errstate(invalid="ignore"):
+        errors = procrustes_error(positions, SQUARE, np.stack([ALL] * 3))
+    np.testing.assert_allclose(errors, [np.nan, np.sqrt(2) / 4, 0.0], atol=1e-14)
+
+
+# Estimates
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_estimation_error_is_the_length_of_all_errors_together(dimension):
+    position = np.zeros((2, 3, dimension))
+    position[1, :, 0] = [0.0, 10.0, 30.0]
+    neighbours = np.array([[1, 2], [0, 0], [1, 0]])
+    estimate = np.zeros((2, 3, 2, dimension))
+    estimate[1, ..., 0] = [[-10.0, -30.0], [10.0, 0.0], [20.0, 30.0]]
+    known = np.array([[True, True], [True, False], [True, True]])
+    np.testing.assert_array_equal(estimation_error(estimate, position, neighbours, np.stack([known] * 2)), [0.0, 0.0])
+    off = np.zeros((2, 3, 2, dimension))
+    off[1, 0, 0, 0], off[1, 2, 1, -1], off[1, 1, 1] = 3.0, 4.0, np.nan  # the last is not known
+    np.testing.assert_allclose(
+        estimation_error(estimate + off, position, neighbours, np.stack([known] * 2)), [0.0, 5.0]
+    )
+
+
+def test_covariance_trace_by_hand():
+    flat = np.array([[[1.0, 50.0, 2.0], [4.0, 60.0, 8.0]], [[16.0, 70.0, 32.0], [0.0, 0.0, 0.0]]])
+    assert covariance_trace(flat, 2) == 63.0
+    assert covariance_trace(np.array([[[1.0, 50.0, 60.0, 2.0, 70.0, 4.0]]]), 3) == 7.0
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_covariance_trace_is_that_of_the_covariances(dimension):
+    covariance = np.random.default_rng(1).normal(size=(5, 4, 3, dimension, dimension))
+    expected = np.trace(covariance, axis1=-2, axis2=-1).sum(axis=(-2, -1))
+    np.testing.assert_allclose(covariance_trace(triangle(covariance), dimension), expected)

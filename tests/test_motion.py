@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from briefs import brief, silence
+from briefs import REST, brief, silence
 from filterpy.common import kinematic_kf
 from filterpy.kalman import IMMEstimator, KalmanFilter
 
@@ -61,7 +61,7 @@ def test_rkf_is_filterpys_filter_on_the_same_measurements_and_losses(model, dime
     theirs = [reference(*written_out(model, dimension, 0.7), R, prior) for _ in range(4)]
     for y, here in zip(measured, seen, strict=True):
         state, _ = rkf.sense(agent, state, np.where(here[:, None], y, 0.0), here)
-        _, estimate = rkf.fuse(agent, state, {})
+        _, estimate = rkf.fuse(agent, state, {}, REST)
         for edge, one in enumerate(theirs):
             one.predict()
             if here[edge]:
@@ -98,7 +98,7 @@ def test_a_filter_tells_the_truth_of_what_moves_by_its_model(model, filters):
         seen = rng.random(edges) < 0.6
         y = x[:, :2] + rng.multivariate_normal([0, 0], R, size=edges)
         state, _ = edge_filter.sense(agent, state, np.where(seen[:, None], y, 0.0), seen)
-        state, estimate = edge_filter.fuse(agent, state, quiet)
+        state, estimate = edge_filter.fuse(agent, state, quiet, REST)
         if tick % 10 == 9:
             assert low < nees(x[:, :2] - estimate.relative, estimate.spread).mean() < high
 
@@ -149,7 +149,7 @@ def test_imm_is_filterpys_on_the_same_measurements_and_losses(dimension, availab
     theirs = [their_imm(dimension, R, np.repeat([5.0, 3.0, 2.0], dimension), sigmas, 0.9) for _ in range(4)]
     for y, here in zip(measured, seen, strict=True):
         state, _ = imm.sense(agent, state, np.where(here[:, None], y, 0.0), here)
-        _, estimate = imm.fuse(agent, state, {})
+        _, estimate = imm.fuse(agent, state, {}, REST)
         for edge, one in enumerate(theirs):
             one.predict()
             if here[edge]:
@@ -210,7 +210,7 @@ def test_imm_does_not_know_an_edge_before_it_was_seen_once_and_is_set_by_its_fir
     agent, imm = brief([[1, 0], [0, 1]], 1e-4 * np.eye(2)), InteractingMultipleModel()
     seen = np.array([True, False])
     state, _ = imm.sense(agent, imm.init(agent, ()), np.array([[3.0, -4.0], [0, 0]]), seen)
-    _, estimate = imm.fuse(agent, state, {})
+    _, estimate = imm.fuse(agent, state, {}, REST)
     np.testing.assert_array_equal(estimate.known, seen)
     np.testing.assert_allclose(estimate.relative[0], [3.0, -4.0], atol=1e-4)
 

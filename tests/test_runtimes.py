@@ -84,6 +84,20 @@ def test_every_kind_of_estimator_agrees(agents, out):
     assert outcome.digest not in {digest_of("corridor", BRIEFLY, *agents[:-1]), digest_of("corridor", BRIEFLY)}
 
 
+@pytest.mark.parametrize("estimator", ["joint-kf", "edge-kf"])
+def test_filters_that_predict_by_lost_inputs_agree_too(estimator, out):
+    overrides = (
+        *("time.duration=0.4", "time.dt=0.02", f"agents.estimator={estimator}", "agents.parameters.static.alpha=2"),
+        *("network.coupled=false", "network.availability=0.7", "dynamics.persistence=0.5"),
+    )
+    model = f"agents.parameters.{estimator}={{coefficients=[0.81],sigma_n=0.1}}"
+    outcome = processes(out, "rigid", *overrides, model)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("rigid", *overrides, model)
+    # A setting that does nothing agrees as well.
+    assert outcome.digest not in {digest_of("rigid", *overrides), digest_of("rigid", *overrides[:-1], model)}
+
+
 @pytest.mark.parametrize(
     "agents",
     [

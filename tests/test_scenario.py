@@ -1,5 +1,7 @@
 """The scenario file: what is written flies; what is wrong is one line: where, which key, what would be right."""
 
+from importlib.metadata import entry_points
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from affinet.sections import ScenarioError
 from netem.fault import Fault, UnderWay, Verb
 from netem.links import Links
 from world.formation import PRESETS
+
+ESTIMATORS = f"there are {', '.join(sorted(entry_points(group='affinet.estimators').names))}"
 
 GOOD = """\
 description = "a test"
@@ -269,7 +273,7 @@ WRONG_OVERRIDES = [
     ("seed=", "seed", "valid integer"),
     ("time.dt=0.007", "time", "duration 1 s is not a whole number of ticks of 0.007 s"),
     ("formation.preset=zhao8", "formation", "there are zhao7, hexa10, octa10"),
-    ("agents.estimator=kalman", "agents.estimator", "there are conral, ga-rkf, imm, none, ral, rkf"),
+    ("agents.estimator=kalman", "agents.estimator", ESTIMATORS),
     ("agents.parameters.rkf.sigma=1", "agents.parameters.rkf.sigma", "rkf has sigma_w"),
     ("formation.leaders=[1, 2, 9]", "formation.leaders", "agents are 1 to 7"),
     ("network.availability", "network.availability", "write it as key=value, like network.availability=0.5"),
@@ -364,8 +368,36 @@ WRONG = [
         "sensing.covariance",
         "must be symmetric and positive definite, in m2",
     ),
+    ("sigma = 0.1", "sigma = 0.1\nsamples = 0", "sensing.samples", "greater than or equal to 1"),
+    # dynamics
+    (
+        "[agents]",
+        "[dynamics]\ndisturbance = 0.1\ncovariance = [[1.0, 0.0], [0.0, 1.0]]\n[agents]",
+        "dynamics",
+        "not both",
+    ),
+    (
+        "[agents]",
+        "[dynamics]\ncovariance = [[1.0, 2.0], [2.0, 1.0]]\n[agents]",
+        "dynamics.covariance",
+        "must be symmetric and positive definite, in m2",
+    ),
+    ("[agents]", "[dynamics]\npersistence = 1.0\n[agents]", "dynamics.persistence", "less than 1"),
+    ("[agents]", "[dynamics]\nkernel = {}\n[agents]", "dynamics.kernel.length", "is missing"),
+    ("[agents]", "[dynamics]\nkernel = { length = 0.0 }\n[agents]", "dynamics.kernel.length", "greater than 0"),
     # agents
-    ('"rkf"', '"kalman"', "agents.estimator", "no 'kalman'; there are conral, ga-rkf, imm, none, ral, rkf, or give"),
+    (
+        '"static"\n',
+        '"double-constant-velocity"\nleaders = "distances"\n',
+        "agents.leaders",
+        "double integrators have 'pilot'",
+    ),
+    (
+        '"rkf"',
+        '"kalman"',
+        "agents.estimator",
+        f"no 'kalman'; {ESTIMATORS}, or give 'module:Class'",
+    ),
     ('"rkf"', '"no.such:Thing"', "agents.estimator", "cannot load no.such:Thing"),
     (
         '"static"',

@@ -27,7 +27,9 @@ BRIEF = Brief(
     relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),
     stress=np.array([3.0, -1.0, 0.0]),
+    leads=np.zeros(3, dtype=bool),
     covariance=0.01 * np.eye(2),
+    process=np.zeros((6, 6)),
     leader=np.array(False),
     mission=None,
 )
@@ -275,7 +277,7 @@ def act(agent, measured, position, velocity, heard, tick=2000):
 
 
 def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(octa10):
-    agent = Agent(octa10, NoEstimator(), CONSTANT, leader_gain=1.5, limit=None)
+    agent = Agent(octa10, NoEstimator(), CONSTANT, leaders="pilot", leader_gain=1.5, limit=None)
     measured, position, velocity, heard = drawn(octa10)
     _, action = act(agent, measured, position, velocity, heard)
     led = pilot(octa10, octa10.mission, 1.5, 2000, position, velocity)
@@ -286,7 +288,7 @@ def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(oc
 
 
 def test_double_integrators_say_their_velocity_and_the_acceleration_now_flying(octa10):
-    agent = Agent(octa10, NoEstimator(), VARYING, leader_gain=1.0, limit=None)
+    agent = Agent(octa10, NoEstimator(), VARYING, leaders="pilot", leader_gain=1.0, limit=None)
     measured, position, velocity, heard = drawn(octa10)
     _, first = agent.sense(agent.init((10,)), measured, octa10.present, velocity)
     np.testing.assert_array_equal(first[INPUT]["acceleration"], np.zeros((10, 3)))
@@ -298,7 +300,7 @@ def test_double_integrators_say_their_velocity_and_the_acceleration_now_flying(o
 
 
 def test_single_integrators_say_their_input_alone(octa10):
-    agent = Agent(octa10, NoEstimator(), Static(), leader_gain=1.0, limit=None)
+    agent = Agent(octa10, NoEstimator(), Static(), leaders="pilot", leader_gain=1.0, limit=None)
     _, spoken = agent.sense(agent.init((10,)), octa10.relative, octa10.present, None)
     assert set(spoken[INPUT]) == set(agent.channels()[INPUT]) == {"velocity"}
 
@@ -307,7 +309,9 @@ def test_single_integrators_say_their_input_alone(octa10):
 def test_the_limit_shortens_the_inputs_of_leaders_and_followers(law, octa10):
     measured, position, velocity, heard = drawn(octa10)
     velocity = velocity if law.order == 2 else None
-    free, bound = (Agent(octa10, NoEstimator(), law, leader_gain=1.0, limit=limit) for limit in (None, 1.0))
+    free, bound = (
+        Agent(octa10, NoEstimator(), law, leaders="pilot", leader_gain=1.0, limit=limit) for limit in (None, 1.0)
+    )
     (_, wanted), (state, limited) = (act(agent, measured, position, velocity, heard) for agent in (free, bound))
     length = np.linalg.norm(wanted.input, axis=-1, keepdims=True)
     long = length[:, 0] > 1.0

@@ -8,6 +8,7 @@ from affinet.batch import fly_all
 from affinet.inprocess import Swarm
 from affinet.run import rehearse
 from affinet.side_by_side import NotABatch, side_by_side
+from analysis import metrics
 from world.history import History
 
 SEEDS = (1, 7, 2**63 + 5)
@@ -30,10 +31,26 @@ AIRS = {
 }
 
 
-FLIGHTS = [*(("corridor", air) for air in AIRS.values()), ("ravine", ("dynamics.disturbance=0.01",))]
+# Gains that hold at this tick; the numbers of a swarm that diverges would be no numbers in the end, and agree.
+GENTLE = ("agents.parameters.static.alpha=1", "agents.leader_gain=0.02")
+PUSHED = 'dynamics={covariance=[[4e-4, 1e-4], [1e-4, 2e-4]], kernel={length=2.0, positions="%s"}, persistence=%s}'
+RIGID = {
+    "kernel": (PUSHED % ("nominal", 0.6), *GENTLE),
+    "kernel-of-true-places": (
+        PUSHED % ("true", 0.6),
+        'agents.estimator="edge-kf"',
+        "network.availability=0.7",
+        *GENTLE,
+    ),
+}
+FLIGHTS = [
+    *(("corridor", air) for air in AIRS.values()),
+    ("ravine", ("dynamics.disturbance=0.01",)),
+    *(("rigid", air) for air in RIGID.values()),
+]
 
 
-@pytest.mark.parametrize(("name", "air"), FLIGHTS, ids=[*AIRS, "double-integrators"])
+@pytest.mark.parametrize(("name", "air"), FLIGHTS, ids=[*AIRS, "double-integrators", *RIGID])
 def test_every_run_of_a_batch_is_the_run_alone(name, air):
     plan = plan_of(name, *SHORT, *air)
     batch, size, width = side_by_side(plan, SEEDS), plan.world.formation.agents, len(plan.world.links)
@@ -47,14 +64,27 @@ def test_every_run_of_a_batch_is_the_run_alone(name, air):
             np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
         for array in ("fates", "newest"):
             np.testing.assert_array_equal(flown[array][..., links], alone[array], array)
+        assert np.isfinite(alone["position"]).all()
 
 
 def test_the_runs_of_a_study_are_those_runs():
     plan = plan_of("corridor", *SHORT)
+    formation, links = plan.world.formation, plan.world.links
     runs = fly_all(plan, range(3, 60), every=4)
     alone = rehearse(plan_of("corridor", *SHORT, "seed=57"))
     np.testing.assert_array_equal(runs.error[54], alone.error[::4])
     np.testing.assert_array_equal(runs.psi[54], alone.arrays["psi"][::4])
+    arrays = {name: array[:60:4] for name, array in alone.arrays.items()}
+    position, known = arrays["position"], arrays["known"]
+    expected = {
+        "procrustes": metrics.procrustes_error(position, formation.nominal, np.ones((15, 7), dtype=bool)),
+        "estimation_error": metrics.estimation_error(arrays["estimate"], position, links.neighbours, known),
+        "covariance_trace": metrics.covariance_trace(arrays["covariance"], 2),
+    }
+    for name, values in expected.items():
+        assert len(np.unique(values)) == 15
+        np.testing.assert_allclose(getattr(runs, name)[54], values, rtol=1e-12, err_msg=name)
+        assert getattr(runs, name).shape == (57, 15)
     assert runs.mean_error[54] == pytest.approx(alone.error.mean(), rel=1e-12)
     np.testing.assert_allclose(runs.seconds, np.arange(0.0, 3.0, 0.2))
 

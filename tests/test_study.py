@@ -10,6 +10,7 @@ from PIL import Image
 
 from affinet import cli, scenario, study
 from affinet import plan as planning
+from affinet.batch import Runs
 from affinet.sections import ScenarioError
 
 pytestmark = PROCESSES
@@ -156,3 +157,105 @@ def test_a_case_that_cannot_fly_is_named_before_any_has_flown(tmp_path):
     with pytest.raises(ScenarioError, match=r"case \{'loss': 'none'.*not a whole number of ticks"):
         study.run(study.load(str(path)), quick=True, watch=flown.append)
     assert flown == []
+
+
+PAIR = """
+title = "Two estimators"
+source = "nobody"
+figure = "curves"
+quantity = "procrustes"
+scenario = "rigid"
+full = { runs = 3 }
+quick = { runs = 3, set = ["time.dt=0.01", "time.duration=0.2"] }
+
+[[axes]]
+name = "graph"
+values = { hexa10 = [] }
+
+[[axes]]
+name = "disturbance"
+values = { none = ["dynamics={}"] }
+
+[[axes]]
+name = "estimator"
+values = { MLE = ['agents.estimator="mle"'], RKF = ['agents.estimator="edge-kf"'] }
+
+[[claims]]
+says = "half the Procrustes error"
+check = "ratio"
+of = { estimator = "RKF" }
+to = { estimator = "MLE" }
+between = [0.4, 0.6]
+
+[[claims]]
+says = "a third of the estimation error since 2 s"
+check = "ratio"
+quantity = "estimation_error"
+of = { estimator = "RKF" }
+to = { estimator = "MLE" }
+between = [0.3, 0.35]
+since = 2.0
+
+[[claims]]
+says = "a third of the estimation error in all"
+check = "ratio"
+quantity = "estimation_error"
+of = { estimator = "RKF" }
+to = { estimator = "MLE" }
+between = [0.3, 0.35]
+
+[[claims]]
+says = "the covariances stay below"
+check = "stays_below"
+quantity = "covariance_trace"
+of = { estimator = "RKF" }
+level = 0.05
+"""
+
+
+@pytest.fixture
+def pair(tmp_path):
+    path = tmp_path / "pair.toml"
+    path.write_text(PAIR)
+    return study.load(str(path))
+
+
+def made_up(labels, **quantities):
+    """A case whose runs hold these values, over four seconds."""
+    shape = (5, 4)
+    rest = {name: np.full(shape, 7e7) for name in ("error", "procrustes", "estimation_error", "covariance_trace")}
+    rest |= {name: np.broadcast_to(values, shape) for name, values in quantities.items()}
+    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), **rest)
+    return study.Result(labels, runs, None, None)
+
+
+def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
+    labels = [case.labels for case in study.cases(pair, quick=True)]
+    later = np.array([1.0, 1.0, 1 / 3, 1 / 3])
+    results = [
+        made_up(labels[0], procrustes=0.2, estimation_error=1.0, covariance_trace=0.2),
+        made_up(labels[1], procrustes=0.1, estimation_error=later, covariance_trace=0.04),
+    ]
+    verdicts = study.judge(pair, results)
+    assert [verdict.holds for verdict in verdicts] == [True, True, False, True]
+    assert verdicts[0].found.startswith("ratio 0.5,")
+    assert verdicts[1].found.startswith("ratio 0.333,")
+    assert verdicts[2].found.startswith("ratio 0.667,")
+
+
+def test_a_study_of_a_quantity_leaves_all_quantities_and_a_figure(pair, tmp_path):
+    pair = pair.model_copy(update={"claims": pair.claims[:1]})  # the others look beyond these 0.2 s
+    results = study.run(pair, quick=True, watch=lambda _: None)
+    study.save(tmp_path / "out", pair, results, study.judge(pair, results))
+    curves = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
+    assert curves["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
+    for name in ("error", "procrustes", "estimation_error", "covariance_trace"):
+        values = np.concatenate([getattr(one.runs, name).mean(axis=0) for one in results])
+        np.testing.assert_array_equal(curves[f"mean_{name}"], values)
+    # The measurement is as uncertain in every tick, and the filter less and less.
+    traces = np.array(curves["mean_covariance_trace"]).reshape(2, 20)
+    assert np.ptp(traces[0]) < 1e-12 < 0.1 < traces[1, 0] / traces[0, 0]
+    assert traces[1, -1] < 0.2 * traces[0, -1]
+    assert json.loads((tmp_path / "out" / "claims.json").read_text())[0]["found"].startswith("ratio")
+    with Image.open(tmp_path / "out" / "figure.png") as figure:
+        assert min(figure.size) > 200

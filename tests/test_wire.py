@@ -291,7 +291,9 @@ BRIEF = Brief(
     relative=np.array([[1.0, -1.0], [0.5, 0.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),
     stress=np.array([0.3, -0.1, 0.0]),
+    leads=np.array([True, False, False]),
     covariance=0.01 * np.eye(2),
+    process=1e-6 * np.arange(36.0).reshape(6, 6),
     leader=np.array(False),
     mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),
 )
@@ -338,6 +340,7 @@ AGENT = AgentBrief(
     neighbours=(1, 3),
     estimator=Choice("agents.estimators.none:NoEstimator", {}),
     law=Choice("agents.controllers:Static", {"alpha": 2.0}),
+    leaders="distances",
     leader_gain=1.0,
     limit=3.0,
     brief=BRIEF,
@@ -454,6 +457,11 @@ def test_an_unknown_verb_of_a_fault_is_named_with_those_there_are():
     plain["faults"][2]["verb"] = "explode"
     with pytest.raises(PlainError, match=r"^faults\[\]\.verb: expected one of .*cut.*depart.* got 'explode'"):
         from_plain(MediumBrief, plain)
+
+
+def test_an_unknown_word_in_a_brief_is_named_with_those_there_are():
+    with pytest.raises(PlainError, match=r"^leaders: expected one of \['pilot', 'distances'\], got 'chase'"):
+        from_plain(AgentBrief, plain_of(AGENT) | {"leaders": "chase"})
 
 
 def test_what_has_no_plain_form_is_not_packed():

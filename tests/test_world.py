@@ -10,6 +10,7 @@ from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Links
 from netem.timeline import Timeline
 from world import sensors
+from world.disturbance import Disturbance
 from world.formation import PRESETS, Formation
 from world.maneuver import corridor, hover
 from world.world import Scene, World
@@ -32,7 +33,12 @@ QUIET = under()
 
 
 def scene(position, velocity=REST, measured=UNSEEN):
-    return Scene(position, velocity, measured)
+    return Scene(position, velocity, measured, np.zeros_like(position))
+
+
+def pushes(deviation):
+    """Displacements of this deviation, of every agent and in every tick by itself."""
+    return Disturbance(deviation**2 * np.eye(2), kernel=None, persistence=0.0)
 
 
 def moved(world, tick, position, flown, *faults):
@@ -51,8 +57,10 @@ def world():
         links=SEVEN,
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
         covariance=0.01 * np.eye(2),
-        disturbance=0.0,
+        disturbance=pushes(0.0),
+        start="targets",
         spread=1.0,
+        swarms=1,
     )
 
 
@@ -93,7 +101,7 @@ def test_noise_is_added_to_what_is_sensed_wherever_the_agents_are(world):
 def test_noise_of_a_link_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges))
-    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2))), under(links=small.links)
+    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3]), under(links=small.links)
     for tick in (0, 1, 64, 5000):
         large_noise, small_noise = world.measure(tick, scene(REST), QUIET), small.measure(tick, three, nothing)
         for link, row in small.links.index.items():
@@ -147,7 +155,7 @@ def test_absent_agents_hold_still(world, fault):
 def test_absent_agents_hold_still_under_disturbance_and_gusts_too(world, fault):
     gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
     z = ZHAO7.nominal
-    after = moved(replace(world, disturbance=0.1), 0, z, REST, fault, gust)
+    after = moved(replace(world, disturbance=pushes(0.1)), 0, z, REST, fault, gust)
     np.testing.assert_array_equal(after[ABSENT], z[ABSENT])
     assert (after[~ABSENT] != z[~ABSENT]).all()
 
@@ -210,7 +218,7 @@ def test_a_gust_is_no_input_of_its_agent(world):
 
 
 def test_disturbance_is_a_displacement_per_tick_of_the_deviation_asked_for(world):
-    gusty = replace(world, disturbance=0.2)
+    gusty = replace(world, disturbance=pushes(0.2))
     drawn = np.array([moved(gusty, tick, REST, REST) for tick in range(5000)])
     assert drawn.std() == pytest.approx(0.2, rel=0.02)
     np.testing.assert_allclose(np.corrcoef(drawn.reshape(5000, 14).T), np.eye(14), atol=0.06)
@@ -218,16 +226,16 @@ def test_disturbance_is_a_displacement_per_tick_of_the_deviation_asked_for(world
 
 def test_disturbance_of_an_agent_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
-    small = replace(world, formation=few, links=Links.both_ways(3, few.edges), disturbance=0.2)
-    seven = moved(replace(world, disturbance=0.2), 9, REST, REST)
-    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)))
+    small = replace(world, formation=few, links=Links.both_ways(3, few.edges), disturbance=pushes(0.2))
+    seven = moved(replace(world, disturbance=pushes(0.2)), 9, REST, REST)
+    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3])
     after = small.step(9, three, nothing, REST[:3], under(links=small.links))
     assert after.position.tobytes() == seven[:3].tobytes()
 
 
 def test_leaders_start_on_their_targets_and_followers_about_theirs(world):
     flying = replace(world, manoeuvre=corridor(np.arange(6001) * 0.01), spread=0.5)
-    starts = np.array([replace(flying, seed=seed).start().position for seed in range(500)])
+    starts = np.array([replace(flying, seed=seed).begin().position for seed in range(500)])
     offset = starts - flying.target(0)
     np.testing.assert_array_equal(offset[:, :3], 0.0)
     assert offset[:, 3:].std() == pytest.approx(0.5, rel=0.05)
@@ -235,11 +243,11 @@ def test_leaders_start_on_their_targets_and_followers_about_theirs(world):
 
 
 def test_spread_zero_starts_everybody_on_target(world):
-    np.testing.assert_array_equal(replace(world, spread=0.0).start().position, ZHAO7.nominal)
+    np.testing.assert_array_equal(replace(world, spread=0.0).begin().position, ZHAO7.nominal)
 
 
 def test_everybody_starts_at_rest_with_a_true_picture(world):
-    begun = world.start()
+    begun = world.begin()
     np.testing.assert_array_equal(begun.velocity, REST)
     np.testing.assert_array_equal(begun.measured, begun.position[SEVEN.dst - 1] - begun.position[SEVEN.src - 1])
 
@@ -296,7 +304,7 @@ def test_absent_double_integrators_stop_at_once_whatever_happens(heavy, fault):
     z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
     gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
     flown = heavy.flown(scene(z, velocity=v), u, under(fault))
-    after = replace(heavy, disturbance=0.1).step(0, scene(z, velocity=v), UNSEEN, flown, under(fault, gust))
+    after = replace(heavy, disturbance=pushes(0.1)).step(0, scene(z, velocity=v), UNSEEN, flown, under(fault, gust))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(after.position[ABSENT], z[ABSENT])
     np.testing.assert_array_equal(after.velocity[ABSENT], 0.0)
@@ -311,7 +319,7 @@ def test_gusts_and_disturbances_displace_a_double_integrator_and_give_it_no_velo
     here = scene(z, velocity=v)
     calm = heavy.step(0, here, UNSEEN, u, QUIET)
     windy = heavy.step(0, here, UNSEEN, heavy.flown(here, u, under(gust)), under(gust))
-    shaken = replace(heavy, disturbance=0.2).step(0, here, UNSEEN, u, QUIET)
+    shaken = replace(heavy, disturbance=pushes(0.2)).step(0, here, UNSEEN, u, QUIET)
     np.testing.assert_allclose(windy.position - calm.position, 0.01 * push, atol=1e-15)
     assert (shaken.position != calm.position).all()
     np.testing.assert_array_equal(windy.velocity, calm.velocity)
@@ -345,7 +353,7 @@ def test_a_frozen_sensor_says_what_it_said_in_the_tick_before(world):
 
 def test_a_frozen_sensor_says_the_same_until_it_thaws(world):
     timeline = Timeline(SEVEN, [Fault(Verb.FREEZE, 2, 5, pairs=((4, 2),))])
-    here, said = world.start(), []
+    here, said = world.begin(), []
     for tick in range(7):
         said.append(world.measure(tick, here, timeline.at(tick)))
         here = world.step(tick, here, said[-1], REST, timeline.at(tick))
@@ -354,7 +362,7 @@ def test_a_frozen_sensor_says_the_same_until_it_thaws(world):
 
 
 def test_a_sensor_frozen_in_the_first_tick_says_the_truth_for_good(world):
-    now, here = under(Fault(Verb.FREEZE, 0, None, pairs=((4, 2),))), world.start()
+    now, here = under(Fault(Verb.FREEZE, 0, None, pairs=((4, 2),))), world.begin()
     truth = here.measured[BIASED]
     for tick in range(3):
         here = world.step(tick, here, world.measure(tick, here, now), np.ones((7, 2)), now)
