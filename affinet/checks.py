@@ -12,7 +12,9 @@ import numpy as np
 from affinet import stability
 from agents.controllers import VaryingVelocity
 from agents.estimators.conral import ConsensusLocalization
+from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.estimators.joint_kf import JointEdgeFilter
 from agents.second_order import DoubleVaryingVelocity
 from analysis.affine import Array
 from analysis.graph import reached
@@ -50,6 +52,14 @@ def leaders_apart(formation: Formation) -> Finding:
         says = f"leaders that keep their distances must all see each other: there is no edge {', '.join(missing)}"
         return Finding("leaders apart", "error", says)
     return Finding("leaders apart", "ok", "the leaders all see each other, and can keep their distances")
+
+
+def inputs_in_time(estimator: Any, late: bool) -> list[Finding]:
+    """Whether inputs by which an estimator predicts arrive in the tick they are of."""
+    if not (late and isinstance(estimator, EdgeKalmanFilter | JointEdgeFilter)):
+        return []
+    says = "inputs are heard ticks late, and taken for those of this tick: the filters will be too sure of themselves"
+    return [Finding("inputs", "note", says)]
 
 
 def not_rigid(why: str) -> Finding:

@@ -200,6 +200,8 @@ def _make(given: Scenario) -> Plan:
     except stress.NotRigid as error:
         raise PlanError([checks.not_rigid(str(error))]) from error
     L = stress.laplacian(formation, weights)
+    late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
+    findings += checks.inputs_in_time(estimator.build(), late)
     findings += checks.closed_loop(formation, L, law.build(), estimator.build(), given.time.dt)
     if any(finding.fatal for finding in findings):
         raise PlanError(findings)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from affinet import files
 from affinet import plan as planning
@@ -66,6 +66,12 @@ class Claim(Section):
     since: float = 0.0
     until: float | None = None
 
+    @model_validator(mode="after")
+    def _compared(self) -> Claim:
+        if (self.to is None) == (self.check in ("approaches", "lower", "ratio")):
+            raise ValueError(f"the check {self.check!r} {'needs' if self.to is None else 'has no use for'} to")
+        return self
+
 
 class Size(Section):
     """How large the study is: runs of each case, and overrides for all of them."""
@@ -89,6 +95,12 @@ class Study(Section):
     along: str | None = None
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _drawn(self) -> Study:
+        if self.figure in ("sweep", "map") and self.quantity != "error":
+            raise ValueError(f"a {self.figure} shows the mean tracking error, and no {self.quantity}")
+        return self
 
 
 @dataclass(frozen=True)
@@ -182,12 +194,20 @@ def _fly(name: str, case: Case, runs: int) -> Result:
 
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:
-    """The verdict on each of its claims."""
-    return [
-        _judge(one, results, one.quantity or study.quantity)
-        for claim in study.claims
-        for one in _spelled_out(study, claim)
-    ]
+    """The verdict on each of its claims.
+
+    Raises
+    ------
+    ScenarioError
+        When a claim looks at what was not flown.
+    """
+    verdicts = []
+    for claim in itertools.chain.from_iterable(_spelled_out(study, claim) for claim in study.claims):
+        try:
+            verdicts.append(_judge(claim, results, claim.quantity or study.quantity))
+        except ValueError as error:
+            raise ScenarioError(f"claim {claim.says!r}: {error}") from error
+    return verdicts
 
 
 def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
@@ -204,7 +224,7 @@ def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
 def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     chosen = [one for one in results if _selected(one, claim.of)]
     if not chosen:
-        raise ScenarioError(f"claim {claim.says!r}: no case has the labels {claim.of}")
+        raise ValueError(f"no case has the labels {claim.of}")
     span, unit = (claim.since, claim.until), NAMES[quantity][1]
 
     def means(of: list[Result]) -> Array:
@@ -221,7 +241,8 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
         case "lower":
             return claims.lower(claim.says, means(chosen), means(other), unit)
         case "ratio":
-            return claims.ratio(claim.says, means(chosen)[0], means(other)[0], claim.between or [0.0, 1.0])
+            (one,), (another,) = means(chosen), means(other)
+            return claims.ratio(claim.says, one, another, claim.between or [0.0, 1.0])
         case "stays_below":
             return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "leaves":
@@ -242,10 +263,7 @@ def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
     if quantity == "error" and span == (0.0, None):
         return runs.mean_error
     values: Array = getattr(runs, quantity)
-    inside = claims.within(runs.seconds, span)
-    if not inside.any():
-        raise ScenarioError(f"a claim looks at {span[0]:g} s and later, but the runs end at {runs.seconds[-1]:g} s")
-    return values[:, inside].mean(axis=1)
+    return values[:, claims.within(runs.seconds, span)].mean(axis=1)
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:

@@ -105,9 +105,18 @@ def _mean(runs: Array) -> Array:
 
 
 def within(seconds: Array, span: Span) -> NDArray[np.bool_]:
-    """Which moments lie in a span."""
+    """Which moments lie in a span.
+
+    Raises
+    ------
+    ValueError
+        When none does.
+    """
     since, until = span
-    return (seconds >= since) & (seconds <= (np.inf if until is None else until))
+    inside = (seconds >= since) & (seconds <= (np.inf if until is None else until))
+    if not inside.any():
+        raise ValueError(f"no moment lies in its span from {since:g} s on: the runs end at {seconds[-1]:g} s")
+    return inside
 
 
 def _list(values: Array) -> str:

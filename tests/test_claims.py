@@ -40,6 +40,12 @@ def test_lower_needs_three_standard_errors(mean, holds):
     assert claims.lower("says", runs(mean, noise=0.1), runs(1.0, noise=0.12), "m²").holds is holds
 
 
+@pytest.mark.parametrize("check", [claims.leaves, claims.stays_below])
+def test_a_span_without_a_moment_decides_nothing(check):
+    with pytest.raises(ValueError, match=r"no moment lies in its span from 30 s on: the runs end at 9 s"):
+        check("says", SECONDS, np.full((10, 10), 0.1), 1.0, (30.0, None), "m²")
+
+
 def test_a_run_that_diverges_leaves_and_does_not_stay():
     error = np.full((10, 10), 0.1)
     error[:, 6:] = np.nan

@@ -259,3 +259,21 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_a_figure(pair, tmp_path
     assert json.loads((tmp_path / "out" / "claims.json").read_text())[0]["found"].startswith("ratio")
     with Image.open(tmp_path / "out" / "figure.png") as figure:
         assert min(figure.size) > 200
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ('to = { loss = "none", estimator = "none" }', "", "claims.0: .*'lower' needs to"),
+        (
+            'figure = "map"',
+            'figure = "map"\nquantity = "procrustes"',
+            "a map shows the mean tracking error, and no procrustes",
+        ),
+    ],
+)
+def test_a_study_that_makes_no_sense_is_refused(old, new, match, tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text(MAP.replace(old, new))
+    with pytest.raises(ScenarioError, match=match):
+        study.load(str(path))

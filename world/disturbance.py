@@ -64,13 +64,13 @@ class Disturbance:
         """Q_A as far as agents can know it: at nominal positions (n, D), shape (n, n)."""
         return np.eye(len(nominal)) if self.kernel is None else self.kernel.correlation(nominal)
 
-    def next(self, before: Array, white: Array, position: Array, nominal: Array) -> Array:
+    def next(self, before: Array | None, white: Array, position: Array, nominal: Array) -> Array:
         """The displacements of a tick, shape (R, n, D), in metres, of R swarms side by side.
 
         Parameters
         ----------
         before
-            Those of the tick before, shape (R, n, D).
+            Those of the tick before, shape (R, n, D); None in the first.
         white
             Standard normal draws, shape (R, n, D).
         position
@@ -83,6 +83,8 @@ class Disturbance:
             drawn = _root(self.kernel.correlation(position)) @ drawn
         elif self.kernel is not None:
             drawn = _root(self.kernel.correlation(nominal)) @ drawn
+        if before is None:
+            return drawn
         return self.persistence * before + np.sqrt(1.0 - self.persistence**2) * drawn
 
     @cached_property

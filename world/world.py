@@ -150,7 +150,7 @@ class World:
             return of_agents.reshape(self.swarms, size, -1)
 
         pushed = self.disturbance.next(
-            by_swarm(scene.disturbance),
+            by_swarm(scene.disturbance) if tick else None,
             by_swarm(self._pushes.at(tick)),
             by_swarm(scene.position),
             self.formation.nominal[:size],

@@ -10,7 +10,8 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
-from netem.channels import CENTRE
+from agents.estimators.inputs import refuse_accelerations
+from netem.channels import CENTRE, INPUT
 
 
 class Nothing(NamedTuple):
@@ -55,6 +56,7 @@ class CentralizedFilter:
         own: Own,  # noqa: ARG002
     ) -> tuple[Nothing, Estimate]:
         """What the centre tells."""
+        refuse_accelerations(heard[INPUT])
         told = heard[CENTRE].fields
         known = np.broadcast_to(brief.present, told["relative"].shape[:-1])
         return state, Estimate(told["relative"], known, told["covariance"], no_indicator(known))

@@ -15,6 +15,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import inputs, kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.blocks import diagonal_blocks
 from agents.estimators.geometry import identity
 from netem.channels import INPUT
 
@@ -89,7 +90,4 @@ class EdgeKalmanFilter:
 
 def of_edges(brief: Brief) -> Array:
     """Q_ij = B_ij^T Q B_ij of every edge by itself, shape (..., n, D, D): the diagonal blocks of the agent's."""
-    slots, dimension = brief.relative.shape[-2:]
-    blocks = brief.process.reshape(*brief.process.shape[:-2], slots, dimension, slots, dimension)
-    diagonal: Array = np.moveaxis(np.diagonal(blocks, axis1=-4, axis2=-2), -1, -3)
-    return diagonal
+    return diagonal_blocks(brief.process, brief.dimension)

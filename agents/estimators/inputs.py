@@ -37,7 +37,7 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
     flown
         As of the tick before.
     said
-        What arrived on the channel of inputs.
+        What arrived on the channel of inputs, and is taken for what flew from the tick before.
     coefficients
         a_1 .. a_p of the model, the same for all axes; none leaves who is not heard at rest.
     sigma
@@ -48,11 +48,11 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
     ValueError
         When the neighbours' inputs are accelerations.
     """
-    if "acceleration" in said.fields:
-        raise ValueError("this estimator predicts by inputs that are velocities; it is for single integrators")
+    refuse_accelerations(said)
     dimension = flown.inputs.shape[-1]
     a = np.array(coefficients, dtype=np.float64)
-    # One-step prediction (6.6) with its covariance (6.18), which is that of (6.10) where the past is known.
+    # One-step prediction (6.6) with its covariance (6.18), which is that of (6.10) where the past is known. As there, errors of
+    # successive predictions count as independent: exact for p = 1, too sure of itself for longer models after several losses.
     expected = (flown.inputs[..., : len(a), :] * a[:, None]).sum(axis=-2)
     spread = (flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None]).sum(axis=-3)
     spread = spread + (sigma**2 if len(a) else 0.0) * np.eye(dimension)
@@ -62,3 +62,15 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
         np.concatenate([newest[..., None, :], flown.inputs[..., :-1, :]], axis=-2),
         np.concatenate([doubt[..., None, :, :], flown.covariance[..., :-1, :, :]], axis=-3),
     )
+
+
+def refuse_accelerations(said: Heard) -> None:
+    """Fail where inputs are accelerations.
+
+    Raises
+    ------
+    ValueError
+        When the agents are double integrators.
+    """
+    if "acceleration" in said.fields:
+        raise ValueError("this estimator predicts by inputs that are velocities; it is for single integrators")

@@ -15,6 +15,7 @@ import numpy as np
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import inputs
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.blocks import block_diagonal, diagonal_blocks
 from agents.estimators.geometry import identity
 from netem.channels import INPUT
 
@@ -108,19 +109,3 @@ def corrected(mean: Array, covariance: Array, measured: Array, R: Array, seen: M
     innovation = np.where(rows, (measured - mean).reshape(rows.shape), 0.0)
     moved = mean.reshape(rows.shape) + (gain @ innovation[..., None])[..., 0]
     return moved.reshape(shape), covariance - gain @ observed
-
-
-def block_diagonal(blocks: Array) -> Array:
-    """Blocks (..., n, D, D) on the diagonal of matrices (..., n D, n D)."""
-    slots, dimension = blocks.shape[-3], blocks.shape[-1]
-    apart = blocks[..., :, :, None, :] * np.eye(slots)[:, None, :, None]
-    matrix: Array = apart.reshape(*blocks.shape[:-3], slots * dimension, slots * dimension)
-    return matrix
-
-
-def diagonal_blocks(matrix: Array, dimension: int) -> Array:
-    """The blocks (..., n, D, D) on the diagonal of matrices (..., n D, n D)."""
-    slots = matrix.shape[-1] // dimension
-    blocks = matrix.reshape(*matrix.shape[:-2], slots, dimension, slots, dimension)
-    diagonal: Array = np.moveaxis(np.diagonal(blocks, axis1=-4, axis2=-2), -1, -3)
-    return diagonal

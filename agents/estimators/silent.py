@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import kalman
+from agents.estimators import inputs, kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
 from agents.estimators.edge_kf import of_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
+from netem.channels import INPUT
 
 
 class Past(NamedTuple):
@@ -97,10 +98,11 @@ class SilentEdgeFilter:
         self,
         brief: Brief,
         state: Silent,
-        heard: Mapping[str, Heard],  # noqa: ARG002
+        heard: Mapping[str, Heard],
         own: Own,
     ) -> tuple[Silent, Estimate]:
         """Predict every edge by what its neighbour is believed to fly, and correct those measured."""
+        inputs.refuse_accelerations(heard[INPUT])
         past = state.past._replace(input=_pushed(own.input, state.past.input, -2))
         theirs, doubt = self._neighbours(brief, past)
         mean = past.mean[..., 0, :, :] + brief.dt * (own.input[..., None, :] - theirs)
@@ -125,10 +127,11 @@ class SilentEdgeFilter:
         observed = moved / seconds + flown
         ends = past.covariance[..., 0, :, :, :] + past.covariance[..., self.window, :, :, :]
         noise = (self.window * of_edges(brief) + ends) / seconds**2
-        W = self.coefficient * R_u0 @ inverse(R_u0 + noise)
+        trust, a = R_u0 @ inverse(R_u0 + noise), self.coefficient
         enough = (past.length > self.window)[..., None, None]
-        theirs = np.where(enough, (W @ observed[..., None])[..., 0], 0.0)
-        return theirs, R_u0 - np.where(enough[..., None], self.coefficient * W @ R_u0, 0.0)
+        theirs = np.where(enough, a * (trust @ observed[..., None])[..., 0], 0.0)
+        # R_u(0) - W R_u(1)^T, without the difference of two large numbers.
+        return theirs, np.where(enough[..., None], (1.0 - a**2) * R_u0 + a**2 * trust @ noise, R_u0)
 
 
 def _pushed(newest: Array, past: Array, axis: int) -> Array:
