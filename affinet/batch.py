@@ -82,9 +82,11 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     swarm = Swarm(side_by_side(plan, seeds))
     swarm.fly(see, _TICKS_AT_ONCE)
     error = np.concatenate(errors).T
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs that have diverged
+        mean_error = error.mean(axis=1)
     return Runs(
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
         error=error[:, ::every],
-        mean_error=error.mean(axis=1),
+        mean_error=mean_error,
         psi=np.moveaxis(np.concatenate(indicators), 0, 1),
     )
