@@ -104,9 +104,11 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     swarm.fly(see, _TICKS_AT_ONCE)
     by_run = {name: np.moveaxis(np.concatenate([part[name] for part in seen]), 0, 1) for name in seen[0]}
     error = by_run.pop("error")
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs that have diverged
+        mean_error = error.mean(axis=1)
     return Runs(
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
         error=error[:, ::every],
-        mean_error=error.mean(axis=1),
+        mean_error=mean_error,
         **by_run,
     )

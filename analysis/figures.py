@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
-_LOST = 1.0  # m²
+_LOST, _FAR = 1.0, 100.0  # m²
 _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
@@ -74,7 +74,7 @@ def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: A
 def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) -> None:
     """Mean error over a grid: a panel for each label of the first axis, rows and columns for those of the second and third.
 
-    A cell is struck out where a run has left the formation for good: its error is above 1 m² at the end.
+    A cell has a cross where the formation is lost for good: the mean over the runs is above 1 m² at the end.
     """
     across, down, each = axes
     panels, rows, columns = (_labels(cases, axis) for axis in (across, down, each))
@@ -86,11 +86,14 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
             if case.labels[across] == label:
                 place = rows.index(case.labels[down]), columns.index(case.labels[each])
                 grid[place] = _finite(case.mean_error).mean()
-                lost[place] = bool((_finite(case.error)[:, -1] > _LOST).any())
+                lost[place] = _finite(case.error)[:, -1].mean() > _LOST
         image = panel.imshow(np.log10(grid), cmap="RdYlGn_r", vmin=-3, vmax=2, aspect="auto")
         for row, column in np.argwhere(np.isfinite(grid)):
-            said = "lost" if lost[row, column] else f"{grid[row, column]:.2g}"
-            panel.text(column, row, said, ha="center", va="center", fontsize=6)
+            mean = grid[row, column]
+            said = f"{mean:.2g}{' ×' if lost[row, column] else ''}" if mean < _FAR else "lost"
+            panel.text(
+                column, row, said, ha="center", va="center", fontsize=6, color="black" if mean < _FAR else "white"
+            )
         panel.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
         panel.set_yticks(range(len(rows)), rows)
         panel.set_title(label)

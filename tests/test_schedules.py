@@ -17,7 +17,7 @@ from affinet.testing import strategies
 
 pytestmark = PROCESSES
 
-ENDERS = {"heal", "restart", "resume", "rejoin"}
+ENDERS = {"heal", "restart", "resume", "rejoin", "replace"}
 ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none")
 COARSE = ("time.dt=0.05", "time.duration=4")
 CORRIDOR = scenario.load("corridor", COARSE)
