@@ -13,12 +13,11 @@ from affinet.inprocess import Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import metrics
+from netem.links import Mask
 from world.formation import Array
-from world.history import Moments
 
 # As many as fit into a cache of a few megabytes together; more at once are not faster.
 _AT_ONCE = 50
-_TICKS_AT_ONCE = 50
 
 
 @dataclass(frozen=True)
@@ -77,38 +76,40 @@ def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
 
 
 def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
-    runs, formation, links = len(seeds), plan.world.formation, plan.world.links
-    seen: list[dict[str, Array]] = []
+    swarm, size = Swarm(side_by_side(plan, seeds)), plan.world.formation.agents
+    errors: list[Array] = []
+    kept: list[dict[str, Array]] = []
 
-    def see(moments: Moments, _: Array) -> None:
-        def of_runs(array: Any) -> Any:
-            return array.reshape(len(array), runs, formation.agents, *array.shape[2:])
+    def of_runs(array: Any) -> Any:
+        return array.reshape(len(seeds), size, *array.shape[1:])
 
-        position = of_runs(moments.position)
-        present = of_runs(swarm.timeline.present(moments.ticks.tolist()))
-        kept = slice(-moments.first % every, None, every)
-        estimate, known, triangles = (
-            of_runs(array[kept]) for array in (moments.estimate, moments.known, moments.covariance)
-        )
-        seen.append(
-            {
-                "error": metrics.tracking_error(position, of_runs(moments.target), present),
-                "psi": of_runs(moments.psi)[kept],
-                "procrustes": metrics.procrustes_error(position[kept], formation.nominal, present[kept]),
-                "estimation_error": metrics.estimation_error(estimate, position[kept], links.neighbours, known),
-                "covariance_trace": metrics.covariance_trace(triangles, formation.dimension),
-            }
-        )
-
-    swarm = Swarm(side_by_side(plan, seeds))
-    swarm.fly(see, _TICKS_AT_ONCE)
-    by_run = {name: np.moveaxis(np.concatenate([part[name] for part in seen]), 0, 1) for name in seen[0]}
-    error = by_run.pop("error")
-    with np.errstate(over="ignore", invalid="ignore"):  # of runs that have diverged
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
+        for instant in swarm.ticks():
+            position, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
+            target = plan.world.target(instant.tick)
+            errors.append(metrics.tracking_error(position, target, present))
+            if instant.tick % every == 0:
+                moment = swarm.moment(instant)
+                beliefs = [of_runs(array) for array in (moment.estimate, moment.known, moment.covariance, moment.psi)]
+                kept.append(_looked_at(plan, position, present, *beliefs))
+        error = np.stack(errors, axis=1)
         mean_error = error.mean(axis=1)
     return Runs(
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
         error=error[:, ::every],
         mean_error=mean_error,
-        **by_run,
+        **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
     )
+
+
+def _looked_at(
+    plan: Plan, position: Array, present: Mask, estimate: Array, known: Mask, covariance: Array, psi: Array
+) -> dict[str, Array]:
+    """What is kept of a tick of all runs; arrays begin with (R, N)."""
+    formation, links = plan.world.formation, plan.world.links
+    return {
+        "psi": psi,
+        "procrustes": metrics.procrustes_error(position, formation.nominal, present),
+        "estimation_error": metrics.estimation_error(estimate, position, links.neighbours, known),
+        "covariance_trace": metrics.covariance_trace(covariance, formation.dimension),
+    }

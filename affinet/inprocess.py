@@ -6,8 +6,8 @@ this file. The answers are equal bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,30 @@ from world.history import UNTOLD, Moment, Moments, Vigil, gather
 from world.world import Scene
 
 Broadcasts = Mapping[str, Fields]
+
+
+class Instant(NamedTuple):
+    """A tick as it was flown.
+
+    Parameters
+    ----------
+    tick
+        Its number.
+    scene, following
+        Where the agents were, and where it led.
+    input
+        What the bodies flew, shape (N, D).
+    action, verdicts, delivery
+        What the agents decided and believed, and what the medium made of their messages.
+    """
+
+    tick: int
+    scene: Scene
+    following: Scene
+    input: Array
+    action: Action
+    verdicts: Verdicts
+    delivery: Delivery
 
 
 class Swarm:
@@ -60,33 +84,43 @@ class Swarm:
 
     def fly(self, watch: Callable[[Moments, Array], None], batch: int) -> None:
         """All ticks; `watch` sees them, a batch at a time, and where the last of them led."""
+        world, moments = self._plan.world, list[Moment]()
+        with np.errstate(over="ignore", invalid="ignore"):
+            for instant in self.ticks():
+                moments.append(self.moment(instant))
+                if len(moments) == batch or instant.tick == world.ticks - 1:
+                    gathered = gather(world, self.timeline, instant.tick + 1 - len(moments), moments)
+                    watch(gathered, instant.following.position)
+                    moments = []
+
+    def ticks(self) -> Iterator[Instant]:
+        """Tick after tick; a swarm that diverges overflows, and whoever flies it knows."""
         world = self._plan.world
         agents = np.arange(1, self._links.agents + 1)
         fresh = self._agents.init(agents.shape)
         vigil = Vigil(world)
-        moments: list[Moment] = []
-        with np.errstate(over="ignore", invalid="ignore"):
-            scene, state = world.begin(), fresh
-            for tick in range(world.ticks):
-                self._fire(tick, vigil)
-                timeline = self.timeline
-                if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
-                    state = renew(state, fresh, np.isin(agents, [*cold]))
-                measured = world.measure(tick, scene, timeline.at(tick))
-                state, moment = self._tick(tick, scene, measured, state)
-                vigil.see(tick, scene.position, timeline)
-                scene = world.step(tick, scene, measured, moment.input, timeline.at(tick))
-                moments.append(moment)
-                if len(moments) == batch or tick == world.ticks - 1:
-                    gathered = gather(world, timeline, tick + 1 - len(moments), moments)
-                    watch(gathered, scene.position)
-                    moments = []
+        scene, state = world.begin(), fresh
+        for tick in range(world.ticks):
+            self._fire(tick, vigil)
+            timeline = self.timeline
+            if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
+                state = renew(state, fresh, np.isin(agents, [*cold]))
+            now = timeline.at(tick)
+            measured = world.measure(tick, scene, now)
+            state, action, verdicts, delivery = self._tick(tick, scene, measured, state)
+            flown = world.flown(scene, np.where(now.idle[:, None], 0.0, action.input), now)
+            vigil.see(tick, scene.position, timeline)
+            following = world.step(tick, scene, measured, flown, now)
+            yield Instant(tick, scene, following, flown, action, verdicts, delivery)
+            scene = following
 
     def _fire(self, tick: int, vigil: Vigil) -> None:
         if triggers := self.timeline.due(vigil.errors):
             self.timeline = self._medium.timeline = self.timeline.fired(triggers, tick)
 
-    def _tick(self, tick: int, scene: Scene, sensed: Array, before: AgentState) -> tuple[AgentState, Moment]:
+    def _tick(
+        self, tick: int, scene: Scene, sensed: Array, before: AgentState
+    ) -> tuple[AgentState, Action, Verdicts, Delivery]:
         links, now = self._links, self.timeline.at(tick)
         air, verdicts = self._medium.judge(self._air, tick, self._offered(~now.idle), scene.position)
         seen = (verdicts.fate[0] == Fate.DELIVERED)[links.slots] & links.present
@@ -102,7 +136,7 @@ class Swarm:
         if now.idle.any():
             state = renew(state, before, now.idle)
         self._forget(tick)
-        return state, self._moment(tick, scene, now, action, verdicts, delivery)
+        return state, action, verdicts, delivery
 
     def _from_the_centre(self, centre: Centre, measured: Array, seen: Mask, inputs: Array) -> Heard:
         def of_swarms(array: Any) -> Any:
@@ -161,24 +195,24 @@ class Swarm:
         oldest = self._air.oldest_sent(tick) - 1
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
 
-    def _moment(
-        self, tick: int, scene: Scene, now: Conditions, action: Action, verdicts: Verdicts, delivery: Delivery
-    ) -> Moment:
-        estimate, awake = action.estimate, ~now.idle
+    def moment(self, instant: Instant) -> Moment:
+        """What is written down of a tick."""
+        estimate, awake = instant.action.estimate, ~self.timeline.at(instant.tick).idle
+        verdicts, delivery = instant.verdicts, instant.delivery
         real = self._links.present & awake[:, None]
         return Moment(
-            position=scene.position,
-            input=self._plan.world.flown(scene, np.where(awake[:, None], action.input, 0.0), now),
+            position=instant.scene.position,
+            input=instant.input,
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,
             covariance=np.where(real[..., None], estimate.spread, 0.0),
             psi=np.where(awake, estimate.psi, np.nan),
             feasible=np.where(awake, UNTOLD if estimate.feasible is None else estimate.feasible, UNTOLD),
             fates=verdicts.fate,
-            odd=out_of_the_ordinary(tick, verdicts),
+            odd=out_of_the_ordinary(instant.tick, verdicts),
             apart=delivery.apart,
             late=delivery.late,
             dropped=delivery.dropped,
             released=delivery.released,
-            injected=to_plain(list(self._plan.injected)) if tick == 0 and self._plan.injected else None,
+            injected=to_plain(list(self._plan.injected)) if instant.tick == 0 and self._plan.injected else None,
         )
