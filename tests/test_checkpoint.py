@@ -14,7 +14,7 @@ from agents.estimators.base import Heard
 from netem.channels import CENTRE
 
 ESTIMATORS, LAWS = (entry_points(group=f"affinet.{what}") for what in ("estimators", "controllers"))
-SINGLE = {"edge-kf", "joint-kf"}  # they predict by inputs that are velocities
+SINGLE = {"edge-kf", "joint-kf", "silent-kf", "crkf"}  # they predict by inputs that are velocities
 PAIRS = [
     (estimator, law)
     for estimator, law in product(sorted(ESTIMATORS.names), sorted(LAWS.names))
