@@ -92,8 +92,8 @@ def write(given: Scenario, formation: Formation, links: Links) -> Script:
     return Script(faults, tuple(draft.triggers), tuple(draft.profiles))
 
 
-def _ends(entry: Event) -> bool:
-    return isinstance(entry, events.Heal | events.Restart | events.Resume | events.Rejoin | events.Replace)
+def _ends(entry: Any) -> bool:
+    return isinstance(entry, events.Heal) or entry.verb in _ENDED_BY
 
 
 def _begin(draft: _Draft, number: int, asking: tuple[int, ...]) -> Moment:
@@ -243,9 +243,8 @@ def _end(draft: _Draft, number: int, entry: Any) -> None:
             warm = isinstance(entry, events.Restart) and entry.state == "warm"
             for place in begun:
                 _close(draft, place, tick, warm)
-            if isinstance(
-                entry, events.Replace
-            ):  # its process ends in the last tick of its absence, and a new one begins
+            if isinstance(entry, events.Replace):
+                # The process that left ends in the last tick of its absence: what begins then is a new one.
                 draft.faults.append((number, Fault(Verb.KILL, tick - 1, tick, trigger=moment.frame, agents=(agent,))))
 
 

@@ -163,11 +163,10 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     """
     size = study.quick if quick else study.full
     todo = list(cases(study, quick=quick))
-    for case in todo:  # before any has flown
-        _planned(study.scenario, case)
+    plans = [_planned(study.scenario, case) for case in todo]  # what cannot fly is found before any has flown
     context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
     with ProcessPoolExecutor(mp_context=context) as pool:
-        waiting = [pool.submit(_fly, study.scenario, case, size.runs) for case in todo]
+        waiting = [pool.submit(_fly, plan, case.labels, size.runs) for plan, case in zip(plans, todo, strict=True)]
         results = []
         for one in waiting:
             results.append(one.result())
@@ -182,15 +181,14 @@ def _planned(name: str, case: Case) -> Plan:
         raise ScenarioError(f"case {case.labels}: {error}") from error
 
 
-def _fly(name: str, case: Case, runs: int) -> Result:
-    plan = _planned(name, case)
+def _fly(plan: Plan, labels: Labels, runs: int) -> Result:
     every = max(1, plan.world.ticks // _KEPT)
     first = plan.scenario.seed
     flown = fly_all(plan, range(first, first + runs), every)
     links = plan.world.links
     heard = adjacency(np.ones(len(links), dtype=bool), links.src, links.dst, links.agents)
     limits = bounds(plan.world.formation.nominal, heard, plan.world.covariance)
-    return Result(case.labels, flown, limits, ~plan.world.formation.is_leader)
+    return Result(labels, flown, limits, ~plan.world.formation.is_leader)
 
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:

@@ -28,7 +28,27 @@ class LastSaid(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DoubleConstantVelocity:
+class _Damped:
+    """What both laws share: the pull of the estimated edges, damped by how the neighbours' velocities differ from one's own."""
+
+    order: ClassVar[int] = 2
+    position_gain: float
+    velocity_gain: float
+    source: Source = "communicated"
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastSaid:
+        """Nobody heard yet."""
+        rest = np.zeros((*batch, *brief.relative.shape[-2:]))
+        return LastSaid(rest, rest, np.zeros(rest.shape[:-1], dtype=bool))
+
+    def _pull(self, brief: Brief, own: Own, estimate: Estimate, said: LastSaid) -> Array:
+        """sum_j l_ij (k_p zhat_ij + k_v (zdot_i - zdot_j)), shape (..., D), in metres per second squared."""
+        closing = _closing(brief, self.source, own, estimate, said)
+        return self.position_gain * stress_force(brief, estimate) + self.velocity_gain * closing
+
+
+@dataclass(frozen=True)
+class DoubleConstantVelocity(_Damped):
     """u_i = -sum_j l_ij (k_p zhat_ij + k_v (zdot_i - zdot_j)), for leaders at rest or at constant velocity.
 
     Parameters
@@ -41,14 +61,8 @@ class DoubleConstantVelocity:
         Where zdot_j comes from.
     """
 
-    order: ClassVar[int] = 2
     position_gain: float = 10.0
     velocity_gain: float = 30.0
-    source: Source = "communicated"
-
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastSaid:
-        """Nobody heard yet."""
-        return _silence(brief, batch)
 
     def command(
         self,
@@ -60,13 +74,12 @@ class DoubleConstantVelocity:
         inputs: Heard,
     ) -> tuple[LastSaid, Array]:
         """Fall toward the formation, damped."""
-        heard = _hear(state, inputs)
-        closing = _closing(brief, self.source, own, estimate, heard)
-        return heard, -self.position_gain * stress_force(brief, estimate) - self.velocity_gain * closing
+        said = _hear(state, inputs)
+        return said, -self._pull(brief, own, estimate, said)
 
 
 @dataclass(frozen=True)
-class DoubleVaryingVelocity:
+class DoubleVaryingVelocity(_Damped):
     """u_i = -(1 / gamma_i) sum_j l_ij (k_p zhat_ij + k_v (zdot_i - zdot_j) - zddot_j), gamma_i = sum_j l_ij.
 
     For leaders that accelerate. As with velocities in Table II, the neighbours' accelerations are heard one tick late: an
@@ -84,15 +97,9 @@ class DoubleVaryingVelocity:
         eta in u <- (1 - eta) u_before + eta u_law, in (0, 1].
     """
 
-    order: ClassVar[int] = 2
     position_gain: float = 1.0
     velocity_gain: float = 2.0
-    source: Source = "communicated"
     relaxation: float = 1.0
-
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastSaid:
-        """Nobody heard yet."""
-        return _silence(brief, batch)
 
     def command(
         self,
@@ -104,11 +111,10 @@ class DoubleVaryingVelocity:
         inputs: Heard,
     ) -> tuple[LastSaid, Array]:
         """Accelerate as the neighbours do, and fall toward the formation, damped."""
-        heard = _hear(state, inputs)
-        closing = _closing(brief, self.source, own, estimate, heard)
-        pull = self.position_gain * stress_force(brief, estimate) + self.velocity_gain * closing
-        law = (weighted(brief.stress, heard.acceleration) - pull) / brief.degree[..., None]
-        return heard, (1.0 - self.relaxation) * own.input + self.relaxation * law
+        said = _hear(state, inputs)
+        accelerations = weighted(brief.stress, said.acceleration)
+        law = (accelerations - self._pull(brief, own, estimate, said)) / brief.degree[..., None]
+        return said, (1.0 - self.relaxation) * own.input + self.relaxation * law
 
 
 def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array, velocity: Array) -> Array:
@@ -127,11 +133,6 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
     astray = mission.target(tick, brief.nominal) - position
     pull = gain**2 * astray + 2.0 * gain * (wanted - velocity)
     return acceleration + pull
-
-
-def _silence(brief: Brief, batch: tuple[int, ...]) -> LastSaid:
-    rest = np.zeros((*batch, *brief.relative.shape[-2:]))
-    return LastSaid(rest, rest, np.zeros(rest.shape[:-1], dtype=bool))
 
 
 def _hear(state: LastSaid, inputs: Heard) -> LastSaid:

@@ -35,11 +35,15 @@ def flat(says: str, mean_errors: Array, factor: float, unit: str) -> Verdict:
 
 
 def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Verdict:
-    """From the last case to the first of (S, R), the mean at least doubles, and comes to at least a share of the other's."""
+    """From the last case to the first of (S, R), the mean at least doubles, and comes nearest to the other's, to a share of it.
+
+    The last case, where nothing is lost and both may be the same, is where it starts from; nearer counts among the others.
+    """
     means = _mean(mean_errors)
     ratio, growth = means / _mean(others), float(means[0] / means[-1])
     found = f"ratio to the other {_list(ratio)}, from the first case to the last; it grows by {growth:.3g}"
-    return Verdict(says, bool(ratio[0] >= share and growth >= _DOUBLE), found)
+    nearest = bool((ratio[0] >= ratio[:-1]).all())
+    return Verdict(says, bool(ratio[0] >= share and growth >= _DOUBLE and nearest), found)
 
 
 def lower(says: str, mean_errors: Array, others: Array, unit: str) -> Verdict:

@@ -81,19 +81,11 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
     size = (1.6 + 0.52 * len(columns) * len(panels), 1.3 + 0.26 * len(rows))
     figure = Figure(figsize=size, layout="constrained", dpi=160)
     for panel, label in zip(figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True):
-        grid, lost = np.full((2, len(rows), len(columns)), np.nan)
-        for case in cases:
-            if case.labels[across] == label:
-                place = rows.index(case.labels[down]), columns.index(case.labels[each])
-                grid[place] = _finite(case.mean_error).mean()
-                lost[place] = _finite(case.error)[:, -1].mean() > _LOST
+        grid = np.full((len(rows), len(columns)), np.nan)
+        for case in (one for one in cases if one.labels[across] == label):
+            row, column = rows.index(case.labels[down]), columns.index(case.labels[each])
+            grid[row, column] = _cell(panel, row, column, case)
         image = panel.imshow(np.log10(grid), cmap="RdYlGn_r", vmin=-3, vmax=2, aspect="auto")
-        for row, column in np.argwhere(np.isfinite(grid)):
-            mean = grid[row, column]
-            said = f"{mean:.2g}{' ×' if lost[row, column] else ''}" if mean < _FAR else "lost"
-            panel.text(
-                column, row, said, ha="center", va="center", fontsize=6, color="black" if mean < _FAR else "white"
-            )
         panel.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
         panel.set_yticks(range(len(rows)), rows)
         panel.set_title(label)
@@ -101,6 +93,15 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
     figure.suptitle(title)
     figure.colorbar(image, label="mean tracking error (m²), power of ten")
     figure.savefig(path)
+
+
+def _cell(panel: Axes, row: int, column: int, case: Curve) -> float:
+    """Say the mean error of a case in its place, and how it ended."""
+    mean = float(_finite(case.mean_error).mean())
+    cross = " ×" if _finite(case.error)[:, -1].mean() > _LOST else ""
+    said, colour = (f"{mean:.2g}{cross}", "black") if mean < _FAR else ("lost", "white")
+    panel.text(column, row, said, ha="center", va="center", fontsize=6, color=colour)
+    return mean
 
 
 def _draw(panel: Axes, case: Curve, label: str) -> None:

@@ -3,13 +3,34 @@
 import numpy as np
 
 from agents.brief import Brief, Own
-from agents.estimators.base import Heard
+from agents.estimators.base import Estimate, Heard
 from netem.channels import INPUT, THETA
 from netem.links import Links
 
 HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
 REST = Own(np.zeros(1), np.zeros(1))  # an agent, in any dimension, that has flown nothing
 OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
+
+# An agent at (1, 1) with neighbours at (0, 0) and (1, 0), and one slot of padding.
+BRIEF = Brief(
+    dt=0.1,
+    nominal=np.array([1.0, 1.0]),
+    relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
+    present=np.array([True, True, False]),
+    stress=np.array([3.0, -1.0, 0.0]),
+    leads=np.zeros(3, dtype=bool),
+    covariance=0.01 * np.eye(2),
+    process=np.zeros((6, 6)),
+    leader=np.array(False),
+    mission=None,
+)
+ESTIMATE = Estimate(
+    relative=np.array([[1.0, 2.0], [4.0, -1.0], [9.0, 9.0]]),
+    known=np.array([True, True, False]),
+    covariance=np.broadcast_to(np.eye(2), (3, 2, 2)),
+    psi=np.array(np.nan),
+)
+FORCE = np.array([3 * 1.0 - 4.0, 3 * 2.0 + 1.0])  # (-1, 7)
 
 
 def brief(relative, covariance=None, process=None):

@@ -29,6 +29,8 @@ def test_flat(means, holds):
         ((0.3, 0.9), (1.0, 1.0), False),
         ((0.4, 0.1), (1.0, 1.0), False),
         ((0.9, 0.6), (1.0, 1.0), False),
+        ((0.9, 0.8, 0.3), (1.0, 1.0, 0.3), True),
+        ((0.8, 0.9, 0.3), (1.0, 1.0, 0.3), False),
     ],
 )
 def test_approaches(means, others, holds):

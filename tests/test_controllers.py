@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from briefs import BRIEF, ESTIMATE, FORCE
 
 from agents.agent import Agent
 from agents.brief import Brief, Own
@@ -17,26 +18,6 @@ from world.formation import PRESETS
 from world.maneuver import corridor
 from world.stress import laplacian
 
-# An agent at (1, 1) with neighbours at (0, 0) and (1, 0), and one slot of padding.
-BRIEF = Brief(
-    dt=0.1,
-    nominal=np.array([1.0, 1.0]),
-    relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
-    present=np.array([True, True, False]),
-    stress=np.array([3.0, -1.0, 0.0]),
-    leads=np.zeros(3, dtype=bool),
-    covariance=0.01 * np.eye(2),
-    process=np.zeros((6, 6)),
-    leader=np.array(False),
-    mission=None,
-)
-ESTIMATE = Estimate(
-    relative=np.array([[1.0, 2.0], [4.0, -1.0], [9.0, 9.0]]),
-    known=np.array([True, True, False]),
-    covariance=np.broadcast_to(np.eye(2), (3, 2, 2)),
-    psi=np.array(np.nan),
-)
-FORCE = np.array([3 * 1.0 - 4.0, 3 * 2.0 + 1.0])  # (-1, 7)
 FLYING = np.array([0.5, -0.5])
 OWN = Own(FLYING, FLYING)
 STILL = Own(np.zeros((7, 2)), np.zeros((7, 2)))

@@ -4,15 +4,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from briefs import BRIEF, ESTIMATE, FORCE
 from flying import plan_of
 
 from affinet import plan, scenario
 from affinet.run import rehearse
 from affinet.sections import ScenarioError
 from agents.agent import Agent
-from agents.brief import Brief, Own
+from agents.brief import Own
 from agents.controllers import Static, needs_mission, saturated, stress_force
-from agents.estimators.base import Estimate, Heard
+from agents.estimators.base import Heard
 from agents.estimators.none import NoEstimator
 from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity, pilot
 from analysis.affine import Manoeuvre
@@ -20,29 +21,9 @@ from netem.channels import INPUT
 from world.dynamics import double_integrator
 from world.maneuver import hover, ravine
 
-# An agent at (1, 1) with neighbours at (0, 0) and (1, 0), and one slot of padding.
-BRIEF = Brief(
-    dt=0.1,
-    nominal=np.array([1.0, 1.0]),
-    relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
-    present=np.array([True, True, False]),
-    stress=np.array([3.0, -1.0, 0.0]),
-    leads=np.zeros(3, dtype=bool),
-    covariance=0.01 * np.eye(2),
-    process=np.zeros((6, 6)),
-    leader=np.array(False),
-    mission=None,
-)
-ESTIMATE = Estimate(
-    relative=np.array([[1.0, 2.0], [4.0, -1.0], [9.0, 9.0]]),
-    known=np.array([True, True, False]),
-    covariance=np.broadcast_to(np.eye(2), (3, 2, 2)),
-    psi=np.array(np.nan),
-)
 OWN = Own(velocity=np.array([1.0, -0.5]), input=np.array([8.0, 4.0]))
 VELOCITIES = np.array([[1.0, 0.0], [2.0, 4.0], [77.0, 77.0]])
 ACCELERATIONS = np.array([[1.0, 1.0], [0.0, 2.0], [77.0, 77.0]])
-FORCE = np.array([-1.0, 7.0])  # 3 (1, 2) - (4, -1)
 CLOSING = np.array([1.0, 3.0])  # 3 ((1, -0.5) - (1, 0)) - ((1, -0.5) - (2, 4))
 GAINED = np.array([3.0, 1.0])  # 3 (1, 1) - (0, 2)
 
@@ -83,13 +64,7 @@ def test_varying_velocity_accelerates_as_the_neighbours_say_falls_and_is_damped(
 
 @dataclass(frozen=True)
 class Orderless:
-    """A law that does not say whether it steers velocities or accelerations."""
-
-    def init(self, brief, batch):
-        raise NotImplementedError
-
-    def command(self, brief, state, tick, own, estimate, inputs):
-        raise NotImplementedError
+    """A law that does not say whether it steers velocities or accelerations; nobody gets as far as to call it."""
 
 
 def test_a_law_that_does_not_say_its_order_is_refused():

@@ -80,9 +80,11 @@ def test_followers_of_zhao7_are_at_home_in_the_nominal_formation(zhao7):
     np.testing.assert_allclose(follower_targets(zhao7, ZHAO7.nominal), ZHAO7.nominal[3:], atol=1e-9)
 
 
-def test_hexa10_is_balanced(hexa10):
-    L = laplacian(HEXA10, hexa10)
-    np.testing.assert_allclose(L @ HEXA10.nominal, 0.0, atol=1e-10)
+@pytest.mark.parametrize("name", ["hexa10", "octa10"])
+def test_the_solved_stress_balances(name, request):
+    formation = PRESETS[name]
+    L = laplacian(formation, request.getfixturevalue(name))
+    np.testing.assert_allclose(L @ formation.nominal, 0.0, atol=1e-10)
     np.testing.assert_allclose(L.sum(axis=1), 0.0, atol=1e-10)
 
 
@@ -90,12 +92,6 @@ def test_the_stress_matrix_of_hexa10_is_semidefinite_of_rank_7(hexa10):
     spectrum = np.linalg.eigvalsh(laplacian(HEXA10, hexa10))
     np.testing.assert_allclose(spectrum[:3], 0.0, atol=1e-10)
     assert spectrum[3] > 0.1
-
-
-def test_octa10_is_balanced(octa10):
-    L = laplacian(OCTA10, octa10)
-    np.testing.assert_allclose(L @ OCTA10.nominal, 0.0, atol=1e-10)
-    np.testing.assert_allclose(L.sum(axis=1), 0.0, atol=1e-10)
 
 
 def test_the_stress_matrix_of_octa10_is_semidefinite_of_rank_6_and_well_conditioned(octa10):

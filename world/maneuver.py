@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
@@ -65,10 +66,7 @@ def ravine(seconds: Array) -> Manoeuvre:
     Manoeuvre
         In three dimensions, written for the nominal positions of `octa10`.
     """
-
-    def blend(start: float, duration: float) -> Array:
-        return _bell_step(seconds, start, duration)
-
+    blend = partial(_bell_step, seconds)
     turned = 0.5 * np.pi * blend(34, 10)
     cosine, sine, nothing, one = np.cos(turned), np.sin(turned), np.zeros_like(turned), np.ones_like(turned)
     yaw = _matrix([[cosine, sine, nothing], [-sine, cosine, nothing], [nothing, nothing, one]])
