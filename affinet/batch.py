@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
 from typing import Any
@@ -12,9 +12,11 @@ import numpy as np
 from affinet.inprocess import Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
-from analysis import metrics
+from analysis import consistency, metrics
+from netem.fate import Fate
 from netem.links import Mask
 from world.formation import Array
+from world.history import Moment
 
 # As many as fit into a cache of a few megabytes together; more at once are not faster.
 _AT_ONCE = 50
@@ -36,6 +38,8 @@ class Runs:
         Convergence indicators (16) in those ticks, shape (R, T, N).
     procrustes, estimation_error, covariance_trace
         As in `analysis.metrics`, in those ticks, shape (R, T), in metres, metres and square metres.
+    nees, nis
+        Means over the edges, as in `analysis.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
     """
 
     seconds: Array
@@ -45,6 +49,8 @@ class Runs:
     procrustes: Array
     estimation_error: Array
     covariance_trace: Array
+    nees: Array
+    nis: Array
 
     def together(self, other: Runs) -> Runs:
         """These runs and others of the same ticks."""
@@ -76,7 +82,8 @@ def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
 
 
 def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
-    swarm, size = Swarm(side_by_side(plan, seeds)), plan.world.formation.agents
+    together, size = side_by_side(plan, seeds), plan.world.formation.agents
+    swarm = Swarm(together)
     errors: list[Array] = []
     kept: list[dict[str, Array]] = []
 
@@ -89,9 +96,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             target = plan.world.target(instant.tick)
             errors.append(metrics.tracking_error(position, target, present))
             if instant.tick % every == 0:
-                moment = swarm.moment(instant)
-                beliefs = [of_runs(array) for array in (moment.estimate, moment.known, moment.covariance, moment.psi)]
-                kept.append(_looked_at(plan, position, present, *beliefs))
+                kept.append(_looked_at(together, present, swarm.moment(instant), of_runs))
         error = np.stack(errors, axis=1)
         mean_error = error.mean(axis=1)
     return Runs(
@@ -102,14 +107,19 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     )
 
 
-def _looked_at(
-    plan: Plan, position: Array, present: Mask, estimate: Array, known: Mask, covariance: Array, psi: Array
-) -> dict[str, Array]:
-    """What is kept of a tick of all runs; arrays begin with (R, N)."""
-    formation, links = plan.world.formation, plan.world.links
+def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """What is kept of a tick of all runs of a plan; `of_runs` splits what begins with all agents into (R, N)."""
+    formation, links, sensor = plan.world.formation, plan.world.links, plan.world.sensor
+    nominal = formation.nominal[: formation.agents // plan.world.swarms]
+    true = moment.position[:, None] - moment.position[links.neighbours]
+    measured, arrived = moment.measured[links.slots], (moment.fates[0] == Fate.DELIVERED)[links.slots]
+    edges = (moment.estimate, true, measured, moment.covariance, moment.known, moment.known & arrived)
+    estimate, true, measured, covariance, known, seen = map(of_runs, edges)
     return {
-        "psi": psi,
-        "procrustes": metrics.procrustes_error(position, formation.nominal, present),
-        "estimation_error": metrics.estimation_error(estimate, position, links.neighbours, known),
+        "psi": of_runs(moment.psi),
+        "procrustes": metrics.procrustes_error(of_runs(moment.position), nominal, present),
+        "estimation_error": metrics.estimation_error(estimate, true, known),
         "covariance_trace": metrics.covariance_trace(covariance, formation.dimension),
+        "nees": consistency.of_errors(estimate, true, covariance, known).mean,
+        "nis": consistency.of_innovations(estimate, measured, covariance, sensor.spread(measured), seen).mean,
     }

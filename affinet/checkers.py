@@ -320,16 +320,10 @@ def _closest(apart: Array, one: Integers, other: Integers) -> str:
     return f"agents {one[pair] + 1} and {other[pair] + 1} are {apart[pair]:.3g} m apart"
 
 
-def _mean_nees(evidence: Evidence, span: range) -> tuple[Array, Array]:
-    """Mean normalised error of the edges estimated in each tick, and how many there are, shape (T,)."""
+def _mean_nees(evidence: Evidence, span: range) -> consistency.Normalised:
+    """Of the edges estimated in each tick."""
     links, arrays = evidence.plan.world.links, evidence.arrays
     part = slice(span.start, span.stop)
     known = arrays["known"][part] & (evidence.awake & evidence.present)[part, :, None]
     true = sensors.relative(evidence.position[part], links)[:, links.slots]
-    error = np.where(known[..., None], arrays["estimate"][part] - true, 0.0)
-    dimension = error.shape[-1]
-    certain = np.eye(dimension)[np.triu_indices(dimension)]
-    covariance = np.where(known[..., None], arrays["covariance"][part], certain)
-    total = consistency.nees(error, covariance).sum(axis=(1, 2))
-    number = known.sum(axis=(1, 2))
-    return total / np.maximum(number, 1), number
+    return consistency.of_errors(arrays["estimate"][part], true, arrays["covariance"][part], known)

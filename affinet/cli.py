@@ -245,6 +245,7 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
 
 
 def _study(parsed: argparse.Namespace) -> int:
+    from affinet import judging, study_report  # pyarrow and matplotlib take a while to import
     from affinet import study as studies
 
     study = studies.load(parsed.study)
@@ -252,8 +253,8 @@ def _study(parsed: argparse.Namespace) -> int:
     total = len(list(studies.cases(study, quick=parsed.quick)))
     with show.Grid(study.title, total) as grid:
         results = studies.run(study, quick=parsed.quick, watch=grid.see)
-    verdicts = studies.judge(study, results)
-    studies.save(out, study, results, verdicts)
+    verdicts = judging.judge(study, results)
+    study_report.save(out, study, results, verdicts)
     show.claims(study, verdicts, out)
     return PASS
 

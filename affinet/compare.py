@@ -14,11 +14,13 @@ from world.history import Arrays
 
 # In the order in which a tick makes them, so that a cause is named before what follows from it.
 _OF_AGENTS = ("target", "position", "known", "estimate", "covariance", "psi", "feasible", "input")
-_OF_LINKS = ("fates", "newest")
+_OF_LINKS = ("measured",)
+_OF_CHANNELS = ("fates", "newest")
 _ORDER = (
     "target",
     "position",
     "error",
+    "measured",
     "fates",
     "newest",
     "copies",
@@ -99,5 +101,7 @@ def _unlike(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.bool_]:
 
 def _where(name: str, row: tuple[int, ...], links: Links, channels: Sequence[str]) -> str:
     if name in _OF_LINKS:
+        return f"{links.src[row[0]]}->{links.dst[row[0]]}"
+    if name in _OF_CHANNELS:
         return f"{channels[row[0]]} on {links.src[row[1]]}->{links.dst[row[1]]}"
     return f"agent {row[0] + 1}" if name in _OF_AGENTS else ""

@@ -40,6 +40,8 @@ class Instant(NamedTuple):
         Its number.
     scene, following
         Where the agents were, and where it led.
+    measured
+        What the sensors said, shape (L, D), in metres.
     input
         What the bodies flew, shape (N, D).
     action, verdicts, delivery
@@ -49,6 +51,7 @@ class Instant(NamedTuple):
     tick: int
     scene: Scene
     following: Scene
+    measured: Array
     input: Array
     action: Action
     verdicts: Verdicts
@@ -111,7 +114,7 @@ class Swarm:
             flown = world.flown(scene, np.where(now.idle[:, None], 0.0, action.input), now)
             vigil.see(tick, scene.position, timeline)
             following = world.step(tick, scene, measured, flown, now)
-            yield Instant(tick, scene, following, flown, action, verdicts, delivery)
+            yield Instant(tick, scene, following, measured, flown, action, verdicts, delivery)
             scene = following
 
     def _fire(self, tick: int, vigil: Vigil) -> None:
@@ -202,6 +205,7 @@ class Swarm:
         real = self._links.present & awake[:, None]
         return Moment(
             position=instant.scene.position,
+            measured=instant.measured,
             input=instant.input,
             estimate=np.where(real[..., None], estimate.relative, 0.0),
             known=estimate.known & real,

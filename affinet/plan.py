@@ -114,7 +114,7 @@ class Plan:
             dt=world.dt,
             neighbours=links.neighbours[:size],
             present=links.present[:size],
-            measurement=world.covariance,
+            sensor=world.sensor,
             process=np.asarray(np.kron(Q_A, world.disturbance.covariance), dtype=np.float64),
             prior_position=estimator.prior_position,
         )
@@ -277,7 +277,8 @@ def _try_out(agents: Agent) -> None:
         channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
         for channel, fields in agents.channels().items()
     }
-    told = {"relative": np.zeros_like(brief.relative), "covariance": np.zeros((*nobody.shape, *brief.covariance.shape))}
+    unseen = np.zeros_like(brief.relative)
+    told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
     agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
 
 

@@ -14,6 +14,7 @@ from affinet.events import AnyEvent, Finite, Links
 from affinet.impairments import LinkProfile, NotNegative, Positive, Probability, Section
 from affinet.selectors import edge
 from affinet.source import Source
+from analysis.sensor import Sensor
 from world.formation import PRESETS
 
 Ticks = Annotated[int, Field(ge=0)]
@@ -117,17 +118,22 @@ class Time(Section):
 class Sensing(Section):
     """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
-    It makes `samples` of them in a tick, and reports their mean.
+    Or those of a range, in metres, and of a bearing, in radians (in three dimensions azimuth and elevation). It makes `samples`
+    of them in a tick, and reports their mean.
     """
 
     samples: Annotated[int, Field(ge=1)] = 1
     sigma: NotNegative | None = None
     covariance: Matrix | None = None
+    sigma_range: Positive | None = None
+    sigma_bearing: Positive | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Sensing:
-        if (self.sigma is None) == (self.covariance is None):
-            raise ValueError("give sigma (m) or covariance (m2)")
+        if (self.sigma_range is None) != (self.sigma_bearing is None):
+            raise ValueError("sigma_range (m) and sigma_bearing (rad) go together")
+        if sum(given is not None for given in (self.sigma, self.covariance, self.sigma_range)) != 1:
+            raise ValueError("give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad)")
         if self.sigma == 0.0:
             raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
         return self
@@ -250,15 +256,19 @@ class Scenario(Section):
         return ScenarioError(f"{self._source.place(key)}: {error}") if self._source else error
 
 
-def covariance(sensing: Sensing, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Of the mean of a tick's relative measurements of one edge, R / T, shape (D, D), in square metres.
+def sensor(sensing: Sensing, dimension: int) -> Sensor:
+    """What says the mean of a tick's T measurements of an edge; what it reads has the covariance R / T.
 
     Raises
     ------
     ScenarioError
-        When it is no covariance of this dimension.
+        When that is no covariance of this dimension.
     """
-    return _covariance("sensing", sensing.sigma, sensing.covariance, dimension) / sensing.samples
+    if sensing.sigma_range is not None and sensing.sigma_bearing is not None:
+        deviations = np.array([sensing.sigma_range] + [sensing.sigma_bearing] * (dimension - 1))
+        return Sensor("range-bearing", np.diag(deviations**2) / sensing.samples)
+    R = _covariance("sensing", sensing.sigma, sensing.covariance, dimension)
+    return Sensor("coordinates", R / sensing.samples)
 
 
 def displacement(dynamics: Dynamics, dimension: int) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -1,18 +1,16 @@
 """Studies: a scenario over a grid of settings and many seeds, a figure, and a verdict on every claim.
 
 A study is a TOML file in `affinet/studies/`: axes whose values are overrides of the scenario, and claims, each with the check
-that decides it (`analysis/claims.py`).
+that decides it (`affinet/judging.py`, `analysis/claims.py`); `affinet/study_report.py` writes down what came of it.
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,21 +23,20 @@ from affinet.batch import Runs, fly_all
 from affinet.impairments import Section
 from affinet.plan import Plan, PlanError
 from affinet.sections import ScenarioError
-from analysis import claims
-from analysis.claims import Verdict
 from analysis.graph import adjacency
 from analysis.indicator import Bounds, bounds
 from netem.links import Mask
-from world.formation import Array
 
 Labels = dict[str, str]
-Quantity = Literal["error", "procrustes", "estimation_error", "covariance_trace"]
+Quantity = Literal["error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"]
 
 NAMES: dict[Quantity, tuple[str, str]] = {
     "error": ("tracking error", "m²"),
     "procrustes": ("Procrustes error", "m"),
     "estimation_error": ("estimation error", "m"),
     "covariance_trace": ("trace of the covariances", "m²"),
+    "nees": ("normalised estimation error squared", ""),
+    "nis": ("normalised innovation squared", ""),
 }
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
@@ -113,12 +110,23 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """A case, and what came of its runs; `bounds` are those of the indicator (18)."""
+    """A case, what was flown, and what came of its runs."""
 
     labels: Labels
+    plan: Plan
     runs: Runs
-    bounds: Bounds
-    followers: Mask
+
+    @property
+    def followers(self) -> Mask:
+        """Who is no leader, shape (N,)."""
+        return ~self.plan.world.formation.is_leader
+
+    @property
+    def bounds(self) -> Bounds:
+        """Those of the indicator (18) where nothing is lost."""
+        world = self.plan.world
+        heard = adjacency(np.ones(len(world.links), dtype=bool), world.links.src, world.links.dst, world.links.agents)
+        return bounds(world.formation.nominal, heard, world.sensor.common)
 
 
 def shipped() -> list[str]:
@@ -149,7 +157,7 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
         chosen = [axis.values[label] for axis, label in zip(study.axes, labels, strict=True)]
         overrides = (*study.set, *size.set, *itertools.chain.from_iterable(chosen))
         case = Case(dict(zip((axis.name for axis in study.axes), labels, strict=True)), overrides)
-        if not any(_selected(case, left_out) for left_out in study.skip):
+        if not any(selected(case, left_out) for left_out in study.skip):
             yield case
 
 
@@ -166,10 +174,10 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     plans = [_planned(study.scenario, case) for case in todo]  # what cannot fly is found before any has flown
     context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
     with ProcessPoolExecutor(mp_context=context) as pool:
-        waiting = [pool.submit(_fly, plan, case.labels, size.runs) for plan, case in zip(plans, todo, strict=True)]
+        waiting = [pool.submit(_fly, plan, size.runs) for plan in plans]
         results = []
-        for one in waiting:
-            results.append(one.result())
+        for case, plan, runs in zip(todo, plans, waiting, strict=True):
+            results.append(Result(case.labels, plan, runs.result()))
             watch(results[-1])
     return results
 
@@ -181,111 +189,11 @@ def _planned(name: str, case: Case) -> Plan:
         raise ScenarioError(f"case {case.labels}: {error}") from error
 
 
-def _fly(plan: Plan, labels: Labels, runs: int) -> Result:
-    every = max(1, plan.world.ticks // _KEPT)
+def _fly(plan: Plan, runs: int) -> Runs:
     first = plan.scenario.seed
-    flown = fly_all(plan, range(first, first + runs), every)
-    links = plan.world.links
-    heard = adjacency(np.ones(len(links), dtype=bool), links.src, links.dst, links.agents)
-    limits = bounds(plan.world.formation.nominal, heard, plan.world.covariance)
-    return Result(labels, flown, limits, ~plan.world.formation.is_leader)
+    return fly_all(plan, range(first, first + runs), max(1, plan.world.ticks // _KEPT))
 
 
-def judge(study: Study, results: list[Result]) -> list[Verdict]:
-    """The verdict on each of its claims.
-
-    Raises
-    ------
-    ScenarioError
-        When a claim looks at what was not flown.
-    """
-    verdicts = []
-    for claim in itertools.chain.from_iterable(_spelled_out(study, claim) for claim in study.claims):
-        try:
-            verdicts.append(_judge(claim, results, claim.quantity or study.quantity))
-        except ValueError as error:
-            raise ScenarioError(f"claim {claim.says!r}: {error}") from error
-    return verdicts
-
-
-def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
-    """A claim for each label of the axes it is for."""
-    values = {axis.name: list(axis.values) for axis in study.axes}
-    for labels in itertools.product(*(values[name] for name in claim.each)):
-        where = dict(zip(claim.each, labels, strict=True))
-        other = None if claim.to is None else claim.to | where
-        yield claim.model_copy(
-            update={"says": ", ".join(labels) + ": " * bool(labels) + claim.says, "of": claim.of | where, "to": other}
-        )
-
-
-def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
-    chosen = [one for one in results if _selected(one, claim.of)]
-    if not chosen:
-        raise ValueError(f"no case has the labels {claim.of}")
-    span, unit = (claim.since, claim.until), NAMES[quantity][1]
-
-    def means(of: list[Result]) -> Array:
-        return np.array([_mean_of(one.runs, quantity, span) for one in of])
-
-    other = [one for one in results if _selected(one, claim.to or {})]
-    seconds = chosen[0].runs.seconds
-    values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
-    match claim.check:
-        case "flat":
-            return claims.flat(claim.says, means(chosen), claim.level or 2.0, unit)
-        case "approaches":
-            return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
-        case "lower":
-            return claims.lower(claim.says, means(chosen), means(other), unit)
-        case "ratio":
-            (one,), (another,) = means(chosen), means(other)
-            return claims.ratio(claim.says, one, another, claim.between or [0.0, 1.0])
-        case "stays_below":
-            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
-        case "leaves":
-            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
-        case "indicator_below_error":
-            (one,) = chosen
-            followers, limits, runs = one.followers, one.bounds, one.runs
-            psi = (runs.psi - limits.offset)[:, :, followers]
-            return claims.below_in_mean(claim.says, runs.seconds, psi, runs.error[..., None] * limits.slope[followers])
-
-
-def _selected(one: Case | Result, labels: Mapping[str, str]) -> bool:
+def selected(one: Case | Result, labels: Mapping[str, str]) -> bool:
+    """Whether a case has all these labels."""
     return all(one.labels[name] == label for name, label in labels.items())
-
-
-def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
-    """The mean of each run over a span of seconds, shape (R,); of the tracking error over all of it, every tick counts."""
-    if quantity == "error" and span == (0.0, None):
-        return runs.mean_error
-    values: Array = getattr(runs, quantity)
-    return values[:, claims.within(runs.seconds, span)].mean(axis=1)
-
-
-def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
-    """Write data, figure and verdicts into a directory."""
-    from affinet import study_tables  # pyarrow and matplotlib take a while to import
-    from analysis import figures
-
-    out.mkdir(parents=True, exist_ok=True)
-    study_tables.write(out, results)
-    (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
-    curves = [
-        figures.Curve(one.labels, one.runs.seconds, getattr(one.runs, study.quantity), one.runs.mean_error)
-        for one in results
-    ]
-    if study.figure == "curves":
-        what, unit = NAMES[study.quantity]
-        figures.curves(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], f"{what} ({unit})")
-    elif study.figure == "sweep":
-        figures.sweep(out / "figure.png", study.title, curves, [axis.name for axis in study.axes], study.along or "")
-    elif study.figure == "map":
-        figures.settings(out / "figure.png", study.title, curves, [axis.name for axis in study.axes])
-    else:
-        (one,) = results
-        corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
-        numbers = np.flatnonzero(one.followers)
-        path, seen = out / "figure.png", corrected[:, :, numbers]
-        figures.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
+from analysis.sensor import Sensor
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,8 +50,8 @@ class Brief:
         Weights l_ij, shape (..., n); 0 in padding.
     leads
         Which neighbours are leaders, shape (..., n).
-    covariance
-        Of one relative measurement, shape (D, D), in square metres.
+    sensor
+        What measures the edges.
     process
         B_i^T Q B_i, of what displaces the edges in a tick, all together, shape (..., n D, n D), in square metres; 0 in padding.
     leader
@@ -65,7 +66,7 @@ class Brief:
     present: Mask
     stress: Array
     leads: Mask
-    covariance: Array
+    sensor: Sensor
     process: Array
     leader: Mask
     mission: Manoeuvre | None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.brief import Array, Mask
+from analysis.sensor import Sensor
 
 
 class Whole(NamedTuple):
@@ -40,8 +41,8 @@ class Centre:
         Tick, in seconds.
     neighbours, present
         Rows of the agents in the slots, and which slots are real, shape (N, n).
-    measurement
-        Covariance of one relative measurement, shape (D, D), in square metres.
+    sensor
+        What measures the edges.
     process
         Q of all agents together, shape (N D, N D), in square metres.
     prior_position
@@ -51,7 +52,7 @@ class Centre:
     dt: float
     neighbours: NDArray[np.int64]
     present: Mask
-    measurement: Array
+    sensor: Sensor
     process: Array
     prior_position: float
 
@@ -74,17 +75,23 @@ class Centre:
         agents, dimension = state.position.shape[-2:]
         position = state.position + self.dt * inputs
         covariance = state.covariance + self.process
-        precision = np.linalg.inv(self.measurement)
-        made = seen.reshape(*seen.shape[:-2], -1).astype(np.float64)
-        edges = self._incidence * made[..., None, :]
-        information = np.kron(edges @ self._incidence.T, precision)
-        surprise = np.where(seen[..., None], measured - self._edges(position), 0.0) @ precision
-        pulled = self._incidence @ surprise.reshape(*made.shape, dimension)
+        precision = np.where(seen[..., None, None], np.linalg.inv(self.sensor.spread(measured)), 0.0)
+        surprise = precision @ (measured - self._edges(position))[..., None]
+        pulled = self._incidence @ surprise.reshape(*seen.shape[:-2], -1, dimension)
+        information = self._information(precision)
         solved = np.linalg.solve(np.eye(agents * dimension) + covariance @ information, covariance)
         corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
         moved = (corrected @ pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
         whole = Whole(position + moved.reshape(position.shape), corrected)
         return whole, Told(self._edges(whole.position), self._spread(corrected, agents, dimension))
+
+    def _information(self, precision: Array) -> Array:
+        """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""
+        agents, dimension = len(self.neighbours), precision.shape[-1]
+        batch = precision.shape[:-4]
+        pairs = self._pairs @ precision.reshape(*batch, -1, dimension * dimension)
+        blocks = pairs.reshape(*batch, agents, agents, dimension, dimension)
+        return np.swapaxes(blocks, -3, -2).reshape(*batch, agents * dimension, agents * dimension)
 
     def _edges(self, position: Array) -> Array:
         relative: Array = position[..., :, None, :] - position[..., self.neighbours, :]
@@ -107,3 +114,9 @@ class Centre:
         B[own, edges] = 1.0
         B[self.neighbours.ravel(), edges] -= 1.0
         return B * self.present.ravel()
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """What an edge adds to the information of each pair of agents, shape (N N, N n)."""
+        B = self._incidence
+        return (B[:, None, :] * B[None, :, :]).reshape(-1, B.shape[-1])

@@ -87,7 +87,7 @@ class Listener:
 
     def _measurements(self, said: dict[int, dict[str, Any]]) -> tuple[Any, Any]:
         agents, slots = self._centre.neighbours.shape
-        measured = np.zeros((agents, slots, len(self._centre.measurement)))
+        measured = np.zeros((agents, slots, len(self._centre.process) // agents))
         seen = np.zeros((agents, slots), dtype=bool)
         for agent, observed in said.items():
             rows = [self._slots[agent - 1][neighbour] for neighbour in observed["neighbours"]]

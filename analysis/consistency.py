@@ -1,31 +1,64 @@
-"""Whether an estimator's covariances tell the truth: normalised errors and their chi-square bands."""
+"""Whether an estimator's covariances tell the truth: normalised errors and innovations, and their chi-square bands."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_CANCELLED = 1e-9  # of a covariance: less is what rounding leaves of a difference
 
 
-def nees(error: Array, covariance: Array) -> Array:
-    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular.
+class Normalised(NamedTuple):
+    """The mean over the edges of a swarm, shape (...), NaN where there are none, and how many there are, shape (...)."""
+
+    mean: Array
+    number: NDArray[np.int64]
+
+
+def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> Normalised:
+    """NEES of the edges of a swarm.
 
     Parameters
     ----------
-    error
-        Shape (..., D).
+    estimate, true
+        Relative positions, shape (..., N, n, D), in metres.
     covariance
-        Upper triangles of their covariances, shape (..., D (D + 1) / 2).
+        Upper triangles of the covariances, shape (..., N, n, D (D + 1) / 2), in square metres.
+    known
+        Which edges are estimated, shape (..., N, n).
     """
-    dimension = error.shape[-1]
-    whole = np.zeros((*error.shape, dimension))
-    rows, columns = np.triu_indices(dimension)
-    whole[..., rows, columns] = whole[..., columns, rows] = covariance
-    singular = np.linalg.det(whole) == 0.0
-    solved = np.linalg.solve(np.where(singular[..., None, None], np.eye(dimension), whole), error[..., None])[..., 0]
-    return np.where(singular, np.inf, (error * solved).sum(axis=-1))
+    error = np.where(known[..., None], estimate - true, 0.0)
+    return _averaged(_normalised(error, _certain(whole(covariance), known)), known)
+
+
+def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array, seen: Mask) -> Normalised:
+    """NIS of the edges measured, from what is left of their innovations once the filters are corrected.
+
+    A filter with the innovation nu of covariance S leaves y - z = R S^-1 nu, of covariance R - P = R S^-1 R: normalised, one is
+    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates.
+
+    Parameters
+    ----------
+    estimate, measured
+        Relative positions, shape (..., N, n, D), in metres.
+    covariance
+        Upper triangles of the covariances P of the estimates, shape (..., N, n, D (D + 1) / 2), in square metres.
+    R
+        Covariances of the measurements, shape (..., N, n, D, D), in square metres.
+    seen
+        Which edges were measured and are estimated, shape (..., N, n).
+    """
+    left = _certain(R - whole(covariance), seen)
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    filtered = seen & (np.linalg.eigvalsh(left)[..., 0] > _CANCELLED * trace)
+    residual = np.where(filtered[..., None], measured - estimate, 0.0)
+    return _averaged(_normalised(residual, _certain(left, filtered)), filtered)
 
 
 def band(level: float, dimension: int, number: int) -> tuple[float, float]:
@@ -43,3 +76,42 @@ def band(level: float, dimension: int, number: int) -> tuple[float, float]:
     upper_tails = np.array([(1.0 + level) / 2, (1.0 - level) / 2])
     low, high = chdtri(dimension * number, upper_tails) / number
     return float(low), float(high)
+
+
+def nees(error: Array, covariance: Array) -> Array:
+    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular.
+
+    Parameters
+    ----------
+    error
+        Shape (..., D).
+    covariance
+        Upper triangles of their covariances, shape (..., D (D + 1) / 2).
+    """
+    return _normalised(error, whole(covariance))
+
+
+def whole(triangles: Array) -> Array:
+    """Symmetric matrices (..., D, D) from their upper triangles, row by row, shape (..., D (D + 1) / 2)."""
+    dimension = int(np.sqrt(2 * triangles.shape[-1]))
+    matrices = np.empty((*triangles.shape[:-1], dimension, dimension))
+    rows, columns = np.triu_indices(dimension)
+    matrices[..., rows, columns] = matrices[..., columns, rows] = triangles
+    return matrices
+
+
+def _normalised(error: Array, covariance: Array) -> Array:
+    singular = np.linalg.det(covariance) == 0.0
+    solvable = np.where(singular[..., None, None], np.eye(error.shape[-1]), covariance)
+    solved = np.linalg.solve(solvable, error[..., None])[..., 0]
+    return np.where(singular, np.inf, (error * solved).sum(axis=-1))
+
+
+def _certain(covariance: Array, counted: Mask) -> Array:
+    return np.where(counted[..., None, None], covariance, np.eye(covariance.shape[-1]))
+
+
+def _averaged(normalised: Array, counted: Mask) -> Normalised:
+    number = counted.sum(axis=(-2, -1))
+    total = np.where(counted, normalised, 0.0).sum(axis=(-2, -1))
+    return Normalised(np.where(number > 0, total / np.maximum(number, 1), np.nan), number)

@@ -12,10 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from analysis.consistency import band
+
 Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
 _LOST, _FAR = 1.0, 100.0  # m²
+_LEVEL = 0.95
 _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
@@ -41,6 +44,36 @@ def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], 
         panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
     _finish(figure, panels, title, "time (s)", quantity, each)
     figure.savefig(path)
+
+
+def consistency(
+    path: Path, title: str, normalised: Mapping[str, Sequence[Curve]], axes: Sequence[str], dimension: int
+) -> None:
+    """Normalised errors and innovations over time: a row for each, a panel for each pair of labels of the first two axes.
+
+    Their mean over the runs, of filters whose covariances tell the truth, lies in the grey band with 95 %: that of one edge in
+    every run, and the more surely that of the mean over many.
+    """
+    across, down, each = axes
+    first = next(iter(normalised.values()))
+    places = list(dict.fromkeys((case.labels[across], case.labels[down]) for case in first))
+    figure = Figure(figsize=(3.4 * len(places), 2.2 * len(normalised)), layout="constrained", dpi=160)
+    panels = figure.subplots(len(normalised), len(places), sharex=True, sharey=True, squeeze=False)
+    for row, (what, cases) in zip(panels, normalised.items(), strict=True):
+        for case in cases:
+            panel = row[places.index((case.labels[across], case.labels[down]))]
+            mean = case.error.mean(axis=0)
+            panel.plot(case.seconds, _positive(np.nan_to_num(mean)), lw=0.8, label=case.labels[each])
+            panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
+        for panel in row:
+            panel.axhspan(*band(_LEVEL, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
+    _finish(figure, panels, title, "time (s)", "mean over edges and runs", each)
+    figure.savefig(path)
+
+
+def said(what: str, unit: str) -> str:
+    """A quantity with its unit, if it has one."""
+    return f"{what} ({unit})" if unit else what
 
 
 def sweep(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], along: str) -> None:

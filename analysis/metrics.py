@@ -55,21 +55,16 @@ def procrustes_error(position: Array, nominal: Array, present: NDArray[np.bool_]
     return np.where(finite, np.sqrt(squared) / number, np.nan)
 
 
-def estimation_error(estimate: Array, position: Array, neighbours: NDArray[np.intp], known: NDArray[np.bool_]) -> Array:
+def estimation_error(estimate: Array, true: Array, known: NDArray[np.bool_]) -> Array:
     """The length of all errors of the relative positions together (paper 004, eq. 4.34), shape (...), in metres.
 
     Parameters
     ----------
-    estimate
+    estimate, true
         Shape (..., N, n, D), in metres.
-    position
-        True, shape (..., N, D), in metres.
-    neighbours
-        Rows of the agents in the slots, shape (N, n).
     known
         Which edges have an estimate, shape (..., N, n).
     """
-    true = position[..., :, None, :] - position[..., neighbours, :]
     squared = ((estimate - true) ** 2).sum(axis=-1)
     total: Array = np.sqrt(np.where(known, squared, 0.0).sum(axis=(-2, -1)))
     return total

@@ -4,6 +4,7 @@ import numpy as np
 
 from agents.brief import Brief, Own
 from agents.estimators.base import Estimate, Heard
+from analysis.sensor import Sensor
 from netem.channels import INPUT, THETA
 from netem.links import Links
 
@@ -19,7 +20,7 @@ BRIEF = Brief(
     present=np.array([True, True, False]),
     stress=np.array([3.0, -1.0, 0.0]),
     leads=np.zeros(3, dtype=bool),
-    covariance=0.01 * np.eye(2),
+    sensor=Sensor("coordinates", 0.01 * np.eye(2)),
     process=np.zeros((6, 6)),
     leader=np.array(False),
     mission=None,
@@ -44,7 +45,7 @@ def brief(relative, covariance=None, process=None):
         present=(relative != 0).any(axis=-1),
         stress=np.ones(relative.shape[:-1]),
         leads=np.zeros(relative.shape[:-1], dtype=bool),
-        covariance=0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance,
+        sensor=Sensor("coordinates", 0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance),
         process=np.zeros((*relative.shape[:-2], size, size)) if process is None else process,
         leader=np.zeros(relative.shape[:-2], dtype=bool),
         mission=None,

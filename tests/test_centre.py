@@ -8,6 +8,7 @@ from affinet.batch import fly_all
 from affinet.run import fly, rehearse
 from affinet.sections import ScenarioError
 from agents.centre import Centre
+from analysis.sensor import Sensor
 from netem.links import Links
 from world.formation import PRESETS
 
@@ -23,7 +24,7 @@ def centre(rng, dimension=2, noise=1.0):
         dt=0.1,
         neighbours=LINKS.neighbours,
         present=LINKS.present,
-        measurement=0.01 * (sensor @ sensor.T + np.eye(dimension)),
+        sensor=Sensor("coordinates", 0.01 * (sensor @ sensor.T + np.eye(dimension))),
         process=noise * 1e-3 * root @ root.T,
         prior_position=1.5,
     )
@@ -45,8 +46,8 @@ class Printed:
     def step(self, y, seen, u):
         x = self.x + self.filtered.dt * self.lifted @ u.ravel()
         covariance = self.covariance + self.lifted @ self.filtered.process @ self.lifted.T
-        H = np.eye(len(x))[np.repeat(seen, len(self.filtered.measurement))]
-        R = np.kron(np.eye(int(seen.sum())), self.filtered.measurement)
+        H = np.eye(len(x))[np.repeat(seen, len(self.filtered.sensor.covariance))]
+        R = np.kron(np.eye(int(seen.sum())), self.filtered.sensor.covariance)
         K = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + R)
         self.x = x + K @ (y[seen].ravel() - H @ x)
         self.covariance = covariance - K @ H @ covariance

@@ -12,6 +12,7 @@ from agents.controllers import ConstantVelocity, Static, VaryingVelocity, needs_
 from agents.estimators.base import Estimate, Heard
 from agents.estimators.none import NoEstimator
 from analysis.affine import Manoeuvre
+from analysis.sensor import Sensor
 from netem.channels import INPUT
 from netem.links import Links
 from world.formation import PRESETS
@@ -132,7 +133,7 @@ def zhao7():
         present=links.present,
         stress=np.where(links.present, stress, 0.0),
         leads=links.present & formation.is_leader[links.neighbours],
-        covariance=0.01 * np.eye(2),
+        sensor=Sensor("coordinates", 0.01 * np.eye(2)),
         process=np.zeros((7, 8, 8)),
         leader=formation.is_leader,
         mission=corridor(np.arange(0, 125, 0.01)),

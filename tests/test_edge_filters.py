@@ -79,7 +79,7 @@ def test_edge_kf_is_filterpys_filter_on_the_same_measurements_losses_and_inputs(
         one = KalmanFilter(dim_x=dimension, dim_z=dimension, dim_u=2 * dimension)
         one.B = DT * np.hstack([np.eye(dimension), -np.eye(dimension)])
         one.Q = agent.process[block(dimension, edge), block(dimension, edge)]
-        one.H, one.R, one.P = np.eye(dimension), agent.covariance, 2 * 1.5**2 * np.eye(dimension)
+        one.H, one.R, one.P = np.eye(dimension), agent.sensor.covariance, 2 * 1.5**2 * np.eye(dimension)
         theirs.append(one)
     for y, seen, own, said in flight(dimension):
         state, estimate = tick(filters, agent, state, y, seen, own, said)
@@ -163,7 +163,7 @@ def test_without_disturbances_the_advantage_of_joint_kf_dies_away_as_one_over_ti
     gaps, moves = [], []
     for ticks in (200, 800):
         (_, last), (_, joint) = (last_of(kind, agent, ticks) for kind in (EdgeKalmanFilter, JointEdgeFilter))
-        np.testing.assert_allclose(ticks * joint.covariance, np.stack([agent.covariance] * 4), rtol=0.01, atol=1e-5)
+        np.testing.assert_allclose(ticks * joint.covariance, np.stack([agent.sensor.covariance] * 4), rtol=0.01, atol=1e-5)
         gaps.append(np.trace(last.covariance - joint.covariance, axis1=-2, axis2=-1).sum())
         moves.append(np.abs(last.relative - joint.relative).max())
     assert gaps[0] / gaps[1] == pytest.approx(16, rel=0.02)
@@ -189,7 +189,7 @@ def test_joint_kf_is_the_textbook_filter_with_the_rows_of_unseen_edges_taken_out
         x, P = x + DT * (own - theirs).ravel(), P + agent.process
         if seen.any():
             H = np.eye(size)[np.repeat(seen, dimension)]
-            R = np.kron(np.eye(seen.sum()), agent.covariance)
+            R = np.kron(np.eye(seen.sum()), agent.sensor.covariance)
             K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
             x, P = x + K @ (y[seen].ravel() - H @ x), (np.eye(size) - K @ H) @ P
         np.testing.assert_allclose(estimate.relative.ravel(), x, atol=1e-10)
@@ -344,7 +344,7 @@ def test_an_input_that_is_lost_widens_the_edge_by_its_doubt_over_a_tick(kind):
 def test_mmse_draws_the_measurement_toward_the_last_estimate(dimension):
     agent, mmse = agent_of(dimension), MinimumMeanSquareError(sigma_prior=0.2)
     state, x = mmse.init(agent, ()), np.zeros((4, dimension))
-    weights = 0.04 * np.linalg.inv(0.04 * np.eye(dimension) + agent.covariance)
+    weights = 0.04 * np.linalg.inv(0.04 * np.eye(dimension) + agent.sensor.covariance)
     for y, seen, own, theirs in flight(dimension, ticks=20):
         state, estimate = tick(mmse, agent, state, y, seen, own, theirs)
         x = np.where(seen[:, None], x + (y - x) @ weights.T, x)
@@ -364,9 +364,9 @@ def test_mmse_is_surer_than_the_measurement_by_the_sign_of_eq_4_21():
     agent, mmse = agent_of(2), MinimumMeanSquareError(sigma_prior=0.2)
     seen = only(4, 0, 1, 2)
     _, estimate = tick(mmse, agent, mmse.init(agent, ()), np.ones((4, 2)), seen, np.zeros(2), np.zeros((4, 2)))
-    expected = np.linalg.inv(np.eye(2) / 0.04 + np.linalg.inv(agent.covariance))
+    expected = np.linalg.inv(np.eye(2) / 0.04 + np.linalg.inv(agent.sensor.covariance))
     np.testing.assert_allclose(estimate.covariance[seen], np.stack([expected] * 3), atol=1e-12)
-    assert np.linalg.eigvalsh(agent.covariance - estimate.covariance[seen]).min() > 0
+    assert np.linalg.eigvalsh(agent.sensor.covariance - estimate.covariance[seen]).min() > 0
     np.testing.assert_allclose(estimate.covariance[~seen], [0.04 * np.eye(2)])
 
 
@@ -376,12 +376,12 @@ def test_the_mle_is_the_mean_of_the_measurements_of_the_tick():
     short = ("time.dt=0.05", "time.duration=1", 'agents.estimator="mle"')
     ten, forty = (make(scenario.load("rigid", [*short, f"sensing.samples={number}"])) for number in (10, 40))
     flown = rehearse(ten).arrays
-    np.testing.assert_allclose(ten.world.covariance, np.array([[0.01, 0.003], [0.003, 0.01]]) / 10)
-    np.testing.assert_allclose(forty.world.covariance, ten.world.covariance / 4)
+    np.testing.assert_allclose(ten.world.sensor.covariance, np.array([[0.01, 0.003], [0.003, 0.01]]) / 10)
+    np.testing.assert_allclose(forty.world.sensor.covariance, ten.world.sensor.covariance / 4)
     links, position = ten.world.links, flown["position"][:-1]
     off = (flown["estimate"] - (position[:, :, None] - position[:, links.neighbours]))[:, links.present]
     assert flown["known"][:, links.present].all()
-    np.testing.assert_allclose(np.cov(off.reshape(-1, 2).T), ten.world.covariance, atol=1.5e-4)
+    np.testing.assert_allclose(np.cov(off.reshape(-1, 2).T), ten.world.sensor.covariance, atol=1.5e-4)
 
 
 # Slots without a neighbour
@@ -394,7 +394,7 @@ def test_padding_changes_nothing(kind, dimension):
     process = np.zeros((6 * dimension, 6 * dimension))
     agent = agent_of(dimension, positive(4 * dimension, 3))
     process[: 4 * dimension, : 4 * dimension] = agent.process
-    padded = replace(brief(relative, agent.covariance, process), present=only(6, 0, 1, 2, 3))
+    padded = replace(brief(relative, agent.sensor.covariance, process), present=only(6, 0, 1, 2, 3))
     filters = kind(coefficients=(0.9,), sigma_n=1.0)
     few, many = filters.init(agent, ()), filters.init(padded, ())
     for y, seen, own, theirs in flight(dimension, ticks=20):

@@ -8,7 +8,7 @@ from affinet.batch import fly_all
 from affinet.inprocess import Swarm
 from affinet.run import rehearse
 from affinet.side_by_side import NotABatch, side_by_side
-from analysis import metrics
+from analysis import consistency, metrics
 from world.history import History
 
 SEEDS = (1, 7, 2**63 + 5)
@@ -76,10 +76,12 @@ def test_the_runs_of_a_study_are_those_runs():
     np.testing.assert_array_equal(runs.psi[54], alone.arrays["psi"][::4])
     arrays = {name: array[:60:4] for name, array in alone.arrays.items()}
     position, known = arrays["position"], arrays["known"]
+    true = position[..., :, None, :] - position[..., links.neighbours, :]
     expected = {
         "procrustes": metrics.procrustes_error(position, formation.nominal, np.ones((15, 7), dtype=bool)),
-        "estimation_error": metrics.estimation_error(arrays["estimate"], position, links.neighbours, known),
+        "estimation_error": metrics.estimation_error(arrays["estimate"], true, known),
         "covariance_trace": metrics.covariance_trace(arrays["covariance"], 2),
+        "nees": consistency.of_errors(arrays["estimate"], true, arrays["covariance"], known).mean,
     }
     for name, values in expected.items():
         assert len(np.unique(values)) == 15

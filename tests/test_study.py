@@ -8,7 +8,7 @@ import pytest
 from flying import PROCESSES
 from PIL import Image
 
-from affinet import cli, scenario, study
+from affinet import cli, judging, scenario, study, study_report
 from affinet import plan as planning
 from affinet.batch import Runs
 from affinet.sections import ScenarioError
@@ -96,7 +96,7 @@ def test_every_case_of_a_shipped_study_can_fly(name, quick):
 def test_what_is_wrong_in_a_study_is_said(old, new, says, tiny):
     tiny.write_text(TINY.replace(old, new, 1))
     with pytest.raises(ScenarioError, match=says):
-        study.judge(loaded := study.load(str(tiny)), study.run(loaded, quick=True, watch=lambda _: None))
+        judging.judge(loaded := study.load(str(tiny)), study.run(loaded, quick=True, watch=lambda _: None))
 
 
 def test_an_unknown_study_is_named_with_those_there_are():
@@ -143,9 +143,9 @@ def test_a_map_leaves_out_what_it_is_told_to_and_a_claim_is_judged_for_each_labe
     assert len(cases) == 6
     assert ("none", "static", "rkf") not in cases
     results = study.run(mapped, quick=True, watch=lambda _: None)
-    verdicts = study.judge(mapped, results)
+    verdicts = judging.judge(mapped, results)
     assert [verdict.says for verdict in verdicts] == ["static: losses cost nothing", "varying: losses cost nothing"]
-    study.save(tmp_path / "out", mapped, results, verdicts)
+    study_report.save(tmp_path / "out", mapped, results, verdicts)
     with Image.open(tmp_path / "out" / "figure.png") as figure:
         assert min(figure.size) > 200
 
@@ -223,10 +223,10 @@ def pair(tmp_path):
 def made_up(labels, **quantities):
     """A case whose runs hold these values, over four seconds."""
     shape = (5, 4)
-    rest = {name: np.full(shape, 7e7) for name in ("error", "procrustes", "estimation_error", "covariance_trace")}
+    rest = {name: np.full(shape, 7e7) for name in study.NAMES}
     rest |= {name: np.broadcast_to(values, shape) for name, values in quantities.items()}
     runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), **rest)
-    return study.Result(labels, runs, None, None)
+    return study.Result(labels, None, runs)
 
 
 def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
@@ -236,7 +236,7 @@ def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
         made_up(labels[0], procrustes=0.2, estimation_error=1.0, covariance_trace=0.2),
         made_up(labels[1], procrustes=0.1, estimation_error=later, covariance_trace=0.04),
     ]
-    verdicts = study.judge(pair, results)
+    verdicts = judging.judge(pair, results)
     assert [verdict.holds for verdict in verdicts] == [True, True, False, True]
     assert verdicts[0].found.startswith("ratio 0.5,")
     assert verdicts[1].found.startswith("ratio 0.333,")
@@ -246,7 +246,7 @@ def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
 def test_a_study_of_a_quantity_leaves_all_quantities_and_a_figure(pair, tmp_path):
     pair = pair.model_copy(update={"claims": pair.claims[:1]})  # the others look beyond these 0.2 s
     results = study.run(pair, quick=True, watch=lambda _: None)
-    study.save(tmp_path / "out", pair, results, study.judge(pair, results))
+    study_report.save(tmp_path / "out", pair, results, judging.judge(pair, results))
     curves = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
     assert curves["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
     for name in ("error", "procrustes", "estimation_error", "covariance_trace"):

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from agents.brief import Brief
 from agents.process import AgentBrief, Choice
 from analysis.affine import Manoeuvre
+from analysis.sensor import Sensor
 from netem import wire
 from netem.delay import Law
 from netem.fault import Body, Fault, UnderWay, Verb
@@ -292,7 +293,7 @@ BRIEF = Brief(
     present=np.array([True, True, False]),
     stress=np.array([0.3, -0.1, 0.0]),
     leads=np.array([True, False, False]),
-    covariance=0.01 * np.eye(2),
+    sensor=Sensor("coordinates", 0.01 * np.eye(2)),
     process=1e-6 * np.arange(36.0).reshape(6, 6),
     leader=np.array(False),
     mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),

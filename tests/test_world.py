@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from analysis.sensor import Sensor
 from netem.fault import Body, Fault, UnderWay, Verb
 from netem.links import Links
 from netem.timeline import Timeline
@@ -56,7 +57,7 @@ def world():
         formation=ZHAO7,
         links=SEVEN,
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
-        covariance=0.01 * np.eye(2),
+        sensor=Sensor("coordinates", 0.01 * np.eye(2)),
         disturbance=pushes(0.0),
         start="targets",
         spread=1.0,
@@ -86,7 +87,7 @@ def test_sensor_noise_of_a_tick_says_nothing_of_the_next_and_of_other_links(worl
 
 
 def test_measured_is_the_position_relative_to_the_neighbour(world):
-    exact = replace(world, covariance=1e-24 * np.eye(2))
+    exact = replace(world, sensor=Sensor("coordinates", 1e-24 * np.eye(2)))
     z = np.random.default_rng(1).normal(size=(7, 2))
     row = exact.links.index[4, 2]  # what 2 sees of 4
     np.testing.assert_allclose(exact.measure(0, scene(z), QUIET)[row], z[1] - z[3], atol=1e-10)

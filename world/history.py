@@ -26,6 +26,7 @@ FILE = "arrays.npz"  # in a run directory
 
 _BY_TICK = (
     "position",
+    "measured",
     "input",
     "estimate",
     "known",
@@ -51,6 +52,8 @@ class Moment(NamedTuple):
     ----------
     position, input
         Where the agents are, and what they fly, shape (N, D), in metres, and metres per second or per second squared.
+    measured
+        What the sensors said of every directed link, heard or not, shape (L, D), in metres.
     estimate, known, covariance
         Estimated relative positions, shape (N, n, D), in metres, where there are any, shape (N, n), and the upper triangles of
         their covariances, shape (N, n, D (D + 1) / 2), in square metres.
@@ -69,6 +72,7 @@ class Moment(NamedTuple):
     """
 
     position: Any
+    measured: Any
     input: Any
     estimate: Any
     known: Any
@@ -108,6 +112,7 @@ class Moments:
 
     first: int
     position: Array
+    measured: Array
     input: Array
     estimate: Array
     known: Mask
@@ -141,6 +146,7 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
     return Moments(
         first=first,
         position=where,
+        measured=np.array([moment.measured for moment in moments]),
         input=np.array([moment.input for moment in moments]),
         estimate=np.array([moment.estimate for moment in moments]),
         known=np.array([moment.known for moment in moments], dtype=bool),
@@ -202,6 +208,7 @@ class History:
         agents, width, dimension = links.agents, links.slots.shape[1], world.formation.dimension
         self.ticks = 0
         self.position = np.zeros((ticks + 1, agents, dimension))
+        self.measured = np.zeros((ticks, len(links), dimension))
         self.target = np.zeros((ticks, agents, dimension))
         self.error = np.full(ticks, np.nan)
         self.input = np.zeros((ticks, agents, dimension))

@@ -58,6 +58,7 @@ class Logbook:
                 run=run,
                 formation=world.formation,
                 links=world.links,
+                sensor=world.sensor,
                 dt=world.dt,
                 every=books.every,
                 viewer=books.viewer,

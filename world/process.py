@@ -74,7 +74,7 @@ class Theatre:
                 acts = self._read_acts(tick)
             self._hear_of_faults(journal)
             now = self._timeline.at(tick)
-            moment = self._moment(scene, journal, acts, now)
+            moment = self._moment(scene, measured, journal, acts, now)
             self._moments.append(moment)
             self._vigil.see(tick, scene.position, self._timeline)
             scene = self._world.step(tick, scene, measured, moment.input, now)
@@ -138,11 +138,14 @@ class Theatre:
             return f"agents {sorted(self._awaited)} to act in tick {tick}"
         return f"the medium's journal of tick {tick}"
 
-    def _moment(self, scene: Scene, journal: wire.Journal, acts: dict[int, wire.Act], now: Conditions) -> Moment:
+    def _moment(
+        self, scene: Scene, measured: Array, journal: wire.Journal, acts: dict[int, wire.Act], now: Conditions
+    ) -> Moment:
         self._account(journal, acts)
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
         return Moment(
             position=scene.position,
+            measured=measured,
             input=self._world.flown(scene, np.array([act.input for act in everybody]), now),
             estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
             known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],

@@ -13,7 +13,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from analysis import consistency
 from analysis.metrics import procrustes_error
+from analysis.sensor import Sensor
 from netem.fate import REASONS, Fate, Fates
 from netem.links import Links
 from netem.timeline import Conditions, Timeline
@@ -43,6 +45,7 @@ _LINK_COLOURS = {
     Fate.LOST: 0xFF9F1CFF,
     Fate.OVERFLOW: 0x26C6DAFF,
 }
+_LEVEL = 0.95  # of the band of consistent filters, in which edges count as independent
 _COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
 
 
@@ -55,8 +58,8 @@ class Recorder:
         Of the recording.
     run
         Its name.
-    formation, links
-        Who flies, and who is linked to whom.
+    formation, links, sensor
+        Who flies, who is linked to whom, and what measures the edges.
     dt
         Tick, in seconds.
     every
@@ -72,12 +75,14 @@ class Recorder:
         run: str,
         formation: Formation,
         links: Links,
+        sensor: Sensor,
         dt: float,
         every: int,
         viewer: str | None = None,
     ) -> None:
         self._formation = formation
         self._links = links
+        self._sensor = sensor
         self._dt = dt
         self._every = every
         self._edges = np.array(formation.edges, dtype=np.int64) - 1
@@ -100,6 +105,7 @@ class Recorder:
         shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
         self._scalars("metrics/procrustes", time, shape[:, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
+        self._log_consistency(time, moments, kept)
         numbers = np.arange(1.0, self._formation.agents + 1.0)
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
@@ -125,6 +131,13 @@ class Recorder:
             ("metrics/procrustes", rr.SeriesLines(names="Procrustes error (m)", colors=0xFFFFFFFF)),
             ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),
             ("metrics/infeasible", rr.SeriesPoints(names=[f"agent {number}" for number in numbers], marker_sizes=2.0)),
+            (
+                "metrics/consistency",
+                rr.SeriesLines(
+                    names=["NEES", "NIS", f"{_LEVEL:.0%} from", f"{_LEVEL:.0%} to"],
+                    colors=np.array([0x3DDC84FF, 0x3FA7F5FF, 0xAAAAAAFF, 0xAAAAAAFF], dtype=np.uint32),
+                ),
+            ),
             (
                 "graph/connectivity",
                 rr.SeriesLines(
@@ -176,6 +189,19 @@ class Recorder:
         self._scalars("graph/age", time, mean_age)
         counts = np.stack([realised.feasible.sum(axis=-1), realised.stress_dimension[:, 0]], axis=-1)
         self._scalars("graph/rigidity", time, counts.astype(np.float64))
+
+    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+        links, position, estimate = self._links, moments.position[kept], moments.estimate[kept]
+        known, covariance = moments.known[kept], moments.covariance[kept]
+        true = position[:, :, None] - position[:, links.neighbours]
+        measured, arrived = moments.measured[kept][:, links.slots], moments.fates[kept, 0][:, links.slots]
+        errors = consistency.of_errors(estimate, true, covariance, known)
+        innovations = consistency.of_innovations(
+            estimate, measured, covariance, self._sensor.spread(measured), known & (arrived == Fate.DELIVERED)
+        )
+        dimension = position.shape[-1]
+        bands = [consistency.band(_LEVEL, dimension, max(number, 1)) for number in errors.number.tolist()]
+        self._scalars("metrics/consistency", time, np.column_stack([errors.mean, innovations.mean, np.array(bands)]))
 
     def _messages_per_tick(self, moments: Moments) -> Array:
         starts = np.arange(0, len(moments.ticks), self._every)
@@ -254,6 +280,7 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
         rrb.Tabs(
             rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
             rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
+            rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),
         ),
         rrb.Tabs(
             rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),

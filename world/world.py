@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
+from analysis.sensor import Sensor
 from netem.draws import Purpose, Seed, Tape, uniform
 from netem.links import Integers, Links, Mask
 from netem.timeline import Conditions
@@ -56,8 +57,8 @@ class World:
         Of the bodies: single integrators (1) or double integrators (2).
     formation, links, manoeuvre
         Who flies, who is linked to whom, and what the leaders fly.
-    covariance
-        Of a relative measurement, shape (D, D), in square metres.
+    sensor
+        What measures relative positions.
     disturbance
         What displaces the agents in every tick.
     start
@@ -75,7 +76,7 @@ class World:
     formation: Formation
     links: Links
     manoeuvre: Manoeuvre
-    covariance: Array
+    sensor: Sensor
     disturbance: Disturbance
     start: Literal["targets", "origin"]
     spread: float
@@ -98,7 +99,7 @@ class World:
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
         """y_ij of every directed link, shape (L, D), in metres."""
-        measured = sensors.relative(scene.position, self.links) + self._sensor_noise.at(tick)
+        measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
         if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
             return measured
         size = self._normal(Purpose.OUTLIER_SIZE, tick)
@@ -132,7 +133,9 @@ class World:
 
     @cached_property
     def _sensor_noise(self) -> Tape:
-        return Tape(lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.covariance))
+        return Tape(
+            lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.sensor.covariance)
+        )
 
     def _normal(self, purpose: Purpose, tick: int | NDArray[np.int64]) -> Array:
         """Standard normal draws for every measurement of a tick, shape (..., L, D)."""

@@ -94,7 +94,7 @@ class ConsensusLocalization:
         return state._replace(consensus=consensus), complete(brief, state.perceived, shape, covariance, psi)
 
     def _covariance(self, shape: geometry.Fit, brief: Brief) -> Array:
-        return MAPS[self.constraint].covariance(shape, brief.relative, brief.covariance)
+        return MAPS[self.constraint].covariance(shape, brief.relative, brief.sensor.common)
 
     def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
         nearest = MAPS[self.constraint].nearest(consensus.theta)

@@ -81,7 +81,8 @@ class EdgeKalmanFilter:
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
         covariance = state.covariance + of_edges(brief) + brief.dt**2 * doubt
-        filters = kalman.correct(mean, covariance, state.measured, brief.covariance, state.seen)
+        R = brief.sensor.spread(state.measured)
+        filters = kalman.correct(mean, covariance, state.measured, R, state.seen)
         estimate = Estimate(
             filters[0], np.broadcast_to(brief.present, state.seen.shape), filters[1], no_indicator(state.seen)
         )

@@ -72,7 +72,7 @@ class GeometryAwareFilter(EdgeFilters):
         R = observed.covariance
         if self.constraint != "affine":
             # What lies outside its class a constrained map cannot see: alone it would be believed absolutely there.
-            R = R + np.where(seen[..., None, None], 0.0, brief.covariance)
+            R = R + np.where(seen[..., None, None], 0.0, brief.sensor.common)
         if self.penalty:
             doubt = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
             R = R + doubt[..., None, None] * identity(brief.dimension)

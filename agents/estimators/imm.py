@@ -80,8 +80,9 @@ class InteractingMultipleModel:
         mean, covariance = _mix(state.mean, state.covariance, weights)
         mean, covariance = (F @ mean[..., None])[..., 0], F @ covariance @ np.swapaxes(F, -1, -2) + Q
         observed, usable = measured[..., None, :], seen[..., None]
-        surprise = _surprise(mean, covariance, observed, brief.covariance)
-        mean, covariance = kalman.correct(mean, covariance, observed, brief.covariance, usable)
+        R = brief.sensor.spread(measured)[..., None, :, :]
+        surprise = _surprise(mean, covariance, observed, R)
+        mean, covariance = kalman.correct(mean, covariance, observed, R, usable)
         probability = np.where(usable, _weighed(expected, surprise), expected)
         return Modes(mean, covariance, probability, state.known | seen), {}
 

@@ -80,7 +80,7 @@ class JointEdgeFilter:
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
         covariance = state.covariance + brief.process + brief.dt**2 * block_diagonal(doubt)
-        R = block_diagonal(np.broadcast_to(brief.covariance, (*state.seen.shape, *brief.covariance.shape)))
+        R = block_diagonal(brief.sensor.spread(state.measured))
         mean, covariance = corrected(mean, covariance, state.measured, R, state.seen)
         known = np.broadcast_to(brief.present, state.seen.shape)
         estimate = Estimate(mean, known, diagonal_blocks(covariance, brief.dimension), no_indicator(state.seen))

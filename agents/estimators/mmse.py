@@ -45,7 +45,7 @@ class MinimumMeanSquareError:
     def sense(self, brief: Brief, state: Recent, measured: Array, seen: Mask) -> tuple[Recent, Mapping[str, Fields]]:
         """Correct the last estimates (4.20)."""
         prior = np.broadcast_to(self._prior(brief), state.covariance.shape)
-        return Recent(*kalman.correct(state.mean, prior, measured, brief.covariance, seen)), {}
+        return Recent(*kalman.correct(state.mean, prior, measured, brief.sensor.spread(measured), seen)), {}
 
     def fuse(
         self,

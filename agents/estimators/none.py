@@ -50,5 +50,5 @@ class NoEstimator:
         own: Own,  # noqa: ARG002
     ) -> tuple[Measured, Estimate]:
         """The measurements."""
-        covariance = np.broadcast_to(brief.covariance, (*state.seen.shape, *brief.covariance.shape))
+        covariance = brief.sensor.spread(state.measured)
         return state, Estimate(state.measured, state.seen, covariance, no_indicator(state.seen))

@@ -70,7 +70,7 @@ class RelativeAffineLocalization:
         """Complete the measurements by the local map."""
         said = heard[THETA]
         psi = geometry.indicator(state.local, said.fields["local"], said.fresh & said.fields["feasible"])
-        covariance = MAPS[self.constraint].covariance(state.local, brief.relative, brief.covariance)
+        covariance = MAPS[self.constraint].covariance(state.local, brief.relative, brief.sensor.common)
         return state, complete(brief, state, state.local, covariance, psi)
 
 
@@ -81,6 +81,6 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
     """
     seen = perceived.seen
     relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))
-    covariance = np.where(seen[..., None, None], brief.covariance, geometric)
+    covariance = np.where(seen[..., None, None], brief.sensor.common, geometric)
     known = brief.present & (seen | shape.feasible[..., None])
     return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible)

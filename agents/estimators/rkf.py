@@ -85,7 +85,7 @@ class RelativeKalmanFilter(EdgeFilters):
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""
-        return self.advance(brief, state, measured, brief.covariance, seen), {}
+        return self.advance(brief, state, measured, brief.sensor.spread(measured), seen), {}
 
     def fuse(
         self,

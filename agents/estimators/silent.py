@@ -107,7 +107,8 @@ class SilentEdgeFilter:
         theirs, doubt = self._neighbours(brief, past)
         mean = past.mean[..., 0, :, :] + brief.dt * (own.input[..., None, :] - theirs)
         covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt**2 * doubt
-        mean, covariance = kalman.correct(mean, covariance, state.measured, brief.covariance, state.seen)
+        R = brief.sensor.spread(state.measured)
+        mean, covariance = kalman.correct(mean, covariance, state.measured, R, state.seen)
         newer = Past(
             mean=_pushed(mean, past.mean, -3),
             covariance=_pushed(covariance, past.covariance, -4),

@@ -1,0 +1,84 @@
+"""The verdict of a study on each of its claims."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from affinet.batch import Runs
+from affinet.sections import ScenarioError
+from affinet.study import NAMES, Claim, Quantity, Result, Study, selected
+from analysis import claims
+from analysis.claims import Verdict
+from world.formation import Array
+
+
+def judge(study: Study, results: list[Result]) -> list[Verdict]:
+    """The verdict on each of its claims.
+
+    Raises
+    ------
+    ScenarioError
+        When a claim looks at what was not flown.
+    """
+    verdicts = []
+    for claim in itertools.chain.from_iterable(_spelled_out(study, claim) for claim in study.claims):
+        try:
+            verdicts.append(_judge(claim, results, claim.quantity or study.quantity))
+        except ValueError as error:
+            raise ScenarioError(f"claim {claim.says!r}: {error}") from error
+    return verdicts
+
+
+def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
+    """A claim for each label of the axes it is for."""
+    values = {axis.name: list(axis.values) for axis in study.axes}
+    for labels in itertools.product(*(values[name] for name in claim.each)):
+        where = dict(zip(claim.each, labels, strict=True))
+        other = None if claim.to is None else claim.to | where
+        yield claim.model_copy(
+            update={"says": ", ".join(labels) + ": " * bool(labels) + claim.says, "of": claim.of | where, "to": other}
+        )
+
+
+def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
+    chosen = [one for one in results if selected(one, claim.of)]
+    if not chosen:
+        raise ValueError(f"no case has the labels {claim.of}")
+    span, unit = (claim.since, claim.until), NAMES[quantity][1]
+
+    def means(of: list[Result]) -> Array:
+        return np.array([_mean_of(one.runs, quantity, span) for one in of])
+
+    other = [one for one in results if selected(one, claim.to or {})]
+    seconds = chosen[0].runs.seconds
+    values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
+    match claim.check:
+        case "flat":
+            return claims.flat(claim.says, means(chosen), claim.level or 2.0, unit)
+        case "approaches":
+            return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
+        case "lower":
+            return claims.lower(claim.says, means(chosen), means(other), unit)
+        case "ratio":
+            (one,), (another,) = means(chosen), means(other)
+            return claims.ratio(claim.says, one, another, claim.between or [0.0, 1.0])
+        case "stays_below":
+            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
+        case "leaves":
+            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
+        case "indicator_below_error":
+            (one,) = chosen
+            followers, limits, runs = one.followers, one.bounds, one.runs
+            psi = (runs.psi - limits.offset)[:, :, followers]
+            return claims.below_in_mean(claim.says, runs.seconds, psi, runs.error[..., None] * limits.slope[followers])
+
+
+def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
+    """The mean of each run over a span of seconds, shape (R,); of the tracking error over all of it, every tick counts."""
+    if quantity == "error" and span == (0.0, None):
+        return runs.mean_error
+    values: Array = getattr(runs, quantity)
+    return values[:, claims.within(runs.seconds, span)].mean(axis=1)

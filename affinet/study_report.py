@@ -1,0 +1,65 @@
+"""What a study leaves: data as Parquet, figures, and the verdicts.
+
+`curves.parquet` has a row for each moment of each case, with mean and standard deviation over its runs; `runs.parquet` has a
+row for each run, with its mean error.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from affinet.study import NAMES, Quantity, Result, Study
+from analysis import figures
+from analysis.claims import Verdict
+from analysis.figures import Curve
+
+
+def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
+    """Write data, figure and verdicts into a directory."""
+    out.mkdir(parents=True, exist_ok=True)
+    pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
+    pq.write_table(pa.concat_tables([_runs(one) for one in results]), out / "runs.parquet")
+    (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+    axes = [axis.name for axis in study.axes]
+    curves = _curves(results, study.quantity)
+    if study.figure == "curves":
+        figures.curves(out / "figure.png", study.title, curves, axes, figures.said(*NAMES[study.quantity]))
+        dimension = results[0].plan.world.formation.dimension
+        normalised = {what.upper(): _curves(results, what) for what in ("nees", "nis")}
+        figures.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
+    elif study.figure == "sweep":
+        figures.sweep(out / "figure.png", study.title, curves, axes, study.along or "")
+    elif study.figure == "map":
+        figures.settings(out / "figure.png", study.title, curves, axes)
+    else:
+        (one,) = results
+        corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
+        numbers = np.flatnonzero(one.followers)
+        path, seen = out / "figure.png", corrected[:, :, numbers]
+        figures.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())
+
+
+def _curves(results: list[Result], quantity: Quantity) -> list[Curve]:
+    return [Curve(one.labels, one.runs.seconds, getattr(one.runs, quantity), one.runs.mean_error) for one in results]
+
+
+def _moments(one: Result) -> pa.Table:
+    number = len(one.runs.seconds)
+    columns = {name: [label] * number for name, label in one.labels.items()} | {"seconds": one.runs.seconds}
+    with np.errstate(invalid="ignore", over="ignore"):
+        for name in NAMES:
+            values = getattr(one.runs, name)
+            columns |= {f"mean_{name}": values.mean(axis=0), f"std_{name}": values.std(axis=0)}
+    return pa.table(columns)
+
+
+def _runs(one: Result) -> pa.Table:
+    number = len(one.runs.mean_error)
+    labels = {name: [label] * number for name, label in one.labels.items()}
+    return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error})
