@@ -18,7 +18,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, files, scenario, show
+from affinet import compare, files, fit, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
@@ -79,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
     _add_hunt(commands)
     _add_study(commands)
+    _add_fit(commands)
     run.set_defaults(command=_run)
     check.set_defaults(command=_check)
     replay.set_defaults(command=_replay)
@@ -170,6 +171,18 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     study.set_defaults(command=_study)
 
 
+def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    fitting = commands.add_parser(
+        "fit", help="an autoregressive model of the inputs of a run, for filters that predict them"
+    )
+    fitting.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
+    fitting.add_argument(
+        "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
+    )
+    fitting.add_argument("--json", action="store_true", help="print one JSON object")
+    fitting.set_defaults(command=_fit)
+
+
 def _groups(text: str) -> tuple[tuple[int, ...], ...]:
     try:
         return tuple(tuple(int(agent) for agent in group.split(",")) for group in text.split("/"))
@@ -256,6 +269,12 @@ def _study(parsed: argparse.Namespace) -> int:
     verdicts = judging.judge(study, results)
     study_report.save(out, study, results, verdicts)
     show.claims(study, verdicts, out)
+    return PASS
+
+
+def _fit(parsed: argparse.Namespace) -> int:
+    model = fit.inputs(parsed.directory, parsed.order)
+    print(json.dumps(asdict(model)) if parsed.json else "\n".join(fit.overrides(model)))  # noqa: T201
     return PASS
 
 

@@ -69,6 +69,8 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
             return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "leaves":
             return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
+        case "exponential":
+            return claims.exponential(claim.says, seconds, values, span)
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs

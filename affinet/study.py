@@ -54,7 +54,9 @@ class Claim(Section):
 
     says: str
     each: list[str] = Field(default_factory=list)
-    check: Literal["flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower", "ratio"]
+    check: Literal[
+        "flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower", "ratio", "exponential"
+    ]
     of: Labels
     to: Labels | None = None
     quantity: Quantity | None = None

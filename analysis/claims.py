@@ -14,6 +14,7 @@ Span = tuple[float, float | None]
 _STANDARD_ERRORS = 3.0
 _MOST = 0.9  # of the runs
 _DOUBLE = 2.0
+_STRAIGHT = 0.99
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,18 @@ def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, un
     inside = within(seconds, span)
     above = ~(error[:, inside] < level).all(axis=1)
     return Verdict(says, bool(above.mean() >= _MOST), f"{above.mean():.0%} of the runs come above {level:g} {unit}")
+
+
+def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
+    """In most runs (R, T) the logarithm of the error falls along a straight line over a span of seconds."""
+    inside = within(seconds, span)
+    time, logarithm = seconds[inside] - seconds[inside].mean(), np.log(error[:, inside])
+    slope = (logarithm @ time) / (time @ time)
+    total = logarithm - logarithm.mean(axis=1, keepdims=True)
+    explained = 1.0 - ((total - slope[:, None] * time) ** 2).sum(axis=1) / (total**2).sum(axis=1)
+    straight = (explained >= _STRAIGHT) & (slope < 0.0)
+    found = f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}), by {-slope.mean():.3g} 1/s"
+    return Verdict(says, bool(straight.mean() >= _MOST), found)
 
 
 def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Verdict:

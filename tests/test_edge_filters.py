@@ -163,7 +163,9 @@ def test_without_disturbances_the_advantage_of_joint_kf_dies_away_as_one_over_ti
     gaps, moves = [], []
     for ticks in (200, 800):
         (_, last), (_, joint) = (last_of(kind, agent, ticks) for kind in (EdgeKalmanFilter, JointEdgeFilter))
-        np.testing.assert_allclose(ticks * joint.covariance, np.stack([agent.sensor.covariance] * 4), rtol=0.01, atol=1e-5)
+        np.testing.assert_allclose(
+            ticks * joint.covariance, np.stack([agent.sensor.covariance] * 4), rtol=0.01, atol=1e-5
+        )
         gaps.append(np.trace(last.covariance - joint.covariance, axis1=-2, axis2=-1).sum())
         moves.append(np.abs(last.relative - joint.relative).max())
     assert gaps[0] / gaps[1] == pytest.approx(16, rel=0.02)

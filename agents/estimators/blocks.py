@@ -10,9 +10,10 @@ from agents.brief import Array
 def block_diagonal(blocks: Array) -> Array:
     """Blocks (..., n, D, D) on the diagonal of matrices (..., n D, n D)."""
     slots, dimension = blocks.shape[-3], blocks.shape[-1]
-    apart = blocks[..., :, :, None, :] * np.eye(slots)[:, None, :, None]
-    matrix: Array = apart.reshape(*blocks.shape[:-3], slots * dimension, slots * dimension)
-    return matrix
+    apart = np.zeros((*blocks.shape[:-3], slots, dimension, slots, dimension))
+    for slot in range(slots):
+        apart[..., slot, :, slot, :] = blocks[..., slot, :, :]
+    return apart.reshape(*blocks.shape[:-3], slots * dimension, slots * dimension)
 
 
 def diagonal_blocks(matrix: Array, dimension: int) -> Array:
