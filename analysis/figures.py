@@ -67,7 +67,10 @@ def consistency(
             panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
         for panel in row:
             panel.axhspan(*band(_LEVEL, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
-    _finish(figure, panels, title, "time (s)", "mean over edges and runs", each)
+    _finish(figure, panels, title, "time (s)", "mean", each)
+    for panel in panels.ravel():
+        panel.set_yscale("linear")
+        panel.set_ylim(0.0, 3.0 * dimension)
     figure.savefig(path)
 
 
