@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from affinet.inprocess import Swarm
+from affinet.inprocess import Instant, Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import consistency, metrics
+from analysis.localization import Edges, centroid, distance, ringing, weights
+from netem import channels
 from netem.fate import Fate
 from netem.links import Mask
 from world.formation import Array
 from world.history import Moment
+from world.localized import FirstMeasurements
 
 # As many as fit into a cache of a few megabytes together; more at once are not faster.
 _AT_ONCE = 50
@@ -40,6 +43,12 @@ class Runs:
         As in `analysis.metrics`, in those ticks, shape (R, T), in metres, metres and square metres.
     nees, nis
         Means over the edges, as in `analysis.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
+    localization, drift, ringing
+        Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
+        metres, and which share of the steps between them goes back; NaN where nobody localizes.
+    place
+        Where the agents of the first run believed they were in those ticks, shape (T, N, D), in metres; of no agents where
+        nobody localizes.
     """
 
     seconds: Array
@@ -51,15 +60,19 @@ class Runs:
     covariance_trace: Array
     nees: Array
     nis: Array
+    localization: Array
+    drift: Array
+    ringing: Array
+    place: Array
 
     def together(self, other: Runs) -> Runs:
         """These runs and others of the same ticks."""
         joined = {
             field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
             for field in fields(self)
-            if field.name != "seconds"
+            if field.name not in {"seconds", "place"}
         }
-        return Runs(self.seconds, **joined)
+        return Runs(self.seconds, place=self.place, **joined)
 
 
 def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
@@ -86,6 +99,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     swarm = Swarm(together)
     errors: list[Array] = []
     kept: list[dict[str, Array]] = []
+    places = _Places(plan, len(seeds))
 
     def of_runs(array: Any) -> Any:
         return array.reshape(len(seeds), size, *array.shape[1:])
@@ -95,8 +109,11 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             position, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
             target = plan.world.target(instant.tick)
             errors.append(metrics.tracking_error(position, target, present))
+            places.measure(instant)
             if instant.tick % every == 0:
-                kept.append(_looked_at(together, present, swarm.moment(instant), of_runs))
+                moment = swarm.moment(instant)
+                kept.append(_looked_at(together, present, moment, of_runs))
+                places.keep(moment)
         error = np.stack(errors, axis=1)
         mean_error = error.mean(axis=1)
     return Runs(
@@ -104,7 +121,45 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         error=error[:, ::every],
         mean_error=mean_error,
         **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+        **places.found(len(kept)),
     )
+
+
+class _Places:
+    """Where the agents of many runs believe they are, and what all their measurements say."""
+
+    def __init__(self, plan: Plan, runs: int) -> None:
+        self._wanted = channels.PLACE in plan.reports
+        self._runs = runs
+        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
+        self._kept: list[Array] = []
+
+    def measure(self, instant: Instant) -> None:
+        """Take in the measurements of a tick."""
+        if self._wanted:
+            measured = instant.measured.reshape(self._runs, -1, instant.measured.shape[-1])
+            self._first.take(measured, (instant.verdicts.fate[0] == Fate.DELIVERED).reshape(self._runs, -1))
+
+    def keep(self, moment: Moment) -> None:
+        """Keep what the agents believe in a tick."""
+        if self._wanted:
+            place = moment.reports[channels.PLACE]
+            self._kept.append(place.reshape(self._runs, -1, place.shape[-1]))
+
+    def found(self, moments: int) -> dict[str, Array]:
+        """How far off they were, how far their centroid has gone, and how much they rang, shape (R, T)."""
+        if not self._wanted:
+            nothing = np.full((self._runs, moments), np.nan)
+            return {"localization": nothing, "drift": nothing, "ringing": nothing, "place": np.zeros((moments, 0, 0))}
+        place, edges = np.stack(self._kept, axis=1), self._first.edges()
+        edges = Edges(edges.information[:, None], edges.pull[:, None])
+        centre = centroid(place, weights(edges))
+        return {
+            "localization": distance(place, edges),
+            "drift": np.linalg.norm(centre - centre[:, :1], axis=-1),
+            "ringing": ringing(place),
+            "place": place[0],
+        }
 
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:

@@ -102,6 +102,7 @@ def brief_of(world: World, L: Array) -> Brief:
         nominal=formation.nominal,
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,
+        back=links.back,
         stress=np.where(links.present, weights, 0.0),
         leads=links.present & formation.is_leader[links.neighbours],
         sensor=world.sensor,

@@ -14,11 +14,13 @@ import numpy as np
 
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
-from analysis import consistency
+from analysis import consistency, localization
+from netem import channels
 from netem.fault import Fault, Verb
 from netem.links import Integers, Mask
 from world import sensors
 from world.formation import Array
+from world.localized import FirstMeasurements
 
 _STANDARD_ERRORS = 3.0
 
@@ -275,6 +277,39 @@ def energy(level: float) -> Checker:
         power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
         spent = np.cumsum(power) * evidence.dt
         return _every(name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} are spent")
+
+    return Checker(name, check)
+
+
+def localized(level: float, by: float = 0.0) -> Checker:
+    """From a time on, in seconds, agents are where the best answer to all first measurements puts them, to a level, in metres.
+
+    That is the root of the mean squared distance, both relative to their weighted centroid; vacuous where nobody localizes.
+    """
+    name = f"localized({level:g}, by={by:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        if channels.PLACE not in evidence.arrays:
+            return Finding(name, "vacuous", None, "nobody said where it is")
+        span = _span(evidence, by, None)
+        known = FirstMeasurements.of(evidence.plan.world, evidence.arrays["measured"], evidence.arrays["fates"][:, 0])
+        off = localization.distance(evidence.arrays[channels.PLACE][span.start : span.stop], known.edges())
+        if np.isnan(off).all():
+            return Finding(name, "vacuous", None, "what was measured does not join all agents")
+        return _every(name, evidence, span, off < level, lambda tick: f"they are {off[tick - span.start]:.4g} m off")
+
+    return Checker(name, check)
+
+
+def smooth(share: float) -> Checker:
+    """Estimated positions do not ring: no more than a share of their steps go back on the step before."""
+    name = f"smooth({share:g})"
+
+    def check(evidence: Evidence) -> Finding:
+        if channels.PLACE not in evidence.arrays:
+            return Finding(name, "vacuous", None, "nobody said where it is")
+        back = float(localization.ringing(evidence.arrays[channels.PLACE]).mean())
+        return Finding(name, "pass" if back <= share else "fail", None, f"{back:.2%} of the steps go back")
 
     return Checker(name, check)
 

@@ -15,12 +15,16 @@ from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.joint_kf import JointEdgeFilter
+from agents.estimators.jor import JacobiOverRelaxation
 from agents.second_order import DoubleVaryingVelocity
+from analysis import localization
 from analysis.affine import Array
 from analysis.graph import reached
 from netem.fault import Fault
-from world import stress
+from world import sensors, stress
 from world.formation import Formation
+from world.localized import FirstMeasurements
+from world.world import World
 
 Level = Literal["ok", "note", "error"]
 
@@ -39,9 +43,9 @@ class Finding:
         return self.level == "error"
 
 
-def framework(formation: Formation) -> list[Finding]:
-    """Whether graph, positions and leaders can carry an affine formation at all."""
-    return [_connected(formation), _edges(formation), _leaders(formation)]
+def graph(formation: Formation) -> list[Finding]:
+    """Whether the graph joins all agents."""
+    return [_connected(formation), _edges(formation)]
 
 
 def leaders_apart(formation: Formation) -> Finding:
@@ -65,6 +69,20 @@ def inputs_in_time(estimator: Any, late: bool) -> list[Finding]:
 def not_rigid(why: str) -> Finding:
     """The framework has no stabilising stress."""
     return Finding("rigidity", "error", f"{why}; add edges, or move nodes off lines")
+
+
+def localization_step(world: World, estimator: JacobiOverRelaxation) -> Finding:
+    """How fast localization comes to its answer, from measurements as they would be without noise."""
+    known = FirstMeasurements(world.links, world.sensor, ())
+    known.take(sensors.relative(world.formation.nominal, world.links), np.ones(len(world.links), dtype=bool))
+    edges = known.edges()
+    found = localization.rates(edges, estimator.h, anchor=0)
+    says = (
+        f"rate {found.anchor if estimator.anchor else found.centroid:.4f} a tick with h {estimator.h:g} (weighted centroid "
+        f"{found.centroid:.4f}, agent 1 as the anchor {found.anchor:.4f}); h {localization.step(edges, 'smooth'):.3f} is the "
+        f"fastest without ringing, {localization.step(edges, 'fast'):.3f} of all"
+    )
+    return Finding("localization", "ok", says)
 
 
 def closed_loop(formation: Formation, L: Array, law: Any, estimator: Any, dt: float) -> list[Finding]:
@@ -127,7 +145,8 @@ def _edges(formation: Formation) -> Finding:
     return Finding("edges", "ok", "every edge joins two agents, once")
 
 
-def _leaders(formation: Formation) -> Finding:
+def leaders(formation: Formation) -> Finding:
+    """Whether the leaders can carry an affine formation."""
     dimension = formation.dimension
     rows = np.array(sorted(set(formation.leaders)), dtype=np.int64) - 1
     spread = formation.nominal[rows] - formation.nominal[rows].mean(axis=0) if len(rows) else np.zeros((0, dimension))

@@ -212,6 +212,7 @@ class Swarm:
             covariance=np.where(real[..., None], estimate.spread, 0.0),
             psi=np.where(awake, estimate.psi, np.nan),
             feasible=np.where(awake, UNTOLD if estimate.feasible is None else estimate.feasible, UNTOLD),
+            reports={name: self._of_the_awake(said, awake) for name, said in estimate.reports.items()},
             fates=verdicts.fate,
             odd=out_of_the_ordinary(instant.tick, verdicts),
             apart=delivery.apart,
@@ -220,3 +221,7 @@ class Swarm:
             released=delivery.released,
             injected=to_plain(list(self._plan.injected)) if instant.tick == 0 and self._plan.injected else None,
         )
+
+    @staticmethod
+    def _of_the_awake(said: Array, awake: Mask) -> Array:
+        return np.where(awake.reshape(-1, *(1,) * (said.ndim - 1)), said, np.nan)

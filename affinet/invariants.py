@@ -21,6 +21,8 @@ NAMED: dict[str, Callable[..., Checker]] = {
         checkers.collision_free,
         checkers.agreement,
         checkers.energy,
+        checkers.localized,
+        checkers.smooth,
     )
 }
 

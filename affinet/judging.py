@@ -10,9 +10,11 @@ import numpy as np
 from affinet.batch import Runs
 from affinet.sections import ScenarioError
 from affinet.study import NAMES, Claim, Quantity, Result, Study, selected
-from analysis import claims
+from analysis import claims, random_graphs
 from analysis.claims import Verdict
 from world.formation import Array
+
+GRAPHS = 1000  # random ones, for claims on all graphs
 
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:
@@ -71,6 +73,8 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
             return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "exponential":
             return claims.exponential(claim.says, seconds, values, span)
+        case "slower_with_anchor":
+            return claims.never_above(claim.says, *random_graphs.rates(GRAPHS, 10, 0.49).T)
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs

@@ -198,6 +198,7 @@ class Launcher:
             channels=self._plan.channels,
             faults=self._plan.faults,
             triggers=self._plan.triggers,
+            reports=self._plan.reports,
             books=self._plan.books(self._viewer),
             patience_s=_WORLD_PATIENCE_S,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ from agents.centre import Centre
 from agents.controllers import Law, needs_mission
 from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
+from agents.estimators.jor import JacobiOverRelaxation
 from agents.process import Choice
 from netem import channels
 from netem.fault import Fault, Verb
@@ -29,6 +30,7 @@ from netem.timeline import Timeline
 from netem.trigger import Trigger
 from world import stress
 from world.brief import Books
+from world.formation import Array, Formation
 from world.world import World
 
 
@@ -52,6 +54,8 @@ class Plan:
         What the world and the medium are made of; profiles with the links' own first, channels with sensing first.
     brief, estimator, law
         What the agents are made of; the brief's arrays begin with the agents.
+    reports
+        What the estimator reports beyond edges, by name, and the shape of each for one agent.
     findings
         What was checked.
     journal
@@ -69,6 +73,7 @@ class Plan:
     brief: Brief
     estimator: Choice
     law: Choice
+    reports: Mapping[str, tuple[int, ...]]
     findings: tuple[Finding, ...]
     journal: Path | None = None
     injected: tuple[Fault, ...] = ()
@@ -190,29 +195,17 @@ def _make(given: Scenario) -> Plan:
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
     _check_order(given, law.build())
-    findings = checks.framework(formation)
-    if given.agents.leaders == "distances":
-        findings.append(checks.leaders_apart(formation))
-    if any(finding.fatal for finding in findings):
-        raise PlanError(findings)
-    try:
-        weights = stress.solve(formation)
-    except stress.NotRigid as error:
-        raise PlanError([checks.not_rigid(str(error))]) from error
-    L = stress.laplacian(formation, weights)
-    late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
-    findings += checks.inputs_in_time(estimator.build(), late)
-    findings += checks.closed_loop(formation, L, law.build(), estimator.build(), given.time.dt)
-    if any(finding.fatal for finding in findings):
-        raise PlanError(findings)
+    findings, L = _framework(given, formation, law.build(), estimator.build())
     world = world_of(given, formation)
+    if isinstance(built := estimator.build(), JacobiOverRelaxation):
+        findings.append(checks.localization_step(world, built))
     brief = brief_of(world, L)
     played = script.write(given, formation, world.links)
     if isinstance(estimator.build(), CentralizedFilter):
         _refuse_absences(played.faults)
     agents = _agents(given, brief, estimator, law)
     with sections.said_at("agents"):
-        _try_out(agents)
+        reports = _try_out(agents)
     spoken = agents.channels()
     names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
@@ -228,8 +221,35 @@ def _make(given: Scenario) -> Plan:
         brief=brief,
         estimator=estimator,
         law=law,
+        reports=reports,
         findings=(*findings, *aired, *checks.timeline(played.faults, given.time.ticks, given.time.dt)),
     )
+
+
+def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: Any) -> tuple[list[Finding], Array]:
+    """What was found of a framework that can fly, and its stress matrix; zero for a law that needs none."""
+    findings = checks.graph(formation)
+    if law.by_stress:
+        findings.append(checks.leaders(formation))
+    if given.agents.leaders == "distances":
+        findings.append(checks.leaders_apart(formation))
+    late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
+    findings += checks.inputs_in_time(estimator, late)
+    _refuse_fatal(findings)
+    if not law.by_stress:
+        return findings, np.zeros((formation.agents, formation.agents))
+    try:
+        L = stress.laplacian(formation, stress.solve(formation))
+    except stress.NotRigid as error:
+        raise PlanError([checks.not_rigid(str(error))]) from error
+    findings += checks.closed_loop(formation, L, law, estimator, given.time.dt)
+    _refuse_fatal(findings)
+    return findings, L
+
+
+def _refuse_fatal(findings: Sequence[Finding]) -> None:
+    if any(finding.fatal for finding in findings):
+        raise PlanError(findings)
 
 
 def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
@@ -244,6 +264,8 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
         raise ScenarioError(
             f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations"
         )
+    if getattr(law, "by_stress", None) not in (True, False):
+        raise ScenarioError(f"agents.law: {given.agents.law} has no 'by_stress': whether it weighs edges by the stress")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if law.order != given.dynamics.order:
@@ -267,8 +289,8 @@ def _refuse_absences(faults: Sequence[Fault]) -> None:
         )
 
 
-def _try_out(agents: Agent) -> None:
-    """One tick in silence: what law and estimator want of each other shows before anything starts."""
+def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
+    """One tick in silence: what law and estimator want of each other shows before anything starts; what will be reported."""
     brief, batch = agents.brief, agents.brief.present.shape[:1]
     nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
     velocity = nowhere if agents.law.order == 2 else None
@@ -279,7 +301,8 @@ def _try_out(agents: Agent) -> None:
     }
     unseen = np.zeros_like(brief.relative)
     told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
-    agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
+    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
+    return {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
 
 
 def _tick(seconds: float, dt: float) -> int:

@@ -51,7 +51,7 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
 
 def rehearse(plan: Plan) -> Evidence:
     """Run a plan in this process, and leave nothing behind."""
-    swarm, flown = Swarm(plan), History(plan.world, len(plan.channels))
+    swarm, flown = Swarm(plan), History(plan.world, len(plan.channels), plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
     return _judged(plan, swarm, flown, time.perf_counter() - started, Path())
@@ -89,7 +89,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
-    swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels))
+    swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels), plan.reports)
     started = time.perf_counter()
     with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
 

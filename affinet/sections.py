@@ -118,8 +118,8 @@ class Time(Section):
 class Sensing(Section):
     """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
-    Or those of a range, in metres, and of a bearing, in radians (in three dimensions azimuth and elevation). It makes `samples`
-    of them in a tick, and reports their mean.
+    Or those of a range, in metres, and of a bearing, in radians (in three dimensions azimuth and elevation); or those along and
+    across the line of sight, as shares of the distance. It makes `samples` of them in a tick, and reports their mean.
     """
 
     samples: Annotated[int, Field(ge=1)] = 1
@@ -127,13 +127,20 @@ class Sensing(Section):
     covariance: Matrix | None = None
     sigma_range: Positive | None = None
     sigma_bearing: Positive | None = None
+    sigma_along: Positive | None = None
+    sigma_across: Positive | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Sensing:
         if (self.sigma_range is None) != (self.sigma_bearing is None):
             raise ValueError("sigma_range (m) and sigma_bearing (rad) go together")
-        if sum(given is not None for given in (self.sigma, self.covariance, self.sigma_range)) != 1:
-            raise ValueError("give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad)")
+        if (self.sigma_along is None) != (self.sigma_across is None):
+            raise ValueError("sigma_along and sigma_across (shares of the distance) go together")
+        if sum(given is not None for given in (self.sigma, self.covariance, self.sigma_range, self.sigma_along)) != 1:
+            raise ValueError(
+                "give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad), "
+                "or sigma_along and sigma_across (shares of the distance)"
+            )
         if self.sigma == 0.0:
             raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
         return self
@@ -267,6 +274,9 @@ def sensor(sensing: Sensing, dimension: int) -> Sensor:
     if sensing.sigma_range is not None and sensing.sigma_bearing is not None:
         deviations = np.array([sensing.sigma_range] + [sensing.sigma_bearing] * (dimension - 1))
         return Sensor("range-bearing", np.diag(deviations**2) / sensing.samples)
+    if sensing.sigma_along is not None and sensing.sigma_across is not None:
+        deviations = np.array([sensing.sigma_along] + [sensing.sigma_across] * (dimension - 1))
+        return Sensor("line-of-sight", np.diag(deviations**2) / sensing.samples)
     R = _covariance("sensing", sensing.sigma, sensing.covariance, dimension)
     return Sensor("coordinates", R / sensing.samples)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from netem.chain import ChainLayer
 from netem.delay import Delay
 from netem.fault import Fault
 from netem.profile import Profile
-from world.formation import Array, Formation
+from world.formation import Formation
 
 
 class NotABatch(ValueError):
@@ -77,7 +78,7 @@ def _formation(one: Formation, number: int) -> Formation:
 
 
 def _brief(one: Brief, number: int) -> Brief:
-    def tiled(array: Array) -> Array:
+    def tiled(array: Any) -> Any:
         return np.tile(array, (number,) + (1,) * (array.ndim - 1))
 
     return replace(
@@ -85,6 +86,7 @@ def _brief(one: Brief, number: int) -> Brief:
         nominal=tiled(one.nominal),
         relative=tiled(one.relative),
         present=np.tile(one.present, (number, 1)),
+        back=tiled(one.back),
         stress=tiled(one.stress),
         leader=np.tile(one.leader, number),
         leads=np.tile(one.leads, (number, 1)),

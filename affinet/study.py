@@ -28,7 +28,17 @@ from analysis.indicator import Bounds, bounds
 from netem.links import Mask
 
 Labels = dict[str, str]
-Quantity = Literal["error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"]
+Quantity = Literal[
+    "error",
+    "procrustes",
+    "estimation_error",
+    "covariance_trace",
+    "nees",
+    "nis",
+    "localization",
+    "drift",
+    "ringing",
+]
 
 NAMES: dict[Quantity, tuple[str, str]] = {
     "error": ("tracking error", "m²"),
@@ -37,6 +47,9 @@ NAMES: dict[Quantity, tuple[str, str]] = {
     "covariance_trace": ("trace of the covariances", "m²"),
     "nees": ("normalised estimation error squared", ""),
     "nis": ("normalised innovation squared", ""),
+    "localization": ("distance from the optimal places", "m"),
+    "drift": ("drift of the weighted centroid", "m"),
+    "ringing": ("share of steps that go back", ""),
 }
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
@@ -55,9 +68,17 @@ class Claim(Section):
     says: str
     each: list[str] = Field(default_factory=list)
     check: Literal[
-        "flat", "approaches", "stays_below", "leaves", "indicator_below_error", "lower", "ratio", "exponential"
+        "flat",
+        "approaches",
+        "stays_below",
+        "leaves",
+        "indicator_below_error",
+        "lower",
+        "ratio",
+        "exponential",
+        "slower_with_anchor",
     ]
-    of: Labels
+    of: Labels = Field(default_factory=dict)
     to: Labels | None = None
     quantity: Quantity | None = None
     level: float | None = None

@@ -14,8 +14,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from affinet.judging import GRAPHS
 from affinet.study import NAMES, Quantity, Result, Study
-from analysis import figures
+from analysis import figures, random_graphs
 from analysis.claims import Verdict
 from analysis.figures import Curve
 
@@ -26,6 +27,12 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
     pq.write_table(pa.concat_tables([_runs(one) for one in results]), out / "runs.parquet")
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+    if any(claim.check == "slower_with_anchor" for claim in study.claims):
+        figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
+    if results[0].runs.place.size:
+        figures.evolution(
+            out / "evolution.png", study.title, [(one.labels, one.runs.seconds, one.runs.place) for one in results]
+        )
     axes = [axis.name for axis in study.axes]
     curves = _curves(results, study.quantity)
     if study.figure == "curves":

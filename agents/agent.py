@@ -58,9 +58,8 @@ class Agent:
 
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
-        dimension = self.brief.dimension
         moves = ("velocity", "acceleration")[: self.law.order]
-        return {INPUT: {name: Field((dimension,)) for name in moves}, **self.estimator.channels(dimension)}
+        return {INPUT: {name: Field((self.brief.dimension,)) for name in moves}, **self.estimator.channels(self.brief)}
 
     def init(self, batch: tuple[int, ...]) -> AgentState:
         """A fresh agent, or a batch of them."""

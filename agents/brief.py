@@ -46,6 +46,9 @@ class Brief:
         Nominal relative positions p_ij = p_i - p_j, shape (..., n, D), in metres; 0 in padding.
     present
         Which neighbour slots are real, shape (..., n).
+    back
+        In which of its slots each neighbour has this agent, shape (..., n): where what it says to every neighbour apart is for
+        this one. Any slot in padding.
     stress
         Weights l_ij, shape (..., n); 0 in padding.
     leads
@@ -64,6 +67,7 @@ class Brief:
     nominal: Array
     relative: Array
     present: Mask
+    back: NDArray[np.int64]
     stress: Array
     leads: Mask
     sensor: Sensor
@@ -78,6 +82,7 @@ class Brief:
             nominal=self.nominal[row],
             relative=self.relative[row],
             present=self.present[row],
+            back=self.back[row],
             stress=self.stress[row],
             leads=self.leads[row],
             process=self.process[row],

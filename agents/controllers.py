@@ -19,9 +19,14 @@ State = TypeVar("State")
 
 
 class Law(Protocol[State]):
-    """A control law for followers; `order` is that of the bodies it steers, by a velocity (1) or an acceleration (2)."""
+    """A control law for followers.
+
+    `order` is that of the bodies it steers, by a velocity (1) or an acceleration (2); `by_stress` says whether it weighs the
+    edges by the stress of the formation, which then must have one.
+    """
 
     order: ClassVar[int]
+    by_stress: ClassVar[bool]
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
         """The state before the first tick, with `batch` as its leading axes."""
@@ -52,6 +57,30 @@ class LastHeard(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Rest:
+    """u_i = 0: agents that stay where they are, to find out where that is."""
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = False
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+        """Nothing to remember."""
+        return Nothing()
+
+    def command(
+        self,
+        brief: Brief,
+        state: Nothing,
+        tick: Reading,  # noqa: ARG002
+        own: Own,
+        estimate: Estimate,  # noqa: ARG002
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Nothing, Array]:
+        """Stay."""
+        return state, np.zeros(np.broadcast_shapes(own.input.shape, brief.nominal.shape))
+
+
+@dataclass(frozen=True)
 class Static:
     """u_i = -alpha sum_j l_ij zhat_ij (Table II, static leaders).
 
@@ -62,6 +91,7 @@ class Static:
     """
 
     order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
     alpha: float = 10.0
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
@@ -94,6 +124,7 @@ class ConstantVelocity:
     """
 
     order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
     alpha: float = 10.0
     eta: float = 0.1
 
@@ -135,6 +166,7 @@ class VaryingVelocity:
     """
 
     order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
     alpha: float = 1.0
     source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
     relaxation: float = 1.0

@@ -150,6 +150,7 @@ class Node:
             covariance=estimate.spread[:degree],
             psi=float(estimate.psi),
             feasible=None if estimate.feasible is None else bool(estimate.feasible),
+            reports=dict(estimate.reports),
             heard=self._heard,
         )
         self._act.put(wire.pack(act))

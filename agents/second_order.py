@@ -32,6 +32,7 @@ class _Damped:
     """What both laws share: the pull of the estimated edges, damped by how the neighbours' velocities differ from one's own."""
 
     order: ClassVar[int] = 2
+    by_stress: ClassVar[bool] = True
     position_gain: float
     velocity_gain: float
     source: Source = "communicated"

@@ -94,8 +94,19 @@ def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
     total = logarithm - logarithm.mean(axis=1, keepdims=True)
     explained = 1.0 - ((total - slope[:, None] * time) ** 2).sum(axis=1) / (total**2).sum(axis=1)
     straight = (explained >= _STRAIGHT) & (slope < 0.0)
-    found = f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}), by {-slope.mean():.3g} 1/s"
+    found = (
+        f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}), by {-slope.mean():.3g} 1/s"
+    )
     return Verdict(says, bool(straight.mean() >= _MOST), found)
+
+
+def never_above(says: str, values: Array, bounds: Array) -> Verdict:
+    """No value (n,) lies above its bound."""
+    above = values > bounds
+    found = (
+        f"{(~above).sum()} of {len(values)} are not above; in the mean {values.mean():.4g} against {bounds.mean():.4g}"
+    )
+    return Verdict(says, not above.any(), found)
 
 
 def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Verdict:

@@ -74,6 +74,39 @@ def consistency(
     figure.savefig(path)
 
 
+def evolution(path: Path, title: str, cases: Sequence[tuple[Mapping[str, str], Array, Array]]) -> None:
+    """Where the agents of one run of each case believe they are, over time: a panel each, x in black, y in red, z in blue.
+
+    A case is its labels, moments (T,), and places (T, N, D), in metres.
+    """
+    columns = min(len(cases), 3)
+    rows = -(-len(cases) // columns)
+    figure = Figure(figsize=(3.4 * columns, 2.2 * rows), layout="constrained", dpi=160)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for panel, (labels, seconds, place) in zip(panels.ravel(), cases, strict=False):
+        for axis, colour in zip(range(place.shape[-1]), ("black", "tab:red", "tab:blue"), strict=False):
+            panel.plot(seconds, place[..., axis], color=colour, lw=0.6)
+        panel.set_title(", ".join(labels.values()), fontsize=7)
+    for panel in panels[-1]:
+        panel.set_xlabel("time (s)")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("estimated position (m)")
+    figure.suptitle(title)
+    figure.savefig(path)
+
+
+def rates(path: Path, title: str, found: Array) -> None:
+    """Convergence rates (n, 2) with the weighted centroid and with an anchor, a point for each graph."""
+    figure = Figure(figsize=(3.4, 3.2), layout="constrained", dpi=160)
+    panel = figure.subplots()
+    panel.plot(found[:, 1], found[:, 0], ".", ms=2)
+    panel.plot([found.min(), 1.0], [found.min(), 1.0], color="grey", lw=0.8)
+    panel.set_xlabel("with an anchor")
+    panel.set_ylabel("weighted centroid")
+    figure.suptitle(f"{title}: convergence rates on {len(found)} random graphs", fontsize=7)
+    figure.savefig(path)
+
+
 def said(what: str, unit: str) -> str:
     """A quantity with its unit, if it has one."""
     return f"{what} ({unit})" if unit else what

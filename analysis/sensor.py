@@ -1,4 +1,4 @@
-"""What measures relative positions, in axes that all agents share: coordinate by coordinate, or by range and bearing.
+"""What measures relative positions, in axes that all agents share: by coordinates, by range and bearing, or along and across.
 
 A range and a bearing make the error of a position depend on where it is, and correlate its coordinates (paper 004, section
 4.1.1). They also draw it toward the agent, by a factor that is known: the positions here are corrected for it.
@@ -22,12 +22,14 @@ class Sensor:
     Parameters
     ----------
     reads
-        Coordinates, or range and bearing; in three dimensions range, azimuth and elevation.
+        Coordinates; or range and bearing, in three dimensions range, azimuth and elevation; or a position along and across the
+        line of sight, as wrong as it is far (paper 003, section VII).
     covariance
-        Of what it reads, shape (D, D): in square metres, and of angles in square radians. Range and bearings are independent.
+        Of what it reads, shape (D, D): in square metres, of angles in square radians, or as shares of the square of the
+        distance. All but that of coordinates is diagonal, and the same for all directions across.
     """
 
-    reads: Literal["coordinates", "range-bearing"]
+    reads: Literal["coordinates", "range-bearing", "line-of-sight"]
     covariance: Array
 
     def measured(self, true: Array, noise: Array) -> Array:
@@ -42,12 +44,20 @@ class Sensor:
         """
         if self.reads == "coordinates":
             return true + noise
+        if self.reads == "line-of-sight":
+            return true + _turned(true, np.linalg.norm(true, axis=-1, keepdims=True) * noise)
         return _cartesian(_polar(true) + noise) / _shrinking(self._variances)
 
     def spread(self, measured: Array) -> Array:
         """Covariances of measurements (..., D), shape (..., D, D), in m2: of ranges and bearings, that at what they say."""
         if self.reads == "coordinates":
             return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
+        if self.reads == "line-of-sight":
+            along, across = self._variances[:2]
+            lines = measured[..., :, None] * measured[..., None, :]
+            squared = (measured * measured).sum(axis=-1)[..., None, None]
+            spread: Array = across * squared * np.eye(measured.shape[-1]) + (along - across) * lines
+            return spread
         mean, second = moments(_polar(measured), self._variances)
         shrinking = _shrinking(self._variances)
         covariance: Array = second - mean[..., :, None] * mean[..., None, :]
@@ -64,7 +74,7 @@ class Sensor:
         """
         if self.reads != "coordinates":
             raise ValueError(
-                "this estimator takes one covariance for all measurements, and range and bearing give each its own; "
+                "this estimator takes one covariance for all measurements, and this sensor gives each its own; "
                 "choose another, or a sensor of coordinates"
             )
         return self.covariance
@@ -120,6 +130,19 @@ def _polar(position: Array) -> Array:
     if position.shape[-1] == 2:
         return np.stack([planar, azimuth], axis=-1)
     return np.stack([np.hypot(planar, position[..., 2]), azimuth, np.arctan2(position[..., 2], planar)], axis=-1)
+
+
+def _turned(line: Array, offset: Array) -> Array:
+    """Offsets along the first axis and across it (..., D), turned so that the first axis lies along lines (..., D)."""
+    length = np.linalg.norm(line, axis=-1, keepdims=True)
+    first = np.eye(line.shape[-1])[0]
+    direction = np.where(length > 0.0, line, first) / np.where(length > 0.0, length, 1.0)
+    # A reflection that swaps the first axis and the direction: what lies across is spread alike to all sides.
+    mirror = direction - first
+    size = (mirror * mirror).sum(axis=-1, keepdims=True)
+    along_mirror = (offset * mirror).sum(axis=-1, keepdims=True)
+    turned: Array = offset - np.where(size > 0.0, 2.0 * along_mirror / np.where(size > 0.0, size, 1.0), 0.0) * mirror
+    return turned
 
 
 def _cartesian(polar: Array) -> Array:

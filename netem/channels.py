@@ -13,6 +13,7 @@ SENSE = "sense"
 MEASUREMENT = "measurement"
 INPUT = "input"
 THETA = "theta"
+PLACE = "place"
 CENTRE = "centre"  # not of the air: what a centralized filter tells reaches everybody
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")

@@ -95,6 +95,16 @@ class Links:
         """Neighbour in each agent's slot as an array row (number - 1), shape (agents, n)."""
         return np.where(self.present, self.src[self.slots] - 1, 0)
 
+    @cached_property
+    def back(self) -> Integers:
+        """The slot in which the neighbour in each slot has this agent, shape (agents, n); 0 in padding."""
+        first = np.cumsum(self.degree) - self.degree
+        rows = np.array(
+            [self.index.get((dst, src), -1) for src, dst in zip(self.src.tolist(), self.dst.tolist(), strict=True)]
+        )
+        slot = rows - first[self.src - 1]
+        return np.where(self.present, slot[self.slots], 0)
+
     def touching(self, agents: Mask) -> Mask:
         """Links with either end among `agents` (agents,), shape (L,)."""
         touched: Mask = agents[self.src - 1] | agents[self.dst - 1]

@@ -110,7 +110,8 @@ class Act(NamedTuple):
     positions it acts on, one per neighbour, shape (m, D), in metres; `known` which of them it has an estimate of at all, shape
     (m,); `covariance` the upper triangles of their covariances, row by row, shape (m, D (D + 1) / 2), in square metres, 0 where
     not known; `psi` its convergence indicator, NaN where undefined; `feasible` whether the neighbours it sees determine a local
-    map, if its estimator fits one; `heard` how many broadcasts it has received so far.
+    map, if its estimator fits one; `reports` what else its estimator says, named numbers and nested lists of numbers; `heard`
+    how many broadcasts it has received so far.
     """
 
     k: int
@@ -122,6 +123,7 @@ class Act(NamedTuple):
     covariance: Array | Rows
     psi: float
     feasible: bool | None
+    reports: dict[str, Any]
     heard: int
 
 

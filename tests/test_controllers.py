@@ -131,6 +131,7 @@ def zhao7():
         nominal=formation.nominal,
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,
+        back=links.back,
         stress=np.where(links.present, stress, 0.0),
         leads=links.present & formation.is_leader[links.neighbours],
         sensor=Sensor("coordinates", 0.01 * np.eye(2)),

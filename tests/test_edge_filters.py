@@ -422,7 +422,7 @@ def test_in_flight_the_filters_are_as_wrong_as_they_say(estimator):
     coarse = ("time.dt=0.01", "time.duration=0.6", "dynamics.disturbance=0.02", "network.coupled=false")
     plan = plan_of("rigid", *coarse, HALF_BLIND, f"agents.estimator={estimator}")
     batch = side_by_side(plan, range(1, 1 + runs))
-    links, flown = batch.world.links, History(batch.world, len(batch.channels))
+    links, flown = batch.world.links, History(batch.world, len(batch.channels), batch.reports)
     Swarm(batch).fly(flown.extend, 60)
     arrays = flown.arrays()
     position = arrays["position"][:-1]

@@ -447,7 +447,7 @@ def test_what_is_said_has_the_shapes_announced(estimator, dimension):
     agent = brief(np.eye(dimension))
     state = estimator.init(agent, ())
     _, said = estimator.sense(agent, state, np.eye(dimension), np.ones(dimension, dtype=bool))
-    announced = estimator.channels(dimension)
+    announced = estimator.channels(agent)
     assert {c: set(fields) for c, fields in said.items()} == {c: set(fields) for c, fields in announced.items()}
     for channel, fields in announced.items():
         for name, field in fields.items():

@@ -54,7 +54,7 @@ FLIGHTS = [
 def test_every_run_of_a_batch_is_the_run_alone(name, air):
     plan = plan_of(name, *SHORT, *air)
     batch, size, width = side_by_side(plan, SEEDS), plan.world.formation.agents, len(plan.world.links)
-    together = History(batch.world, len(batch.channels))
+    together = History(batch.world, len(batch.channels), batch.reports)
     Swarm(batch).fly(together.extend, 20)
     flown = together.arrays()
     for place, seed in enumerate(SEEDS):

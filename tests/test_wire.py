@@ -63,6 +63,7 @@ MESSAGES = [
         covariance=[[0.5, 0.0, 0.5]],
         psi=0.25,
         feasible=True,
+        reports={"place": [1.0, 2.0]},
         heard=12,
     ),
     wire.Journal(
@@ -291,6 +292,7 @@ BRIEF = Brief(
     nominal=np.array([1.0, 0.0]),
     relative=np.array([[1.0, -1.0], [0.5, 0.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),
+    back=np.array([1, 0, 0]),
     stress=np.array([0.3, -0.1, 0.0]),
     leads=np.array([True, False, False]),
     sensor=Sensor("coordinates", 0.01 * np.eye(2)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from netem.fault import Fault
@@ -51,6 +52,8 @@ class WorldBrief:
         The run directory.
     world, channels, faults, triggers
         What it simulates.
+    reports
+        What the agents' estimators report beyond edges, by name, and the shape of each for one agent.
     books
         How it writes that down.
     patience_s
@@ -64,5 +67,6 @@ class WorldBrief:
     channels: tuple[str, ...]
     faults: tuple[Fault, ...]
     triggers: tuple[Trigger, ...]
+    reports: Mapping[str, tuple[int, ...]]
     books: Books
     patience_s: float

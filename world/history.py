@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -61,6 +61,8 @@ class Moment(NamedTuple):
         Convergence indicators, shape (N,), NaN where undefined.
     feasible
         Whether what an agent sees determines a local map, 1 or 0, or `UNTOLD`, shape (N,).
+    reports
+        What else the agents' estimators said, by name, shape (N, *), NaN of those who did not.
     fates
         Verdicts, shape (C, L).
     odd
@@ -79,6 +81,7 @@ class Moment(NamedTuple):
     covariance: Any
     psi: Any
     feasible: Any
+    reports: Mapping[str, Any]
     fates: Any
     odd: Any
     apart: Any
@@ -119,6 +122,7 @@ class Moments:
     covariance: Array
     psi: Array
     feasible: NDArray[np.int8]
+    reports: Mapping[str, Array]
     fates: Fates
     newest: NDArray[np.int32]
     copies: NDArray[np.int64]
@@ -153,6 +157,7 @@ def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Momen
         covariance=np.array([moment.covariance for moment in moments]),
         psi=np.array([moment.psi for moment in moments]),
         feasible=np.array([moment.feasible for moment in moments], dtype=np.int8),
+        reports={name: np.array([moment.reports[name] for moment in moments]) for name in moments[0].reports},
         fates=fates,
         newest=_newest(ticks, fates, entries, moments),
         copies=np.array([np.count_nonzero(entry.odd[:, _COPY_DUE] >= 0) for entry in entries]),
@@ -203,7 +208,7 @@ class Vigil:
 class History:
     """The moments of a run, gathered; arrays begin with the ticks."""
 
-    def __init__(self, world: World, channels: int) -> None:
+    def __init__(self, world: World, channels: int, reports: Mapping[str, tuple[int, ...]]) -> None:
         links, ticks = world.links, world.ticks
         agents, width, dimension = links.agents, links.slots.shape[1], world.formation.dimension
         self.ticks = 0
@@ -217,6 +222,7 @@ class History:
         self.covariance = np.zeros((ticks, agents, width, dimension * (dimension + 1) // 2))
         self.psi = np.full((ticks, agents), np.nan)
         self.feasible = np.full((ticks, agents), UNTOLD, dtype=np.int8)
+        self.reports = {name: np.full((ticks, agents, *shape), np.nan) for name, shape in reports.items()}
         self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
         self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)
         self.copies = np.zeros(ticks, dtype=np.int64)
@@ -228,13 +234,16 @@ class History:
         span = slice(self.ticks, self.ticks + len(moments.error))
         for name in _BY_TICK:
             getattr(self, name)[span] = getattr(moments, name)
+        for name, values in moments.reports.items():
+            self.reports[name][span] = values
         self.position[span.stop] = next_position
         self.ticks = span.stop
 
     def arrays(self) -> Arrays:
         """All arrays by name, up to the last tick."""
         by_tick = {name: getattr(self, name)[: self.ticks] for name in _BY_TICK}
-        return by_tick | {"position": self.position[: self.ticks + 1]}
+        said = {name: values[: self.ticks] for name, values in self.reports.items()}
+        return by_tick | said | {"position": self.position[: self.ticks + 1]}
 
     def save(self, path: Path) -> None:
         """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes."""

@@ -50,10 +50,11 @@ class Theatre:
         dimension = brief.world.formation.dimension
         self._unknown = [[0.0] * dimension] * brief.world.links.slots.shape[1]
         self._unsure = [[0.0] * (dimension * (dimension + 1) // 2)] * brief.world.links.slots.shape[1]
-        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, None, 0)
+        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, None, {}, 0)
         self._vigil = Vigil(brief.world)
         self.uninstructed = 0
-        self.history = History(brief.world, len(brief.channels))
+        self._unsaid = {name: np.full(shape, np.nan).tolist() for name, shape in brief.reports.items()}
+        self.history = History(brief.world, len(brief.channels), brief.reports)
 
     def await_everybody(self) -> None:
         """Wait until the medium listens."""
@@ -152,6 +153,9 @@ class Theatre:
             covariance=[act.covariance + self._unsure[len(act.covariance) :] for act in everybody],
             psi=[act.psi for act in everybody],
             feasible=[UNTOLD if act.feasible is None else int(act.feasible) for act in everybody],
+            reports={
+                name: [act.reports.get(name, unsaid) for act in everybody] for name, unsaid in self._unsaid.items()
+            },
             fates=journal.fates,
             odd=journal.odd,
             apart=journal.apart,

@@ -8,6 +8,7 @@ it in the entry-point group `affinet.estimators` of your own package, or in a sc
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -61,6 +62,8 @@ class Estimate(NamedTuple):
         Estimated relative velocities, shape (..., n, D), in metres per second, by estimators that track them.
     feasible
         Whether the neighbours seen in this tick determine a local map, shape (...), by estimators that fit one.
+    reports
+        What else an estimator has to say, for recordings, metrics and control laws: named arrays, each of one shape (..., *).
     """
 
     relative: Array
@@ -69,6 +72,7 @@ class Estimate(NamedTuple):
     psi: Array
     relative_velocity: Array | None = None
     feasible: Mask | None = None
+    reports: Mapping[str, Array] = MappingProxyType({})
 
     @property
     def spread(self) -> Array:
@@ -79,8 +83,8 @@ class Estimate(NamedTuple):
 class Estimator(Protocol[State]):
     """An estimator of relative positions."""
 
-    def channels(self, dimension: int) -> Channels:
-        """What it broadcasts: for each channel, its fields."""
+    def channels(self, brief: Brief) -> Channels:
+        """What it broadcasts: for each channel, its fields; what is for one neighbour stands in that neighbour's slot."""
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
         """The state before the first tick, with `batch` as its leading axes."""

@@ -30,7 +30,7 @@ class CentralizedFilter:
 
     prior_position: float = 1.0
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""
         return {}
 

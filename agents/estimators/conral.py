@@ -50,9 +50,9 @@ class ConsensusLocalization:
     epsilon: float = 0.05
     constraint: Constraint = "affine"
 
-    def channels(self, dimension: int) -> Channels:
+    def channels(self, brief: Brief) -> Channels:
         """The local and the consensus map."""
-        square, truth = Field((dimension, dimension)), Field((), bool)
+        square, truth = Field((brief.dimension, brief.dimension)), Field((), bool)
         return {THETA: {"local": square, "feasible": truth, "consensus": square, "started": truth}}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Agreement:

@@ -51,9 +51,9 @@ class GeometryAwareFilter(EdgeFilters):
     constraint: Constraint = "affine"
     penalty: bool = True
 
-    def channels(self, dimension: int) -> Channels:
+    def channels(self, brief: Brief) -> Channels:
         """What the geometry broadcasts."""
-        return self._shaper.channels(dimension)
+        return self._shaper.channels(brief)
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Fusion:
         """All edges unknown, no shape perceived."""

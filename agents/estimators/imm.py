@@ -61,7 +61,7 @@ class InteractingMultipleModel:
         if not 0.0 < self.stay < 1.0:
             raise ValueError(f"stay is a probability strictly between 0 and 1, not {self.stay}")
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing: a neighbour's measurements of others say nothing of this edge."""
         return {}
 

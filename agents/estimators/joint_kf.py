@@ -46,7 +46,7 @@ class JointEdgeFilter:
     coefficients: Sequence[float] = (1.0,)
     sigma_n: float = 0.0
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""
         return {}
 

@@ -33,7 +33,7 @@ class MinimumMeanSquareError:
 
     sigma_prior: float = 0.1
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""
         return {}
 

@@ -23,7 +23,7 @@ class Measured(NamedTuple):
 class NoEstimator:
     """The measurements themselves."""
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""
         return {}
 

@@ -38,9 +38,9 @@ class RelativeAffineLocalization:
 
     constraint: Constraint = "affine"
 
-    def channels(self, dimension: int) -> Channels:
+    def channels(self, brief: Brief) -> Channels:
         """The local map, for the neighbours' convergence indicator."""
-        return {THETA: {"local": Field((dimension, dimension)), "feasible": Field((), bool)}}
+        return {THETA: {"local": Field((brief.dimension, brief.dimension)), "feasible": Field((), bool)}}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Perceived:
         """Nothing perceived yet."""

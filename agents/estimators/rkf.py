@@ -75,7 +75,7 @@ class EdgeFilters:
 class RelativeKalmanFilter(EdgeFilters):
     """RKF: correct the edges that are measured, propagate the others."""
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing: a neighbour's measurements of others say nothing of this edge."""
         return {}
 

@@ -67,7 +67,7 @@ class SilentEdgeFilter:
         if self.window < 1:
             raise ValueError(f"window counts ticks, from 1; got {self.window}")
 
-    def channels(self, dimension: int) -> Channels:  # noqa: ARG002
+    def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""
         return {}
 

@@ -54,7 +54,14 @@ def main() -> None:
                     broadcasts[name].put(msgpack.packb(envelope))
                 continue
             heard += len(message["messages"])
-            belief = {"estimate": [], "known": [], "covariance": [], "psi": float("nan"), "feasible": None}
+            belief = {
+                "estimate": [],
+                "known": [],
+                "covariance": [],
+                "psi": float("nan"),
+                "feasible": None,
+                "reports": {},
+            }
             decision = {"input": [0.0, 0.0], "heard": heard} | belief
             act.put(msgpack.packb({"k": message["k"], "src": me, "seq": seq} | decision))
             seq += 1

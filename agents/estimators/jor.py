@@ -1,0 +1,131 @@
+"""Localization by Jacobi over-relaxation (paper 003): where an agent is, relative to the weighted centroid of all.
+
+Every edge counts with what was first measured of it, from either end. In each tick an agent moves its estimate toward where its
+neighbours, as last heard, say that it is; a message that is lost or late leaves it with what it heard before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own
+from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
+from agents.estimators.geometry import identity
+from agents.estimators.small import inverse
+from netem.channels import PLACE
+
+
+class Side(NamedTuple):
+    """What one end of each edge measured, of the agent relative to the neighbour, (..., n, D), and whether it did (..., n)."""
+
+    measured: Array
+    seen: Mask
+
+
+class Belief(NamedTuple):
+    """Where the agent is (..., D), where its neighbours said they are (..., n, D), who has said so (..., n), and both sides."""
+
+    place: Array
+    theirs: Array
+    told: Mask
+    own: Side
+    other: Side
+
+
+@dataclass(frozen=True)
+class JacobiOverRelaxation:
+    """JOR (11)-(13).
+
+    Parameters
+    ----------
+    h
+        Step: below 1/2 nothing rings (lemma 5.1), below 1 it converges (theorem 4.1). `affinet check` says which are fastest.
+    anchor
+        Whether leaders stay at the origin of the common frame, as in anchor-based methods (definition 4.1).
+    """
+
+    h: float = 0.49
+    anchor: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.h < 1.0:
+            raise ValueError(f"h is a step between 0 and 1, not {self.h}")
+
+    def channels(self, brief: Brief) -> Channels:
+        """Where it believes it is, and what it first measured of each neighbour."""
+        slots, dimension = brief.relative.shape[-2:]
+        measured = {"measured": Field((slots, dimension)), "seen": Field((slots,), bool)}
+        return {PLACE: {"place": Field((dimension,)), **measured}}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Belief:
+        """At the origin; nothing measured, nobody heard."""
+        shape = (*batch, *brief.relative.shape[-2:])
+        nothing, no = np.zeros(shape), np.zeros(shape[:-1], dtype=bool)
+        return Belief(np.zeros((*batch, shape[-1])), nothing, no, Side(nothing, no), Side(nothing, no))
+
+    def sense(
+        self,
+        brief: Brief,  # noqa: ARG002
+        state: Belief,
+        measured: Array,
+        seen: Mask,
+    ) -> tuple[Belief, Mapping[str, Fields]]:
+        """Keep the first measurement of each edge, and tell it with the estimate."""
+        own = _first(state.own, measured, seen)
+        return state._replace(own=own), {PLACE: {"place": state.place, **own._asdict()}}
+
+    def fuse(
+        self,
+        brief: Brief,
+        state: Belief,
+        heard: Mapping[str, Heard],
+        own: Own,  # noqa: ARG002
+    ) -> tuple[Belief, Estimate]:
+        """One iteration (13)."""
+        said = heard[PLACE]
+        here = brief.back[..., None]
+        of_me = np.take_along_axis(said.fields["measured"], here[..., None], axis=-2)[..., 0, :]
+        seen = np.take_along_axis(said.fields["seen"], here, axis=-1)[..., 0]
+        other = _first(state.other, -of_me, said.fresh & seen)
+        theirs = np.where(said.fresh[..., None], said.fields["place"], state.theirs)
+        told = state.told | said.fresh
+        information, pull = _edges(brief, state.own, other)
+        counts = told & (state.own.seen | other.seen)
+        place = self._moved(
+            brief, state.place, theirs, np.where(counts[..., None, None], information, 0.0), pull, counts
+        )
+        covariance = inverse(np.where(counts[..., None, None], information, identity(brief.dimension)))
+        relative = np.where(counts[..., None], place[..., None, :] - theirs, 0.0)
+        estimate = Estimate(relative, counts, covariance, no_indicator(counts), reports={"place": place})
+        return Belief(place, theirs, told, state.own, other), estimate
+
+    def _moved(self, brief: Brief, place: Array, theirs: Array, information: Array, pull: Array, counts: Mask) -> Array:
+        own = information.sum(axis=-3)
+        drawn = (information @ theirs[..., None])[..., 0] + np.where(counts[..., None], pull, 0.0)
+        anybody = np.asarray(counts.any(axis=-1))
+        weight = np.where(anybody[..., None, None], own, identity(brief.dimension))
+        toward = (inverse(weight) @ drawn.sum(axis=-2)[..., None])[..., 0]
+        fixed = np.logical_and(brief.leader, self.anchor)
+        stepped = (1.0 - self.h) * place + self.h * toward
+        return np.where((anybody & ~fixed)[..., None], stepped, place)
+
+
+def _first(side: Side, measured: Array, seen: Mask) -> Side:
+    new = seen & ~side.seen
+    return Side(np.where(new[..., None], measured, side.measured), side.seen | seen)
+
+
+def _edges(brief: Brief, own: Side, other: Side) -> tuple[Array, Array]:
+    """Inverse covariances of the edges, both sides together, shape (..., n, D, D), and these times what was measured."""
+    information, pull = np.zeros(1), np.zeros(1)
+    for side in (own, other):
+        known = side.seen[..., None, None]
+        spread = np.where(known, brief.sensor.spread(side.measured), identity(brief.dimension))
+        precision = np.where(known, inverse(spread), 0.0)
+        information = information + precision
+        pull = pull + (precision @ side.measured[..., None])[..., 0]
+    return information, pull
