@@ -89,7 +89,7 @@ class Plan:
     def books(self, viewer: str | None) -> Books:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
-        return Books(record.every, self.window, record.enabled, viewer)
+        return Books(record.every, self.window, record.enabled, viewer, channels.PLACE in self.reports)
 
     @property
     def window(self) -> int:

@@ -27,12 +27,15 @@ class Books:
         Whether to make a recording.
     viewer
         URL of a viewer to stream to.
+    localizes
+        Whether agents report where they believe they are.
     """
 
     every: int
     window: int
     record: bool
     viewer: str | None
+    localizes: bool
 
     @property
     def batch(self) -> int:

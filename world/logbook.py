@@ -56,10 +56,8 @@ class Logbook:
             self._recorder = Recorder(
                 out / RECORDING,
                 run=run,
-                formation=world.formation,
-                links=world.links,
-                sensor=world.sensor,
-                dt=world.dt,
+                world=world,
+                localizes=books.localizes,
                 every=books.every,
                 viewer=books.viewer,
             )

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 
 from analysis import consistency
 from analysis.metrics import procrustes_error
-from analysis.sensor import Sensor
 from netem.fate import REASONS, Fate, Fates
-from netem.links import Links
 from netem.timeline import Conditions, Timeline
 from world.formation import Array, Formation
 from world.history import Moments
 from world.realised import Realised
-
-_TIMELINE = "sim_time"
+from world.recorded_places import Places
+from world.stage import TIMELINE, scalars, spatial
+from world.world import World
 
 _LEADER, _FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
 _DEAD, _PAUSED, _DEPARTED, _VANISHED = 0x7A1F1FFF, 0xB388FFFF, 0x6E6E6EFF, 0x00000000
@@ -58,10 +57,10 @@ class Recorder:
         Of the recording.
     run
         Its name.
-    formation, links, sensor
-        Who flies, who is linked to whom, and what measures the edges.
-    dt
-        Tick, in seconds.
+    world
+        What is flown.
+    localizes
+        Whether agents report where they believe they are.
     every
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
@@ -73,23 +72,22 @@ class Recorder:
         path: Path,
         *,
         run: str,
-        formation: Formation,
-        links: Links,
-        sensor: Sensor,
-        dt: float,
+        world: World,
+        localizes: bool,
         every: int,
         viewer: str | None = None,
     ) -> None:
-        self._formation = formation
-        self._links = links
-        self._sensor = sensor
-        self._dt = dt
+        self._formation = world.formation
+        self._links = world.links
+        self._sensor = world.sensor
+        self._dt = world.dt
         self._every = every
-        self._edges = np.array(formation.edges, dtype=np.int64) - 1
+        self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
         self._stream = rr.RecordingStream("affinet", recording_id=run)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
-        self._stream.set_sinks(*sinks, default_blueprint=_blueprint(formation))
+        self._stream.set_sinks(*sinks, default_blueprint=_blueprint(world.formation, localizes=localizes))
         self._log_static()
+        self._places = Places(self._stream, world) if localizes else None
         self._stream.flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
@@ -97,7 +95,7 @@ class Recorder:
         for tick in moments.ticks.tolist():
             self._log_events(tick, timeline)
         kept = slice(None, None, self._every)
-        time = [rr.TimeColumn(_TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
+        time = [rr.TimeColumn(TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
         self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], moments.position[kept])
         self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
@@ -110,6 +108,8 @@ class Recorder:
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
         self._log_realised(time, realised)
+        if self._places:
+            self._places.log(time, moments, kept)
 
     def close(self) -> None:
         """End the file."""
@@ -172,7 +172,7 @@ class Recorder:
         started = [fault.describe() for fault in timeline.starting(tick)]
         ended = [fault.describe_end() for fault in timeline.ending(tick)]
         if started or ended:
-            self._stream.set_time(_TIMELINE, duration=tick * self._dt)
+            self._stream.set_time(TIMELINE, duration=tick * self._dt)
             for text in started:
                 self._stream.log("events", rr.TextLog(text, level="WARN"))
             for text in ended:
@@ -213,7 +213,7 @@ class Recorder:
     def _log_agents(self, time: list[rr.TimeColumn], conditions: Sequence[Conditions], position: Array) -> None:
         agents = self._formation.agents
         colours = np.array([self._agent_colours(now) for now in conditions]).ravel()
-        columns = rr.Points3D.columns(positions=_spatial(position).reshape(-1, 3), colors=colours)
+        columns = rr.Points3D.columns(positions=spatial(position).reshape(-1, 3), colors=colours)
         for path in ("swarm/agents", "swarm/trail"):
             self._stream.send_columns(path, time, columns.partition([agents] * len(conditions)))
 
@@ -223,7 +223,7 @@ class Recorder:
         return np.select(states, [_VANISHED, _DEAD, _DEPARTED, _PAUSED], flying).astype(np.uint32)
 
     def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
-        position, target = _spatial(flown), _spatial(wanted)
+        position, target = spatial(flown), spatial(wanted)
         links = self._links
         receiver, sender = position[:, links.dst - 1], position[:, links.src - 1]
         # Half an edge for each direction: the half at an agent shows whether that agent hears and sees the other.
@@ -246,20 +246,13 @@ class Recorder:
         self._stream.send_columns(path, time, columns.partition([number] * moments))
 
     def _scalars(self, path: str, time: list[rr.TimeColumn], values: Array) -> None:
-        columns = rr.Scalars.columns(scalars=values.ravel())
-        self._stream.send_columns(path, time, columns.partition([values.shape[1]] * len(values)))
+        scalars(self._stream, path, time, values)
 
 
-def _spatial(position: Array) -> Array:
-    """Points (..., D) as points (..., 3); a plane is seen from above."""
-    missing = 3 - position.shape[-1]
-    return np.pad(position, [(0, 0)] * (position.ndim - 1) + [(0, missing)])
-
-
-def _blueprint(formation: Formation) -> rrb.Blueprint:
+def _blueprint(formation: Formation, *, localizes: bool) -> rrb.Blueprint:
     reach = float(np.ptp(formation.nominal, axis=0).max())
     trail = rrb.VisibleTimeRange(
-        _TIMELINE,
+        TIMELINE,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-8.0),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
@@ -278,6 +271,7 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
     )
     plots = rrb.Vertical(
         rrb.Tabs(
+            *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if localizes else []),
             rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
             rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
             rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),
@@ -296,6 +290,6 @@ def _blueprint(formation: Formation) -> rrb.Blueprint:
     )
     return rrb.Blueprint(
         rrb.Horizontal(swarm, plots, column_shares=[3, 2]),
-        rrb.TimePanel(timeline=_TIMELINE, state="collapsed"),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
         collapse_panels=True,
     )

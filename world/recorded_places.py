@@ -1,0 +1,69 @@
+"""What a recording shows of localization: estimated places, the best there are, and how well each edge is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from analysis import localization
+from netem.channels import PLACE
+from netem.fate import Fate
+from world.formation import Array
+from world.history import Moments
+from world.localized import FirstMeasurements
+from world.stage import TIMELINE, ellipses, points, scalars
+from world.world import World
+
+_ESTIMATED, _OPTIMAL, _ELLIPSE = 0x3FA7F5FF, 0xFF3B30FF, 0x88888866
+_DEVIATIONS = 2.0
+
+
+class Places:
+    """Logs what agents that localize believe.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    world
+        What is flown.
+    """
+
+    def __init__(self, stream: rr.RecordingStream, world: World) -> None:
+        self._stream = stream
+        self._dt = world.dt
+        self._links = world.links
+        self._first = FirstMeasurements(world.links, world.sensor, ())
+        reach = float(np.ptp(world.formation.nominal, axis=0).max())
+        for path, colour in (("swarm/place", _ESTIMATED), ("swarm/optimal", _OPTIMAL)):
+            stream.log(path, rr.Points3D.from_fields(radii=0.015 * reach, colors=colour), static=True)
+        width = rr.Radius.ui_points(0.5)
+        stream.log("swarm/measured", rr.LineStrips3D.from_fields(radii=width, colors=_ELLIPSE), static=True)
+        stream.log("metrics/localization", rr.SeriesLines(names="distance from the optimal places (m)"), static=True)
+
+    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+        """Consecutive ticks, of which those `kept` are recorded."""
+        known = self._first.seen.sum()
+        for measured, fates in zip(moments.measured, moments.fates[:, 0], strict=True):
+            self._first.take(measured, fates == Fate.DELIVERED)
+        place, position = moments.reports[PLACE][kept], moments.position[kept]
+        edges = self._first.edges()
+        own = localization.weights(edges)
+        joined = np.linalg.det(own.sum(axis=0)) != 0.0
+        here = localization.centroid(position, own)[:, None] if joined else np.zeros((len(position), 1, 1))
+        believed = localization.centred(place, own) + here if joined else place
+        best = np.broadcast_to(localization.optimal(edges) + here, believed.shape)
+        points(self._stream, "swarm/place", time, believed)
+        points(self._stream, "swarm/optimal", time, best)
+        off = localization.distance(place, edges) if joined else np.full(len(place), np.nan)
+        scalars(self._stream, "metrics/localization", time, off[:, None])
+        if self._first.seen.sum() > known:
+            self._log_ellipses(moments.first, position[0])
+
+    def _log_ellipses(self, tick: int, position: Array) -> None:
+        """Where each agent puts its neighbours, with two standard deviations."""
+        first, links = self._first, self._links
+        where = (position[links.dst - 1] - first.measured)[first.seen]
+        lines = ellipses(where, first.sensor.spread(first.measured[first.seen]), _DEVIATIONS)
+        self._stream.set_time(TIMELINE, duration=tick * self._dt)
+        self._stream.log("swarm/measured", rr.LineStrips3D(lines.reshape(-1, *lines.shape[-2:])))

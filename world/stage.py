@@ -1,0 +1,41 @@
+"""What all layers of a recording share: its timeline, and space."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from world.formation import Array
+
+TIMELINE = "sim_time"
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
+
+
+def spatial(position: Array) -> Array:
+    """Points (..., D) as points (..., 3); a plane is seen from above."""
+    missing = 3 - position.shape[-1]
+    return np.pad(position, [(0, 0)] * (position.ndim - 1) + [(0, missing)])
+
+
+def ellipses(centre: Array, covariance: Array, deviations: float) -> Array:
+    """Where so many standard deviations lie: closed lines (..., C, 25, 3) about centres (..., D), with covariances (..., D, D).
+
+    C is 1 in two dimensions; in three, one line in each plane of two principal axes.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    axes = deviations * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
+    first, second = np.triu_indices(centre.shape[-1], 1)
+    lines = axes[..., first][..., None] * np.cos(_CIRCLE) + axes[..., second][..., None] * np.sin(_CIRCLE)
+    return spatial(centre[..., None, None, :] + np.moveaxis(lines, -3, -1))
+
+
+def points(stream: rr.RecordingStream, path: str, time: list[rr.TimeColumn], positions: Array) -> None:
+    """Log points (T, n, D) at times."""
+    columns = rr.Points3D.columns(positions=spatial(positions).reshape(-1, 3))
+    stream.send_columns(path, time, columns.partition([positions.shape[1]] * len(positions)))
+
+
+def scalars(stream: rr.RecordingStream, path: str, time: list[rr.TimeColumn], values: Array) -> None:
+    """Log numbers (T, n) at times."""
+    columns = rr.Scalars.columns(scalars=values.ravel())
+    stream.send_columns(path, time, columns.partition([values.shape[1]] * len(values)))
