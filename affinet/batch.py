@@ -14,6 +14,7 @@ from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import consistency, metrics
 from analysis.localization import Edges, centroid, distance, ringing, weights
+from analysis.pursuit import position
 from netem import channels
 from netem.fate import Fate
 from netem.links import Mask
@@ -46,6 +47,11 @@ class Runs:
     localization, drift, ringing
         Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
         metres, and which share of the steps between them goes back; NaN where nobody localizes.
+    found, agreed, ideal, apart, behind, effort
+        Of agents that pursue a target, in those ticks, shape (R, T): how far the target is from where each finds it by itself,
+        from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal
+        are apart; how far agents are from the places that they steer for; how hard they steer. Root mean squares over the
+        agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
     place
         Where the agents of the first run believed they were in those ticks, shape (T, N, D), in metres; of no agents where
         nobody localizes.
@@ -63,6 +69,12 @@ class Runs:
     localization: Array
     drift: Array
     ringing: Array
+    found: Array
+    agreed: Array
+    ideal: Array
+    apart: Array
+    behind: Array
+    effort: Array
     place: Array
 
     def together(self, other: Runs) -> Runs:
@@ -106,9 +118,9 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
 
     with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
         for instant in swarm.ticks():
-            position, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
-            target = plan.world.target(instant.tick)
-            errors.append(metrics.tracking_error(position, target, present))
+            flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
+            target = of_runs(together.world.goal(instant.tick, instant.scene))
+            errors.append(metrics.tracking_error(flown, target, present))
             places.measure(instant)
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
@@ -177,4 +189,20 @@ def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any
         "covariance_trace": metrics.covariance_trace(covariance, formation.dimension),
         "nees": consistency.of_errors(estimate, true, covariance, known).mean,
         "nis": consistency.of_innovations(estimate, measured, covariance, sensor.spread(measured), seen).mean,
+        **_pursued(plan, moment, of_runs),
     }
+
+
+def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """How well a target is found and followed in a tick of all runs, shape (R,)."""
+    names = ("found", "agreed", "ideal", "apart", "behind", "effort")
+    pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
+    if pursuit is None or "information" not in moment.reports:
+        return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
+    said = moment.reports
+    target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)
+    agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"]))
+    mean = np.mean(information, axis=1, keepdims=True)
+    ideal = position(mean, target.shape[-1], pursuit.target.order)
+    off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))
+    return {name: np.sqrt((each**2).sum(axis=-1).mean(axis=-1)) for name, each in zip(names, off, strict=True)}

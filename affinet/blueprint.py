@@ -8,10 +8,12 @@ from affinet import sections, selectors
 from affinet.sections import Scenario, ScenarioError
 from agents.brief import Brief
 from analysis.affine import Array, Manoeuvre
+from analysis.pursuit import Target
 from netem.links import Links
 from world import maneuver
 from world.disturbance import Disturbance, Kernel
 from world.formation import PRESETS, Formation
+from world.pursued import Pursuit
 from world.world import World
 
 # Presets that are flown in so many dimensions.
@@ -59,6 +61,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         manoeuvre=_manoeuvre(given, formation.dimension),
         sensor=sections.sensor(given.sensing, formation.dimension),
         disturbance=_disturbance(given, formation.dimension),
+        pursuit=_pursuit(given, formation.dimension),
         start=given.formation.start,
         spread=given.formation.spread,
         swarms=1,
@@ -69,6 +72,21 @@ def _disturbance(given: Scenario, dimension: int) -> Disturbance:
     section = given.dynamics
     kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
     return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
+
+
+def _pursuit(given: Scenario, dimension: int) -> Pursuit | None:
+    section, dt = given.target, given.time.dt
+    if section is None:
+        return None
+    start = np.zeros((section.order, dimension))
+    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
+        if values is not None and derivative < section.order:
+            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
+    ticks = np.round(np.array(section.latencies) / dt).astype(np.int64)
+    if (np.abs(ticks * dt - section.latencies) > 1e-6 * dt).any():
+        raise ScenarioError(f"target.latencies: {section.latencies} s are not whole numbers of ticks of {dt:g} s")
+    target = Target(section.order, section.intensity, ticks, np.array(section.variances, dtype=np.float64))
+    return Pursuit(target, dt, start)
 
 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
@@ -108,6 +126,7 @@ def brief_of(world: World, L: Array) -> Brief:
         sensor=world.sensor,
         process=_process(world),
         leader=formation.is_leader,
+        target=None if world.pursuit is None else world.pursuit.target,
         mission=world.manoeuvre,
     )
 

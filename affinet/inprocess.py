@@ -92,7 +92,7 @@ class Swarm:
             for instant in self.ticks():
                 moments.append(self.moment(instant))
                 if len(moments) == batch or instant.tick == world.ticks - 1:
-                    gathered = gather(world, self.timeline, instant.tick + 1 - len(moments), moments)
+                    gathered = gather(self.timeline, instant.tick + 1 - len(moments), moments)
                     watch(gathered, instant.following.position)
                     moments = []
 
@@ -112,7 +112,7 @@ class Swarm:
             measured = world.measure(tick, scene, now)
             state, action, verdicts, delivery = self._tick(tick, scene, measured, state)
             flown = world.flown(scene, np.where(now.idle[:, None], 0.0, action.input), now)
-            vigil.see(tick, scene.position, timeline)
+            vigil.see(tick, scene, timeline)
             following = world.step(tick, scene, measured, flown, now)
             yield Instant(tick, scene, following, measured, flown, action, verdicts, delivery)
             scene = following
@@ -135,7 +135,8 @@ class Swarm:
         heard = {name: self._hear(name, delivery) for name in self._fields}
         if self._centre:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
-        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, velocity)
+        sighting = self._plan.world.sighting(tick, scene)
+        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, velocity, sighting)
         if now.idle.any():
             state = renew(state, before, now.idle)
         self._forget(tick)
@@ -205,6 +206,7 @@ class Swarm:
         real = self._links.present & awake[:, None]
         return Moment(
             position=instant.scene.position,
+            target=self._plan.world.goal(instant.tick, instant.scene),
             measured=instant.measured,
             input=instant.input,
             estimate=np.where(real[..., None], estimate.relative, 0.0),

@@ -73,6 +73,9 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
             return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
         case "exponential":
             return claims.exponential(claim.says, seconds, values, span)
+        case "value":
+            (one,) = means(chosen)
+            return claims.ratio(claim.says, one, np.full_like(one, claim.level or 1.0), claim.between or [0.8, 1.25])
         case "slower_with_anchor":
             return claims.never_above(claim.says, *random_graphs.rates(GRAPHS, 10, 0.49).T)
         case "indicator_below_error":

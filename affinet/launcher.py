@@ -216,7 +216,7 @@ class Launcher:
             triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
-            leaders=self._plan.world.formation.is_leader,
+            positioned=self._plan.positioned,
             patience_s=_MEDIUM_PATIENCE_S,
         )
 

@@ -22,6 +22,7 @@ from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.jor import JacobiOverRelaxation
 from agents.process import Choice
+from analysis.pursuit import Sighting
 from netem import channels
 from netem.fault import Fault, Verb
 from netem.medium import Verdicted, recorded
@@ -31,6 +32,7 @@ from netem.trigger import Trigger
 from world import stress
 from world.brief import Books
 from world.formation import Array, Formation
+from world.history import TAKEN
 from world.world import World
 
 
@@ -100,6 +102,11 @@ class Plan:
     def timeline(self) -> Timeline:
         """All faults over the links."""
         return Timeline(self.world.links, (*self.faults, *self.injected), self.triggers)
+
+    @cached_property
+    def positioned(self) -> Mask:
+        """Which agents are told where they are, shape (N,): leaders, and all whose law steers by it."""
+        return self.world.formation.is_leader | self.law.build().by_position
 
     @cached_property
     def told_mission(self) -> Mask:
@@ -264,8 +271,12 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
         raise ScenarioError(
             f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations"
         )
-    if getattr(law, "by_stress", None) not in (True, False):
-        raise ScenarioError(f"agents.law: {given.agents.law} has no 'by_stress': whether it weighs edges by the stress")
+    for name, what in (
+        ("by_stress", "it weighs edges by the stress"),
+        ("by_position", "it needs the agent's position"),
+    ):
+        if getattr(law, name, None) not in (True, False):
+            raise ScenarioError(f"agents.law: {given.agents.law} has no {name!r}: whether {what}")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if law.order != given.dynamics.order:
@@ -301,8 +312,14 @@ def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     }
     unseen = np.zeros_like(brief.relative)
     told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
-    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity)
-    return {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
+    sighting = None
+    if brief.target is not None:
+        sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64))
+    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity, sighting)
+    reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
+    if taken := sorted(reports.keys() & TAKEN):
+        raise ValueError(f"the estimator reports {', '.join(taken)}, which every run has already: give it another name")
+    return reports
 
 
 def _tick(seconds: float, dt: float) -> int:

@@ -178,6 +178,27 @@ class Dynamics(Section):
         return 2 if self.model == "double-integrator" else 1
 
 
+class Target(Section):
+    """A target to pursue: position in m, velocity in m/s.
+
+    `intensity` is W of the noise that drives it, per axis, in m2/s^(2 order - 1). Detectors take one of `latencies` (s), chosen
+    at random for each detection, and find it with the variance (m2) of that one.
+    """
+
+    order: Annotated[int, Field(ge=1, le=4)] = 2
+    intensity: NotNegative = 1.0
+    position: list[Finite] | None = None
+    velocity: list[Finite] | None = None
+    latencies: Annotated[list[Positive], Field(min_length=1)]
+    variances: Annotated[list[Positive], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _paired(self) -> Target:
+        if len(self.latencies) != len(self.variances):
+            raise ValueError("give a variance for each latency")
+        return self
+
+
 class Agents(Section):
     """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s.
 
@@ -251,6 +272,7 @@ class Scenario(Section):
     time: Time
     sensing: Sensing
     dynamics: Dynamics = Dynamics()
+    target: Target | None = None
     agents: Agents
     network: Network = Network()
     timeline: list[AnyEvent] = Field(default_factory=list)

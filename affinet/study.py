@@ -38,6 +38,12 @@ Quantity = Literal[
     "localization",
     "drift",
     "ringing",
+    "found",
+    "agreed",
+    "ideal",
+    "apart",
+    "behind",
+    "effort",
 ]
 
 NAMES: dict[Quantity, tuple[str, str]] = {
@@ -50,6 +56,12 @@ NAMES: dict[Quantity, tuple[str, str]] = {
     "localization": ("distance from the optimal places", "m"),
     "drift": ("drift of the weighted centroid", "m"),
     "ringing": ("share of steps that go back", ""),
+    "found": ("error of the target by oneself", "m"),
+    "agreed": ("error of the target together", "m"),
+    "ideal": ("error of the target with all that is known", "m"),
+    "apart": ("distance of agreement from all that is known", "m"),
+    "behind": ("distance from the places steered for", "m"),
+    "effort": ("input", "m/s²"),
 }
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
@@ -77,6 +89,7 @@ class Claim(Section):
         "ratio",
         "exponential",
         "slower_with_anchor",
+        "value",
     ]
     of: Labels = Field(default_factory=dict)
     to: Labels | None = None

@@ -13,6 +13,7 @@ from agents.brief import Array, Brief, Mask, Own, Reading
 from agents.controllers import Law, hold_distances, pilot, saturated
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
 from analysis.affine import Manoeuvre
+from analysis.pursuit import Sighting
 from netem.channels import INPUT
 
 
@@ -87,13 +88,15 @@ class Agent:
         heard: Mapping[str, Heard],
         position: Array | None,
         velocity: Array | None,
+        sighting: Sighting | None,
     ) -> tuple[AgentState, Action]:
         """Estimate from what was heard, and steer; `tick` is what its clock says.
 
-        Only leaders have their own `position` (..., D), and only double integrators a `velocity` (..., D).
+        Only leaders, and those whose law wants it, have their own `position` (..., D); only double integrators a `velocity`
+        (..., D); only who pursues a target a `sighting`.
         """
         brief = self.brief
-        own = Own(state.input if velocity is None else velocity, state.input)
+        own = Own(state.input if velocity is None else velocity, state.input, position, sighting)
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
         law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
         if self.leaders == "distances":

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
+from analysis.pursuit import Sighting, Target
 from analysis.sensor import Sensor
 
 Array = NDArray[np.float64]
@@ -18,7 +19,7 @@ Reading = int | NDArray[np.int64]  # of a clock, in ticks; one for all, or each 
 
 
 class Own(NamedTuple):
-    """What an agent knows of its own motion.
+    """What an agent knows by itself: of its own motion, and of a target.
 
     Parameters
     ----------
@@ -26,10 +27,16 @@ class Own(NamedTuple):
         Shape (..., D), in metres per second: what odometry says, or a single integrator's input.
     input
         Now flying, shape (..., D), in metres per second, or per second squared.
+    position
+        Shape (..., D), in metres; of agents that have positioning.
+    sighting
+        What its detector says, if there is a target.
     """
 
     velocity: Array
     input: Array
+    position: Array | None = None
+    sighting: Sighting | None = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,8 @@ class Brief:
         B_i^T Q B_i, of what displaces the edges in a tick, all together, shape (..., n D, n D), in square metres; 0 in padding.
     leader
         Whether it follows the mission rather than its neighbours, shape (...).
+    target
+        What there is to pursue, if anything.
     mission
         The manoeuvre, for those who are told it: leaders, and everybody under feed-forward.
     """
@@ -73,6 +82,7 @@ class Brief:
     sensor: Sensor
     process: Array
     leader: Mask
+    target: Target | None
     mission: Manoeuvre | None
 
     def of(self, row: int) -> Brief:

@@ -22,11 +22,12 @@ class Law(Protocol[State]):
     """A control law for followers.
 
     `order` is that of the bodies it steers, by a velocity (1) or an acceleration (2); `by_stress` says whether it weighs the
-    edges by the stress of the formation, which then must have one.
+    edges by the stress of the formation, which then must have one; `by_position` whether it needs the agent's own position.
     """
 
     order: ClassVar[int]
     by_stress: ClassVar[bool]
+    by_position: ClassVar[bool]
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
         """The state before the first tick, with `batch` as its leading axes."""
@@ -62,6 +63,7 @@ class Rest:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = False
+    by_position: ClassVar[bool] = False
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
         """Nothing to remember."""
@@ -92,6 +94,7 @@ class Static:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
     alpha: float = 10.0
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
@@ -125,6 +128,7 @@ class ConstantVelocity:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
     alpha: float = 10.0
     eta: float = 0.1
 
@@ -167,6 +171,7 @@ class VaryingVelocity:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
     alpha: float = 1.0
     source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
     relaxation: float = 1.0

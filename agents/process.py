@@ -16,6 +16,7 @@ from agents.agent import Agent, AgentState
 from agents.brief import Array, Brief
 from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
+from analysis.pursuit import Sighting
 from netem import channels, wire
 from netem.keys import Keys
 from netem.sequence import Numbering, Sequences
@@ -136,7 +137,8 @@ class Node:
         self._heard += len(inbox.messages)
         heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
         position, velocity = _numbers(sensed.position), _numbers(sensed.velocity)
-        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, velocity)
+        sighting = _sighting(sensed.sighting)
+        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, velocity, sighting)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
@@ -195,6 +197,18 @@ class Node:
 
 def _numbers(given: wire.Rows | None) -> Array | None:
     return None if given is None else np.array(given, dtype=np.float64)
+
+
+def _sighting(said: Mapping[str, Any] | None) -> Sighting | None:
+    if said is None:
+        return None
+    try:
+        place = np.array(said["position"], dtype=np.float64)
+        return Sighting(place, np.array(bool(said["done"])), np.array(int(said["method"])))
+    except (KeyError, TypeError, ValueError) as error:
+        raise wire.WireError(
+            f"a sighting has position, done and method, not {said!r} (see docs/protocol.md)"
+        ) from error
 
 
 def main() -> None:

@@ -33,6 +33,7 @@ class _Damped:
 
     order: ClassVar[int] = 2
     by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
     position_gain: float
     velocity_gain: float
     source: Source = "communicated"

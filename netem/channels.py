@@ -14,6 +14,7 @@ MEASUREMENT = "measurement"
 INPUT = "input"
 THETA = "theta"
 PLACE = "place"
+TARGET = "target"
 CENTRE = "centre"  # not of the air: what a centralized filter tells reaches everybody
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")

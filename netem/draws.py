@@ -49,6 +49,9 @@ class Purpose(IntEnum):
     OUTLIER = 18
     OUTLIER_SIZE = 19
     SELECTION = 20
+    TARGET = 21
+    LATENCY = 22
+    DETECTION = 23
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:

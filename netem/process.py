@@ -46,7 +46,7 @@ class MediumBrief:
         Faults that an earlier run was given while it flew.
     recorded
         The journal of an earlier run that is to be judge of this one.
-    leaders
+    positioned
         Agents that have positioning, shape (N,).
     patience_s
         How long to wait for a broadcast before the run is stalled, in seconds.
@@ -63,7 +63,7 @@ class MediumBrief:
     triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
-    leaders: Mask
+    positioned: Mask
     patience_s: float
 
 
@@ -250,8 +250,9 @@ class Relay:
                 clock=clock[agent - 1],
                 neighbours=neighbours,
                 measured=[sense.measured[link] for link in links],
-                position=sense.position[agent - 1] if self._brief.leaders[agent - 1] else None,
+                position=sense.position[agent - 1] if self._brief.positioned[agent - 1] else None,
                 velocity=None if sense.velocity is None else sense.velocity[agent - 1],
+                sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
             self._inboxes[agent].put(wire.pack(inbox))
 

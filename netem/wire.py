@@ -39,6 +39,7 @@ class Sense(NamedTuple):
 
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
     (N, D), both in metres; `velocity` the true velocities, shape (N, D), in metres per second, where agents are told theirs;
+    `sightings` what each agent's detector says of a target, as in `SenseInbox`, if there is one;
     `fired` are the numbers of the triggers that fire in this tick.
     """
 
@@ -49,6 +50,7 @@ class Sense(NamedTuple):
     measured: Array | Rows
     position: Array | Rows
     velocity: Array | Rows | None
+    sightings: Rows | None
     fired: Rows
 
 
@@ -57,7 +59,9 @@ class SenseInbox(NamedTuple):
 
     `clock` is what the agent's own clock says, in ticks; `neighbours` are the agents measured, shape (m,), `measured` their
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
-    positioning, get it; `velocity` its own, shape (D,), in metres per second, if it is a double integrator.
+    positioning, get it; `velocity` its own, shape (D,), in metres per second, if it is a double integrator; `sighting` what its
+    detector says of a target, if there is one: `position`, where it was when the detection began, in metres, if one is `done`,
+    and the number of the `method` that the detector uses from now on.
     """
 
     k: int
@@ -69,6 +73,7 @@ class SenseInbox(NamedTuple):
     measured: Rows
     position: Rows | None
     velocity: Rows | None
+    sighting: dict[str, Any] | None
 
 
 class Broadcast(NamedTuple):

@@ -158,7 +158,7 @@ def fly_together(agent, links, measured, seen, fresh, position, velocity):
         told = odometry(agent, velocity[tick])
         state, said = agent.sense(state, measured[tick], seen[tick], told)
         heard = gather(said, links.neighbours, fresh[tick])
-        state, action = agent.act(state, tick, heard, position[tick], told)
+        state, action = agent.act(state, tick, heard, position[tick], told, None)
         ticks.append((said, heard, action, state))
     return ticks
 
@@ -175,7 +175,7 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, di
         for tick, (all_said, all_heard, all_action, all_state) in enumerate(together):
             told = odometry(alone, velocity[tick, row])
             state, said = alone.sense(state, measured[tick, row], seen[tick, row], told)
-            state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row], told)
+            state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row], told, None)
             for one, many in zip(leaves((said, action, state)), leaves((all_said, all_action, all_state)), strict=True):
                 assert one.shape == many[row].shape
                 assert one.tobytes() == many[row].tobytes()

@@ -67,7 +67,7 @@ def lives(agent, state, ticks, seed):
         }
         centre = {"relative": measured, "covariance": rng.normal(size=(*measured.shape, measured.shape[-1]))}
         heard[CENTRE] = Heard(centre, np.ones(slots, dtype=bool))
-        state, action = agent.act(state, tick, heard, None, velocity)
+        state, action = agent.act(state, tick, heard, None, velocity, None)
         told.append(action.input)
     return state, np.array(told)
 

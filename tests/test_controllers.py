@@ -193,7 +193,7 @@ def test_leaders_follow_the_pilot_and_followers_the_law(zhao7):
     state, said = agent.sense(agent.init((7,)), measured, zhao7.present, None)
     np.testing.assert_array_equal(said[INPUT]["velocity"], np.zeros((7, 2)))
     heard = {INPUT: Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)}
-    state, action = agent.act(state, 40, heard, position, None)
+    state, action = agent.act(state, 40, heard, position, None, None)
     np.testing.assert_allclose(action.input[:3], pilot(zhao7, zhao7.mission, 1.0, 40, position)[:3])
     np.testing.assert_allclose(action.input[3:], -2.0 * stress_force(zhao7, action.estimate)[3:])
     _, said = agent.sense(state, measured, zhao7.present, None)

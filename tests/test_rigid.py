@@ -104,7 +104,7 @@ def test_leaders_keep_their_distances_and_followers_fly_the_law():
     state, _ = agent.sense(agent.init((10,)), measured, links.present, None)
     heard = hears(links.present, np.zeros((10, links.present.shape[1], 2)))
     # A position it should not look at: these leaders have no target.
-    _, action = agent.act(state, 3, heard, np.full((10, 2), 1e3), None)
+    _, action = agent.act(state, 3, heard, np.full((10, 2), 1e3), None, None)
     np.testing.assert_array_equal(action.input[own.leader], hold_distances(own, 0.5, action.estimate)[own.leader])
     np.testing.assert_array_equal(action.input[~own.leader], -2.0 * stress_force(own, action.estimate)[~own.leader])
 

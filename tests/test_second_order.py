@@ -248,7 +248,7 @@ def drawn(brief, seed=1):
 
 def act(agent, measured, position, velocity, heard, tick=2000):
     state, _ = agent.sense(agent.init((10,)), measured, agent.brief.present, velocity)
-    return agent.act(state, tick, heard, position, velocity)
+    return agent.act(state, tick, heard, position, velocity, None)
 
 
 def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(octa10):

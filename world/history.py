@@ -18,7 +18,7 @@ from netem.fate import Fate, Fates
 from netem.links import Integers, Mask
 from netem.timeline import Timeline
 from world.formation import Array
-from world.world import World
+from world.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -41,6 +41,7 @@ _BY_TICK = (
     "target",
     "error",
 )
+TAKEN = frozenset(_BY_TICK)  # names that no report can have
 UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
 _MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
 
@@ -50,8 +51,9 @@ class Moment(NamedTuple):
 
     Parameters
     ----------
-    position, input
-        Where the agents are, and what they fly, shape (N, D), in metres, and metres per second or per second squared.
+    position, target, input
+        Where the agents are and should be, and what they fly, shape (N, D), in metres, and metres per second or per second
+        squared.
     measured
         What the sensors said of every directed link, heard or not, shape (L, D), in metres.
     estimate, known, covariance
@@ -74,6 +76,7 @@ class Moment(NamedTuple):
     """
 
     position: Any
+    target: Any
     measured: Any
     input: Any
     estimate: Any
@@ -138,10 +141,10 @@ class Moments:
         return np.arange(self.first, self.first + len(self.error))
 
 
-def gather(world: World, timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments:
+def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments:
     """Consecutive moments as arrays, with what they are measured against."""
     ticks = np.arange(first, first + len(moments))
-    where, target = np.array([moment.position for moment in moments]), world.target(ticks)
+    where, target = (np.array([getattr(moment, name) for moment in moments]) for name in ("position", "target"))
     fates = np.array([moment.fates for moment in moments], dtype=np.uint8)
     entries = [
         Entry(each, _rows(moment.odd), _rows(moment.dropped), _rows(moment.released), moment.injected)
@@ -198,10 +201,11 @@ class Vigil:
         """Of the ticks seen so far, shape (T,), in square metres."""
         return self._errors[: self._seen]
 
-    def see(self, tick: int, position: Array, timeline: Timeline) -> None:
+    def see(self, tick: int, scene: Scene, timeline: Timeline) -> None:
         """Take in a tick, if anything waits for it."""
         if timeline.pending:
-            self._errors[tick] = tracking_error(position, self._world.target(tick), ~timeline.at(tick).absent)
+            goal = self._world.goal(tick, scene)
+            self._errors[tick] = tracking_error(scene.position, goal, ~timeline.at(tick).absent)
             self._seen = tick + 1
 
 

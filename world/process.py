@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zenoh
@@ -77,10 +77,10 @@ class Theatre:
             now = self._timeline.at(tick)
             moment = self._moment(scene, measured, journal, acts, now)
             self._moments.append(moment)
-            self._vigil.see(tick, scene.position, self._timeline)
+            self._vigil.see(tick, scene, self._timeline)
             scene = self._world.step(tick, scene, measured, moment.input, now)
         self._write_down(self._world.ticks, scene, logbook)
-        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, [])
+        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, None, [])
         self._sense.put(wire.pack(end))
 
     def _fire(self, tick: int) -> list[int]:
@@ -107,8 +107,17 @@ class Theatre:
 
     def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
         number, velocity = self._numbers.next("sense"), self._world.odometry(scene)
-        sense = wire.Sense(tick, WORLD, number, False, measured, scene.position, velocity, fired)
+        sense = wire.Sense(
+            tick, WORLD, number, False, measured, scene.position, velocity, self._sightings(tick, scene), fired
+        )
         self._sense.put(wire.pack(sense))
+
+    def _sightings(self, tick: int, scene: Scene) -> list[dict[str, Any]] | None:
+        sighting = self._world.sighting(tick, scene)
+        if sighting is None:
+            return None
+        agents = zip(*(field.tolist() for field in sighting), strict=True)
+        return [dict(zip(sighting._fields, said, strict=True)) for said in agents]
 
     def _read_journal(self, tick: int) -> wire.Journal:
         journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
@@ -146,6 +155,7 @@ class Theatre:
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
         return Moment(
             position=scene.position,
+            target=self._world.goal(journal.k, scene),
             measured=measured,
             input=self._world.flown(scene, np.array([act.input for act in everybody]), now),
             estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
@@ -168,7 +178,7 @@ class Theatre:
     def _write_down(self, tick: int, scene: Scene, logbook: Logbook) -> None:
         if not self._moments:
             return
-        moments = gather(self._world, self._timeline, tick - len(self._moments), self._moments)
+        moments = gather(self._timeline, tick - len(self._moments), self._moments)
         self._moments = []
         self.history.extend(moments, scene.position)
         logbook.write(moments, self._timeline)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
+from analysis.pursuit import Sighting
 from analysis.sensor import Sensor
 from netem.draws import Purpose, Seed, Tape, uniform
 from netem.links import Integers, Links, Mask
@@ -18,6 +19,7 @@ from world import dynamics, sensors
 from world.disturbance import Disturbance
 from world.formation import Array, Formation
 from world.noise import normal
+from world.pursued import Chase, Pursuit
 
 
 class Scene(NamedTuple):
@@ -33,12 +35,15 @@ class Scene(NamedTuple):
         What was measured in the tick before, shape (L, D), in metres.
     disturbance
         What displaced them from the tick before, shape (N, D), in metres.
+    chase
+        The target, and the detectors that are after it, if there is one.
     """
 
     position: Array
     velocity: Array
     measured: Array
     disturbance: Array
+    chase: Chase | None
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,8 @@ class World:
         What measures relative positions.
     disturbance
         What displaces the agents in every tick.
+    pursuit
+        How a target moves and is found, if there is one.
     start
         Where they begin: leaders on their targets and followers scattered about theirs, or all about the origin.
     spread
@@ -78,6 +85,7 @@ class World:
     manoeuvre: Manoeuvre
     sensor: Sensor
     disturbance: Disturbance
+    pursuit: Pursuit | None
     start: Literal["targets", "origin"]
     spread: float
     swarms: int
@@ -91,11 +99,25 @@ class World:
         if self.start == "targets":
             position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
         rest = np.zeros_like(position)
-        return Scene(position, rest, sensors.relative(position, self.links), rest)
+        chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
+        return Scene(position, rest, sensors.relative(position, self.links), rest, chase)
 
     def target(self, tick: int | NDArray[np.int64]) -> Array:
         """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
         return self.manoeuvre.target(np.asarray(tick)[..., None], self.formation.nominal)
+
+    def goal(self, tick: int, scene: Scene) -> Array:
+        """Where every agent should be, shape (N, D): where the manoeuvre wants it, or at its place about the target."""
+        if scene.chase is None:
+            return self.target(tick)
+        size = self.formation.agents // self.swarms
+        return np.repeat(scene.chase.target[:, 0], size, axis=0) + self.formation.nominal
+
+    def sighting(self, tick: int, scene: Scene) -> Sighting | None:
+        """What the agents' detectors say of the target, if there is one."""
+        if self.pursuit is None or scene.chase is None:
+            return None
+        return self.pursuit.sighting(tick, self.seed, self._numbers, scene.chase)
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
         """y_ij of every directed link, shape (L, D), in metres."""
@@ -129,7 +151,10 @@ class World:
         else:
             velocity = np.where(still, 0.0, scene.velocity + self.dt * flown)
             moved = dynamics.double_integrator(scene.position, scene.velocity + now.push, flown, self.dt, noise)
-        return Scene(np.where(still, scene.position, moved), velocity, measured, noise)
+        chase = scene.chase
+        if self.pursuit is not None and chase is not None:
+            chase = self.pursuit.step(tick, self.seed, self._numbers, chase)
+        return Scene(np.where(still, scene.position, moved), velocity, measured, noise, chase)
 
     @cached_property
     def _sensor_noise(self) -> Tape:

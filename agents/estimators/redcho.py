@@ -1,0 +1,68 @@
+"""REDCHO (paper 002, appendix C): agents agree on the average of signals and of its derivatives, while the signals change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from agents.brief import Array
+
+
+@dataclass(frozen=True)
+class Consensus:
+    """The protocol (14), by explicit Euler steps, for any number of signals at once.
+
+    Parameters
+    ----------
+    order
+        m: the highest derivative that is agreed on.
+    theta, k, gamma
+        Its gains; k and gamma have m + 1 entries.
+    """
+
+    order: int
+    theta: float
+    k: tuple[float, ...]
+    gamma: tuple[float, ...]
+
+    def outputs(self, local: Array, internal: Array) -> Array:
+        """s_mu, shape (m + 1, ..., C), of jets of own signals (m + 1, ..., C) and internal variables (..., m + 1, C)."""
+        mixed = self._mixing @ internal
+        agreed: Array = local - np.moveaxis(mixed, -2, 0)
+        return agreed
+
+    def step(self, internal: Array, own: Array, theirs: Array, dt: float) -> Array:
+        """The internal variables a tick later.
+
+        Parameters
+        ----------
+        internal
+            Shape (..., m + 1, C).
+        own
+            s_0 of the agent, shape (..., C).
+        theirs
+            Those of its neighbours, shape (..., n, C); its own in place of those that count for nothing.
+        dt
+            Tick, in seconds.
+        """
+        apart = own[..., None, :] - theirs
+        size, sign = np.abs(apart), np.sign(apart)
+        rates = []
+        for mu in range(self.order + 1):
+            exponent = (self.order - mu) / (self.order + 1)
+            pull = (size**exponent * sign).sum(axis=-2)
+            higher = internal[..., mu + 1, :] if mu < self.order else 0.0
+            rates.append(self.k[mu] * self.theta ** (mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :])
+        stepped: Array = internal + dt * np.stack(rates, axis=-2)
+        return stepped
+
+    @cached_property
+    def _mixing(self) -> Array:
+        """G, shape (m + 1, m + 1): row mu is C_0 Gamma^mu, with Gamma = A_0 - diag(gamma) (errata)."""
+        Gamma = np.eye(self.order + 1, k=1) - np.diag(self.gamma)
+        rows = [np.eye(self.order + 1)[0]]
+        for _ in range(self.order):
+            rows.append(rows[-1] @ Gamma)
+        return np.stack(rows)

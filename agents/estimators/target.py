@@ -1,0 +1,234 @@
+"""Where a target is that is found with a latency: DOE and SOE, fused by REDCHO (paper 002, sections 3 and 4).
+
+Every axis is a filter of its own, with one covariance for all. Between detections the optimal estimate is predicted, and jumps
+when one is done (DOE); the smooth one passes from the last prediction to this one in between (SOE). What is exchanged is
+information; consensus on it and its derivatives gives all agents one estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from agents.brief import Array, Brief, Mask, Own
+from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
+from agents.estimators.redcho import Consensus
+from analysis import jets
+from analysis.pursuit import Target, diffusion, numbers, packed, transition, unpacked
+from netem.channels import TARGET
+from netem.links import Integers
+
+
+class Prediction(NamedTuple):
+    """An optimal estimate (5): mean (..., m, D), covariance (..., m, m), and the ticks since it was made, (...)."""
+
+    mean: Array
+    covariance: Array
+    age: Integers
+
+
+class Track(NamedTuple):
+    """The last two optimal estimates, whether there are two (...), the method at work (...), and the internals of REDCHO.
+
+    These are (..., m + 1, C), for the C different numbers of information matrix and vectors.
+    """
+
+    last: Prediction
+    before: Prediction
+    settled: Mask
+    method: Integers
+    internal: Array
+
+
+@dataclass(frozen=True)
+class TargetEstimator:
+    """An estimate of the target and its derivatives, by itself or with the neighbours.
+
+    Parameters
+    ----------
+    output
+        "smooth" (SOE), or "optimal" (DOE), which jumps.
+    alpha
+        Of the transition function (appendix B): the smaller, the sooner the newer prediction counts.
+    fuse
+        Whether agents agree on what they know (REDCHO); wants the smooth output.
+    derivatives
+        Whose derivatives go with the position that agents agree on: those agreed on too (Algorithm 1), or the agent's own. The
+        former want far shorter ticks than networks have (docs/studies.md).
+    theta, k, gamma
+        Gains of REDCHO (14), k and gamma one for each derivative from 0 to m.
+    prior_position, prior_derivatives
+        Standard deviations of the target's position and of each of its derivatives in the first tick, in SI units.
+    """
+
+    output: Literal["smooth", "optimal"] = "smooth"
+    alpha: float = 1.0
+    fuse_information: bool = True
+    derivatives: Literal["agreed", "own"] = "agreed"
+    theta: float = 16.0
+    k: Sequence[float] = (6.0, 11.0, 6.0)
+    gamma: Sequence[float] = (1.0, 1.0, 1.0)
+    prior_position: float = 1.0
+    prior_derivatives: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.fuse_information and self.output == "optimal":
+            raise ValueError(
+                "an output that jumps has no derivatives to agree on: fuse_information wants output = 'smooth'"
+            )
+        if self.alpha <= 0.0:
+            raise ValueError(f"alpha must be above 0, not {self.alpha}")
+
+    def channels(self, brief: Brief) -> Channels:
+        """The information, as agreed on so far."""
+        order = _target(brief).order
+        if not self.fuse_information:
+            return {}
+        return {TARGET: {"information": Field((numbers(order, brief.dimension),))}}
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Track:
+        """The target is at the origin and at rest, as far as is known."""
+        order = _target(brief).order
+        if self.fuse_information and not len(self.k) == len(self.gamma) == order + 1:
+            raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
+        deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
+        prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
+        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.full(batch, -1, dtype=np.int64))
+        internal = np.zeros((*batch, order + 1, numbers(order, brief.dimension)))
+        return Track(first, first, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64), internal)
+
+    def sense(
+        self,
+        brief: Brief,
+        state: Track,
+        measured: Array,  # noqa: ARG002
+        seen: Mask,  # noqa: ARG002
+    ) -> tuple[Track, Mapping[str, Fields]]:
+        """A tick has passed; tell the information agreed on so far."""
+        state = state._replace(last=_older(state.last), before=_older(state.before))
+        if not self.fuse_information:
+            return state, {}
+        local = packed(*self._information(brief, state))
+        return state, {TARGET: {"information": self._consensus(brief).outputs(local, state.internal)[0]}}
+
+    def fuse(self, brief: Brief, state: Track, heard: Mapping[str, Heard], own: Own) -> tuple[Track, Estimate]:
+        """Take in a detection that is done; agree with the neighbours."""
+        state = self._detected(brief, state, own)
+        Q, y = self._information(brief, state)
+        local = _position(Q, y)
+        reference, spread = local, np.linalg.inv(Q[0])
+        if self.fuse_information:
+            consensus, said = self._consensus(brief), heard[TARGET]
+            agreed = consensus.outputs(packed(Q, y), state.internal)
+            theirs = np.where(said.fresh[..., None], said.fields["information"], agreed[0][..., None, :])
+            internal = consensus.step(state.internal, agreed[0], theirs, brief.dt)
+            state = state._replace(internal=internal)
+            shared, vectors = unpacked(agreed, brief.dimension, _target(brief).order)
+            # While agreement is far off, what is agreed on need not be the information of anything.
+            sound = np.linalg.eigvalsh(shared[0])[..., 0] > 0.0
+            shared = np.where(sound[..., None, None], shared, Q)
+            fused = _position(shared, np.where(sound[..., None, None], vectors, y))
+            reference = fused if self.derivatives == "agreed" else np.concatenate([fused[:1], local[1:]])
+            spread = np.linalg.inv(shared[0])
+        reports = {
+            "reference": np.moveaxis(reference, 0, -2),
+            "found": local[0],
+            "variance": spread[..., 0, 0],
+            "information": packed(Q[0], y[0]),
+        }
+        nothing = np.zeros(brief.relative.shape)
+        known = np.zeros_like(brief.present)
+        return state, Estimate(
+            nothing, known, nothing[..., None] * nothing[..., None, :], no_indicator(known), reports=reports
+        )
+
+    def _detected(self, brief: Brief, state: Track, own: Own) -> Track:
+        """The optimal estimate of the tick in which the detection was done (5), where one was."""
+        sighting, target = own.sighting, _target(brief)
+        if sighting is None:
+            raise ValueError("this estimator needs a target: give the scenario a [target]")
+        seconds = _seconds(target, state, brief.dt)
+        R = target.variances[state.method]
+        A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
+        mean, P = state.last.mean, state.last.covariance
+        L = (A @ P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
+        # The method's latency is over when the detection is done: how old the estimate is by then, it is by definition.
+        corrected = A @ mean + L @ (sighting.position[..., None, :] - mean[..., :1, :])
+        closed = A - L @ np.eye(1, target.order)
+        covariance = closed @ P @ np.swapaxes(closed, -1, -2) + R[..., None, None] * (L @ np.swapaxes(L, -1, -2)) + W
+        done = sighting.done
+
+        def replaced(new: Any, old: Any) -> Any:
+            return np.where(done.reshape(done.shape + (1,) * (old.ndim - done.ndim)), new, old)
+
+        last = Prediction(
+            replaced(corrected, mean), replaced(covariance, P), np.where(done, 0, state.last.age).astype(np.int64)
+        )
+        before = Prediction(*(replaced(new, old) for new, old in zip(state.last, state.before, strict=True)))
+        return state._replace(last=last, before=before, settled=state.settled | done, method=sighting.method)
+
+    def _information(self, brief: Brief, state: Track) -> tuple[Array, Array]:
+        """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D) (7)."""
+        target = _target(brief)
+        newer = _predicted(target, state.last, brief.dt)
+        if self.output == "optimal":
+            return newer
+        older = _predicted(target, state.before, brief.dt)
+        share = self._share(target, state, brief.dt)
+        rest = np.concatenate([1.0 - share[:1], -share[1:]])
+        Q, y = (jets.scaled(rest, old) + jets.scaled(share, new) for old, new in zip(older, newer, strict=True))
+        return Q, y
+
+    def _share(self, target: Target, state: Track, dt: float) -> Array:
+        """The jet of eta (appendix B), shape (m + 1, ...): how far the smooth output has passed to the newer prediction."""
+        latency = _seconds(target, state, dt)
+        rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
+        passed = np.minimum(state.last.age * dt / latency, 1.0)
+        rising = jets.power(passed, exponent, rate, orders)
+        falling = self.alpha**exponent * jets.power(1.0 - passed, exponent, -rate, orders)
+        share = jets.quotient(rising, rising + falling)
+        alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((orders - 1, *passed.shape))])
+        return np.where(state.settled, share, alone)
+
+    def _consensus(self, brief: Brief) -> Consensus:
+        return Consensus(_target(brief).order, self.theta, tuple(self.k), tuple(self.gamma))
+
+
+def _target(brief: Brief) -> Target:
+    if brief.target is None:
+        raise ValueError("this estimator needs a target: give the scenario a [target]")
+    return brief.target
+
+
+def _seconds(target: Target, state: Track, dt: float) -> Array:
+    """How long the detection at work takes, shape (...)."""
+    return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
+
+
+def _older(prediction: Prediction) -> Prediction:
+    return prediction._replace(age=prediction.age + 1)
+
+
+def _predicted(target: Target, prediction: Prediction, dt: float) -> tuple[Array, Array]:
+    """Jets of the information of an optimal estimate carried on (6), by the differential equations that it follows."""
+    order, seconds = target.order, np.maximum(prediction.age, 0) * dt
+    A = transition(order, seconds)
+    shift, driven = np.eye(order, k=1), np.zeros((order, order))
+    driven[-1, -1] = target.intensity
+    mean = [A @ prediction.mean]
+    covariance = [A @ prediction.covariance @ np.swapaxes(A, -1, -2) + diffusion(order, seconds, target.intensity)]
+    for derivative in range(order):
+        mean.append(shift @ mean[-1])
+        moved = shift @ covariance[-1]
+        covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
+    Q = jets.inverse(np.stack(covariance))
+    return Q, jets.times(Q, np.stack(mean))
+
+
+def _position(Q: Array, y: Array) -> Array:
+    """The jet of the position (m + 1, ..., D) (Algorithm 1)."""
+    found: Array = jets.times(jets.inverse(Q), y)[..., 0, :]
+    return found

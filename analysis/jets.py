@@ -1,0 +1,70 @@
+"""Jets: a quantity and its first m derivatives in time, along a leading axis of length m + 1.
+
+Products and inverses are exact (paper 002, lemma 1), whatever the derivatives are of.
+"""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def times(one: Array, other: Array) -> Array:
+    """The jet of a matrix product, of jets (m + 1, ..., r, s) and (m + 1, ..., s, c)."""
+    return np.stack(
+        [
+            sum((comb(order, lower) * (one[lower] @ other[order - lower]) for lower in range(order + 1)), np.zeros(1))
+            for order in range(len(one))
+        ]
+    )
+
+
+def scaled(factor: Array, other: Array) -> Array:
+    """The jet of numbers (m + 1, ...) times matrices (m + 1, ..., r, c)."""
+    return np.stack(
+        [
+            sum(
+                (
+                    comb(order, lower) * (factor[lower][..., None, None] * other[order - lower])
+                    for lower in range(order + 1)
+                ),
+                np.zeros(1),
+            )
+            for order in range(len(factor))
+        ]
+    )
+
+
+def inverse(matrix: Array) -> Array:
+    """The jet of the inverses of matrices (m + 1, ..., r, r) (lemma 1, i)."""
+    inverted = [np.linalg.inv(matrix[0])]
+    for order in range(1, len(matrix)):
+        drawn = sum(
+            (comb(order, lower) * (matrix[order - lower] @ inverted[lower]) for lower in range(order)), np.zeros(1)
+        )
+        inverted.append(-inverted[0] @ drawn)
+    return np.stack(inverted)
+
+
+def quotient(numerator: Array, denominator: Array) -> Array:
+    """The jet of a quotient of numbers (m + 1, ...)."""
+    found: list[Array] = []
+    for order in range(len(numerator)):
+        drawn = sum(
+            (comb(order, lower) * found[lower] * denominator[order - lower] for lower in range(order)), np.zeros(1)
+        )
+        found.append((numerator[order] - drawn) / denominator[0])
+    return np.stack(found)
+
+
+def power(base: Array, exponent: int, rate: Array, orders: int) -> Array:
+    """The jet of x^n where x moves at a rate, shape (orders, ...)."""
+    jet = []
+    for order in range(orders):
+        falling = float(np.prod(np.arange(exponent - order + 1, exponent + 1))) if order <= exponent else 0.0
+        jet.append(falling * base ** max(exponent - order, 0) * rate**order)
+    return np.stack(jet)
