@@ -51,10 +51,11 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
         raise ValueError(f"no case has the labels {claim.of}")
     span, unit = (claim.since, claim.until), NAMES[quantity][1]
 
-    def means(of: list[Result]) -> Array:
-        return np.array([_mean_of(one.runs, quantity, span) for one in of])
+    def means(of: list[Result], what: Quantity = quantity) -> Array:
+        return np.array([_mean_of(one.runs, what, span) for one in of])
 
     other = [one for one in results if selected(one, claim.to or {})]
+    others = claim.to_quantity or quantity
     seconds = chosen[0].runs.seconds
     values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
     match claim.check:
@@ -63,9 +64,9 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
         case "approaches":
             return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
         case "lower":
-            return claims.lower(claim.says, means(chosen), means(other), unit)
+            return claims.lower(claim.says, means(chosen), means(other, others), unit)
         case "ratio":
-            (one,), (another,) = means(chosen), means(other)
+            (one,), (another,) = means(chosen), means(other, others)
             return claims.ratio(claim.says, one, another, claim.between or [0.0, 1.0])
         case "stays_below":
             return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)

@@ -22,7 +22,7 @@ from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.jor import JacobiOverRelaxation
 from agents.process import Choice
-from analysis.pursuit import Sighting
+from analysis.pursuit import REPORTS, Sighting
 from netem import channels
 from netem.fault import Fault, Verb
 from netem.medium import Verdicted, recorded
@@ -91,7 +91,8 @@ class Plan:
     def books(self, viewer: str | None) -> Books:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
-        return Books(record.every, self.window, record.enabled, viewer, channels.PLACE in self.reports)
+        pursues = self.world.pursuit is not None and self.reports.keys() >= REPORTS
+        return Books(record.every, self.window, record.enabled, viewer, channels.PLACE in self.reports, pursues)
 
     @property
     def window(self) -> int:

@@ -94,6 +94,7 @@ class Claim(Section):
     of: Labels = Field(default_factory=dict)
     to: Labels | None = None
     quantity: Quantity | None = None
+    to_quantity: Quantity | None = None
     level: float | None = None
     between: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     since: float = 0.0
@@ -104,6 +105,13 @@ class Claim(Section):
         if (self.to is None) == (self.check in ("approaches", "lower", "ratio")):
             raise ValueError(f"the check {self.check!r} {'needs' if self.to is None else 'has no use for'} to")
         return self
+
+
+class Bound(Section):
+    """A line in the figure that no curve should cross, and what it says."""
+
+    at: float
+    says: str
 
 
 class Size(Section):
@@ -121,6 +129,7 @@ class Study(Section):
     figure: Literal["curves", "sweep", "indicator", "map"]
     scenario: str
     quantity: Quantity = "error"
+    bound: Bound | None = None
     set: list[str] = Field(default_factory=list)
     full: Size
     quick: Size

@@ -36,7 +36,8 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     axes = [axis.name for axis in study.axes]
     curves = _curves(results, study.quantity)
     if study.figure == "curves":
-        figures.curves(out / "figure.png", study.title, curves, axes, figures.said(*NAMES[study.quantity]))
+        bound = None if study.bound is None else (study.bound.at, study.bound.says)
+        figures.curves(out / "figure.png", study.title, curves, axes, figures.said(*NAMES[study.quantity]), bound)
         dimension = results[0].plan.world.formation.dimension
         normalised = {what.upper(): _curves(results, what) for what in ("nees", "nis")}
         figures.consistency(out / "consistency.png", study.title, normalised, axes, dimension)

@@ -32,8 +32,18 @@ class Curve:
     mean_error: Array
 
 
-def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], quantity: str) -> None:
-    """A quantity over time: a panel for each label of the first axis and each of the second, a curve for each of the third."""
+def curves(
+    path: Path,
+    title: str,
+    cases: Sequence[Curve],
+    axes: Sequence[str],
+    quantity: str,
+    bound: tuple[float, str] | None = None,
+) -> None:
+    """A quantity over time: a panel for each label of the first axis and each of the second, a curve for each of the third.
+
+    A bound is a dashed line, with what it says.
+    """
     across, down, each = axes
     columns, rows = _labels(cases, across), _labels(cases, down)
     figure = Figure(figsize=(3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
@@ -42,6 +52,9 @@ def curves(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], 
         panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
         _draw(panel, case, case.labels[each])
         panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
+    if bound is not None:
+        for panel in panels.ravel():
+            panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
     _finish(figure, panels, title, "time (s)", quantity, each)
     figure.savefig(path)
 

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# What estimators of a target report: position and derivatives to steer for, the position found by oneself, the variance of the
+# former per axis, and one's own information.
+REPORTS = frozenset({"reference", "found", "variance", "information"})
+
 
 class Sighting(NamedTuple):
     """What detectors say in a tick.

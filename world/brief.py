@@ -27,8 +27,8 @@ class Books:
         Whether to make a recording.
     viewer
         URL of a viewer to stream to.
-    localizes
-        Whether agents report where they believe they are.
+    localizes, pursues
+        Whether agents report where they believe they are, and where a target is.
     """
 
     every: int
@@ -36,6 +36,7 @@ class Books:
     record: bool
     viewer: str | None
     localizes: bool
+    pursues: bool
 
     @property
     def batch(self) -> int:

@@ -58,6 +58,7 @@ class Logbook:
                 run=run,
                 world=world,
                 localizes=books.localizes,
+                pursues=books.pursues,
                 every=books.every,
                 viewer=books.viewer,
             )

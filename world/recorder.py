@@ -21,6 +21,7 @@ from world.formation import Array, Formation
 from world.history import Moments
 from world.realised import Realised
 from world.recorded_places import Places
+from world.recorded_target import Pursued
 from world.stage import TIMELINE, scalars, spatial
 from world.world import World
 
@@ -59,8 +60,8 @@ class Recorder:
         Its name.
     world
         What is flown.
-    localizes
-        Whether agents report where they believe they are.
+    localizes, pursues
+        Whether agents report where they believe they are, and where a target is.
     every
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
@@ -74,6 +75,7 @@ class Recorder:
         run: str,
         world: World,
         localizes: bool,
+        pursues: bool,
         every: int,
         viewer: str | None = None,
     ) -> None:
@@ -85,9 +87,12 @@ class Recorder:
         self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
         self._stream = rr.RecordingStream("affinet", recording_id=run)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
-        self._stream.set_sinks(*sinks, default_blueprint=_blueprint(world.formation, localizes=localizes))
+        self._stream.set_sinks(
+            *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
+        )
         self._log_static()
-        self._places = Places(self._stream, world) if localizes else None
+        kinds = ((Places, localizes), (Pursued, pursues))
+        self._layers = [layer(self._stream, world) for layer, wanted in kinds if wanted]
         self._stream.flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
@@ -108,8 +113,8 @@ class Recorder:
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
         self._log_realised(time, realised)
-        if self._places:
-            self._places.log(time, moments, kept)
+        for layer in self._layers:
+            layer.log(time, moments, kept)
 
     def close(self) -> None:
         """End the file."""
@@ -249,7 +254,7 @@ class Recorder:
         scalars(self._stream, path, time, values)
 
 
-def _blueprint(formation: Formation, *, localizes: bool) -> rrb.Blueprint:
+def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.Blueprint:
     reach = float(np.ptp(formation.nominal, axis=0).max())
     trail = rrb.VisibleTimeRange(
         TIMELINE,
@@ -272,6 +277,7 @@ def _blueprint(formation: Formation, *, localizes: bool) -> rrb.Blueprint:
     plots = rrb.Vertical(
         rrb.Tabs(
             *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if localizes else []),
+            *([rrb.TimeSeriesView(origin="metrics/target", name="error of the target")] if pursues else []),
             rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
             rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
             rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),

@@ -1,0 +1,53 @@
+"""What a recording shows of a pursuit: the target, where each agent finds it by itself and with the others, and how surely."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from world.history import Moments
+from world.stage import ellipses, points, scalars
+from world.world import World
+
+_TARGET, _FOUND, _AGREED, _ELLIPSE = 0xFF3B30FF, 0x88888899, 0x3FA7F5FF, 0x3FA7F544
+_DEVIATIONS = 2.0
+
+
+class Pursued:
+    """Logs what agents that pursue a target believe.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    world
+        What is flown.
+    """
+
+    def __init__(self, stream: rr.RecordingStream, world: World) -> None:
+        self._stream = stream
+        self._nominal = world.formation.nominal
+        reach = float(np.ptp(world.formation.nominal, axis=0).max())
+        for path, colour, size in (("target", _TARGET, 0.03), ("found", _FOUND, 0.01), ("agreed", _AGREED, 0.015)):
+            stream.log(f"swarm/{path}/at", rr.Points3D.from_fields(radii=size * reach, colors=colour), static=True)
+        width = rr.Radius.ui_points(0.5)
+        stream.log("swarm/agreed/spread", rr.LineStrips3D.from_fields(radii=width, colors=_ELLIPSE), static=True)
+        names = ["found by oneself (m)", "agreed on (m)"]
+        stream.log("metrics/target", rr.SeriesLines(names=names), static=True)
+
+    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+        """Consecutive ticks, of which those `kept` are recorded."""
+        target = (moments.target[kept] - self._nominal)[:, :1]
+        found, agreed = moments.reports["found"][kept], moments.reports["reference"][kept][:, :, 0]
+        for path, positions in (("target", target), ("found", found), ("agreed", agreed)):
+            points(self._stream, f"swarm/{path}/at", time, positions)
+        off = [np.sqrt(((each - target) ** 2).sum(axis=-1).mean(axis=-1)) for each in (found, agreed)]
+        scalars(self._stream, "metrics/target", time, np.stack(off, axis=-1))
+        variance = moments.reports["variance"][kept][..., None, None] * np.eye(target.shape[-1])
+        known = np.asarray(np.isfinite(variance).all(axis=(-2, -1)) & np.isfinite(agreed).all(axis=-1))
+        lines = ellipses(
+            np.where(known[..., None], agreed, 0.0), np.where(known[..., None, None], variance, 0.0), _DEVIATIONS
+        )
+        strips = lines.reshape(len(lines), -1, *lines.shape[-2:])
+        columns = rr.LineStrips3D.columns(strips=strips.reshape(-1, *strips.shape[-2:]))
+        self._stream.send_columns("swarm/agreed/spread", time, columns.partition([strips.shape[1]] * len(strips)))
