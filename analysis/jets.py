@@ -5,6 +5,7 @@ Products and inverses are exact (paper 002, lemma 1), whatever the derivatives a
 
 from __future__ import annotations
 
+from functools import reduce
 from math import comb
 
 import numpy as np
@@ -17,7 +18,7 @@ def times(one: Array, other: Array) -> Array:
     """The jet of a matrix product, of jets (m + 1, ..., r, s) and (m + 1, ..., s, c)."""
     return np.stack(
         [
-            sum((comb(order, lower) * (one[lower] @ other[order - lower]) for lower in range(order + 1)), np.zeros(1))
+            reduce(np.add, [comb(order, lower) * (one[lower] @ other[order - lower]) for lower in range(order + 1)])
             for order in range(len(one))
         ]
     )
@@ -25,15 +26,10 @@ def times(one: Array, other: Array) -> Array:
 
 def scaled(factor: Array, other: Array) -> Array:
     """The jet of numbers (m + 1, ...) times matrices (m + 1, ..., r, c)."""
+    wide = factor[..., None, None]
     return np.stack(
         [
-            sum(
-                (
-                    comb(order, lower) * (factor[lower][..., None, None] * other[order - lower])
-                    for lower in range(order + 1)
-                ),
-                np.zeros(1),
-            )
+            reduce(np.add, [comb(order, lower) * wide[lower] * other[order - lower] for lower in range(order + 1)])
             for order in range(len(factor))
         ]
     )
@@ -43,8 +39,8 @@ def inverse(matrix: Array) -> Array:
     """The jet of the inverses of matrices (m + 1, ..., r, r) (lemma 1, i)."""
     inverted = [np.linalg.inv(matrix[0])]
     for order in range(1, len(matrix)):
-        drawn = sum(
-            (comb(order, lower) * (matrix[order - lower] @ inverted[lower]) for lower in range(order)), np.zeros(1)
+        drawn = reduce(
+            np.add, [comb(order, lower) * (matrix[order - lower] @ inverted[lower]) for lower in range(order)]
         )
         inverted.append(-inverted[0] @ drawn)
     return np.stack(inverted)
@@ -53,11 +49,9 @@ def inverse(matrix: Array) -> Array:
 def quotient(numerator: Array, denominator: Array) -> Array:
     """The jet of a quotient of numbers (m + 1, ...)."""
     found: list[Array] = []
-    for order in range(len(numerator)):
-        drawn = sum(
-            (comb(order, lower) * found[lower] * denominator[order - lower] for lower in range(order)), np.zeros(1)
-        )
-        found.append((numerator[order] - drawn) / denominator[0])
+    for order, rest in enumerate(numerator):
+        drawn = [comb(order, lower) * found[lower] * denominator[order - lower] for lower in range(order)]
+        found.append(reduce(np.subtract, drawn, rest) / denominator[0])
     return np.stack(found)
 
 
