@@ -24,6 +24,7 @@ BRIEF = Brief(
     sensor=Sensor("coordinates", 0.01 * np.eye(2)),
     process=np.zeros((6, 6)),
     leader=np.array(False),
+    target=None,
     mission=None,
 )
 ESTIMATE = Estimate(
@@ -50,6 +51,7 @@ def brief(relative, covariance=None, process=None):
         sensor=Sensor("coordinates", 0.01 * np.eye(relative.shape[-1]) if covariance is None else covariance),
         process=np.zeros((*relative.shape[:-2], size, size)) if process is None else process,
         leader=np.zeros(relative.shape[:-2], dtype=bool),
+        target=None,
         mission=None,
     )
 
