@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def inputs(directory: Path, order: int) -> Model:
     try:
         flown = history.load(directory / history.FILE)["input"]
         return autoregressive.fit(flown[np.isfinite(flown).all(axis=(1, 2))], order)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, BadZipFile) as error:
         raise ScenarioError(f"{directory}: {error}") from error
 
 

@@ -89,14 +89,15 @@ def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, un
 def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
     """In most runs (R, T) the logarithm of the error falls along a straight line over a span of seconds."""
     inside = within(seconds, span)
-    time, logarithm = seconds[inside] - seconds[inside].mean(), np.log(error[:, inside])
-    slope = (logarithm @ time) / (time @ time)
-    total = logarithm - logarithm.mean(axis=1, keepdims=True)
-    explained = 1.0 - ((total - slope[:, None] * time) ** 2).sum(axis=1) / (total**2).sum(axis=1)
-    straight = (explained >= _STRAIGHT) & (slope < 0.0)
-    found = (
-        f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}), by {-slope.mean():.3g} 1/s"
-    )
+    # Runs may diverge, stand still, or end at 0.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        time, logarithm = seconds[inside] - seconds[inside].mean(), np.log(error[:, inside])
+        slope = (logarithm @ time) / (time @ time)
+        total = logarithm - logarithm.mean(axis=1, keepdims=True)
+        explained = 1.0 - ((total - slope[:, None] * time) ** 2).sum(axis=1) / (total**2).sum(axis=1)
+        straight = (explained >= _STRAIGHT) & (slope < 0.0)
+    rate = f", by {-slope[straight].mean():.3g} 1/s" if straight.any() else ""
+    found = f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}){rate}"
     return Verdict(says, bool(straight.mean() >= _MOST), found)
 
 

@@ -11,7 +11,8 @@ from scipy.special import chdtri
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_CANCELLED = 1e-9  # of a covariance: less is what rounding leaves of a difference
+# Of the trace of a covariance: a smallest eigenvalue below is what rounding leaves of nothing, and of a difference.
+_SINGULAR, _CANCELLED = 1e-12, 1e-6
 
 
 class Normalised(NamedTuple):
@@ -41,7 +42,8 @@ def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array
     """NIS of the edges measured, from what is left of their innovations once the filters are corrected.
 
     A filter with the innovation nu of covariance S leaves y - z = R S^-1 nu, of covariance R - P = R S^-1 R: normalised, one is
-    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates.
+    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates,
+    and those whose filters were so unsure that rounding leaves nothing of it. NaN where a filter has diverged.
 
     Parameters
     ----------
@@ -56,7 +58,8 @@ def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array
     """
     left = _certain(R - whole(covariance), seen)
     trace = np.trace(R, axis1=-2, axis2=-1)
-    filtered = seen & (np.linalg.eigvalsh(left)[..., 0] > _CANCELLED * trace)
+    lost = ~_finite(left) | ~np.isfinite(estimate).all(axis=-1)
+    filtered = seen & (lost | (_smallest(left) > _CANCELLED * trace))
     residual = np.where(filtered[..., None], measured - estimate, 0.0)
     return _averaged(_normalised(residual, _certain(left, filtered)), filtered)
 
@@ -79,7 +82,7 @@ def band(level: float, dimension: int, number: int) -> tuple[float, float]:
 
 
 def nees(error: Array, covariance: Array) -> Array:
-    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular.
+    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular, NaN where it is no number.
 
     Parameters
     ----------
@@ -101,10 +104,24 @@ def whole(triangles: Array) -> Array:
 
 
 def _normalised(error: Array, covariance: Array) -> Array:
-    singular = np.linalg.det(covariance) == 0.0
-    solvable = np.where(singular[..., None, None], np.eye(error.shape[-1]), covariance)
-    solved = np.linalg.solve(solvable, error[..., None])[..., 0]
-    return np.where(singular, np.inf, (error * solved).sum(axis=-1))
+    finite = _finite(covariance)
+    trace = np.where(finite, np.trace(covariance, axis1=-2, axis2=-1), 1.0)
+    singular = finite & (_smallest(covariance) <= _SINGULAR * trace)
+    regular = finite & ~singular
+    solved = np.linalg.solve(_certain(covariance, regular), error[..., None])[..., 0]
+    length = (error * solved).sum(axis=-1)
+    return np.where(singular, np.inf, np.where(finite, length, np.nan))
+
+
+def _finite(matrix: Array) -> Mask:
+    return np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+
+
+def _smallest(matrix: Array) -> Array:
+    """The smallest eigenvalues of symmetric matrices, NaN where they are no numbers: LAPACK would raise."""
+    finite = _finite(matrix)
+    smallest = np.linalg.eigvalsh(np.where(finite[..., None, None], matrix, 0.0))[..., 0]
+    return np.where(finite, smallest, np.nan)
 
 
 def _certain(covariance: Array, counted: Mask) -> Array:

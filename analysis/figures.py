@@ -76,7 +76,7 @@ def consistency(
         for case in cases:
             panel = row[places.index((case.labels[across], case.labels[down]))]
             mean = case.error.mean(axis=0)
-            panel.plot(case.seconds, _positive(np.nan_to_num(mean)), lw=0.8, label=case.labels[each])
+            panel.plot(case.seconds, np.where(np.isfinite(mean), mean, np.nan), lw=0.8, label=case.labels[each])
             panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
         for panel in row:
             panel.axhspan(*band(_LEVEL, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)

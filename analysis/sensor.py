@@ -58,9 +58,8 @@ class Sensor:
             squared = (measured * measured).sum(axis=-1)[..., None, None]
             spread: Array = across * squared * np.eye(measured.shape[-1]) + (along - across) * lines
             return spread
-        mean, second = moments(_polar(measured), self._variances)
+        _, covariance = moments(_polar(measured), self._variances)
         shrinking = _shrinking(self._variances)
-        covariance: Array = second - mean[..., :, None] * mean[..., None, :]
         return covariance / (shrinking[:, None] * shrinking)
 
     @property
@@ -85,7 +84,9 @@ class Sensor:
 
 
 def moments(polar: Array, variances: Array) -> tuple[Array, Array]:
-    """Mean (..., D) and second moments (..., D, D) of positions read as range and bearings (paper 004, (4.3) and (4.4)).
+    """Mean (..., D) and covariance (..., D, D) of positions read as range and bearings (paper 004, (4.3) and (4.4)).
+
+    The covariance is the printed one without its differences of large numbers, of which a sharp sensor would leave nothing.
 
     Parameters
     ----------
@@ -94,27 +95,49 @@ def moments(polar: Array, variances: Array) -> tuple[Array, Array]:
     variances
         Theirs, shape (D,), in square metres and square radians.
     """
-    mean = _cartesian(polar) * _shrinking(variances)
-    reach = (polar[..., 0] ** 2 + variances[0])[..., None, None]
-    level = _squares(polar[..., 1], variances[1])
-    if polar.shape[-1] == 2:
-        return mean, reach * level
-    upright = _squares(polar[..., 2], variances[2])
-    damped = np.exp(-variances[1] / 2) * np.stack([np.cos(polar[..., 1]), np.sin(polar[..., 1])], axis=-1)
-    second = np.empty((*mean.shape, 3))
-    second[..., :2, :2] = upright[..., :1, :1] * level
-    second[..., :2, 2] = second[..., 2, :2] = upright[..., 0, 1, None] * damped
-    second[..., 2, 2] = upright[..., 1, 1]
-    return mean, reach * second
+    reach = polar[..., 0]
+    mean, second, covariance = _direction(polar[..., 1:], variances[1:])
+    squared = (reach * reach)[..., None, None]
+    return reach[..., None] * mean, variances[0] * second + squared * covariance
 
 
-def _squares(angle: Array, variance: float) -> Array:
-    """E [c s]' [c s] of cosine and sine of a normal angle, shape (..., 2, 2)."""
-    damping = np.exp(-2.0 * variance)
-    cosine, sine = damping * np.cos(2.0 * angle), damping * np.sin(2.0 * angle)
-    rows = [np.stack([1.0 + cosine, sine], axis=-1), np.stack([sine, 1.0 - cosine], axis=-1)]
-    halves: Array = 0.5 * np.stack(rows, axis=-2)
-    return halves
+def _direction(angles: Array, variances: Array) -> tuple[Array, Array, Array]:
+    """Mean, second moments and covariance of a unit vector at normal angles (..., 1) or (..., 2)."""
+    mean, second, covariance = _circle(angles[..., 0], variances[0])
+    if angles.shape[-1] == 1:
+        return mean, second, covariance
+    up, up_second, up_covariance = _circle(angles[..., 1], variances[1])
+    planar, squared = up[..., :1], up_second[..., :1, :1]
+    across = up_covariance[..., 0, 1, None] * mean
+
+    def joined(level: Array, tilted: Array, upright: Array) -> Array:
+        rows = np.concatenate([level, tilted[..., :, None]], axis=-1)
+        last = np.concatenate([tilted, upright[..., None]], axis=-1)
+        return np.concatenate([rows, last[..., None, :]], axis=-2)
+
+    return (
+        np.concatenate([planar * mean, up[..., 1:]], axis=-1),
+        joined(squared * second, up_second[..., 0, 1, None] * mean, up_second[..., 1, 1]),
+        joined(
+            up_covariance[..., :1, :1] * second + (planar * planar)[..., None] * covariance,
+            across,
+            up_covariance[..., 1, 1],
+        ),
+    )
+
+
+def _circle(angle: Array, variance: float) -> tuple[Array, Array, Array]:
+    """Mean (..., 2), second moments and covariance (..., 2, 2) of cosine and sine of a normal angle."""
+    kept, lost = np.exp(-variance), -np.expm1(-variance)
+    cosine, sine = np.cos(2.0 * angle), np.sin(2.0 * angle)
+    mean = np.sqrt(kept) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    second = 0.5 * _matrix(1.0 + kept**2 * cosine, kept**2 * sine, 1.0 - kept**2 * cosine)
+    covariance = 0.5 * lost * _matrix(1.0 - kept * cosine, -kept * sine, 1.0 + kept * cosine)
+    return mean, second, covariance
+
+
+def _matrix(first: Array, mixed: Array, last: Array) -> Array:
+    return np.stack([np.stack([first, mixed], axis=-1), np.stack([mixed, last], axis=-1)], axis=-2)
 
 
 def _shrinking(variances: Array) -> Array:

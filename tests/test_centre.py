@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from flying import PROCESSES, plan_of
+from scipy.linalg import block_diag
 
 from affinet.batch import fly_all
 from affinet.run import fly, rehearse
@@ -17,14 +18,17 @@ LINKS = Links.both_ways(HEXA.agents, HEXA.edges)
 COARSE = ("time.dt=0.01", "record.enabled=false")
 
 
-def centre(rng, dimension=2, noise=1.0):
+RANGING = Sensor("range-bearing", np.diag([0.1, 0.3]) ** 2)
+
+
+def centre(rng, dimension=2, noise=1.0, reader=None):
     size = HEXA.agents * dimension
     root, sensor = rng.normal(size=(size, size)), rng.normal(size=(dimension, dimension))
     return Centre(
         dt=0.1,
         neighbours=LINKS.neighbours,
         present=LINKS.present,
-        sensor=Sensor("coordinates", 0.01 * (sensor @ sensor.T + np.eye(dimension))),
+        sensor=reader or Sensor("coordinates", 0.01 * (sensor @ sensor.T + np.eye(dimension))),
         process=noise * 1e-3 * root @ root.T,
         prior_position=1.5,
     )
@@ -47,16 +51,17 @@ class Printed:
         x = self.x + self.filtered.dt * self.lifted @ u.ravel()
         covariance = self.covariance + self.lifted @ self.filtered.process @ self.lifted.T
         H = np.eye(len(x))[np.repeat(seen, len(self.filtered.sensor.covariance))]
-        R = np.kron(np.eye(int(seen.sum())), self.filtered.sensor.covariance)
+        R = block_diag(*self.filtered.sensor.spread(y[seen]))
         K = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + R)
         self.x = x + K @ (y[seen].ravel() - H @ x)
         self.covariance = covariance - K @ H @ covariance
 
 
+@pytest.mark.parametrize("reader", [None, RANGING], ids=["coordinates", "range-bearing"])
 @pytest.mark.parametrize("availability", [1.0, 0.4])
-def test_it_tells_what_the_filter_of_all_edges_would(availability):
+def test_it_tells_what_the_filter_of_all_edges_would(availability, reader):
     rng = np.random.default_rng(1)
-    filtered = centre(rng)
+    filtered = centre(rng, reader=reader)
     printed, state = Printed(filtered), filtered.begin(())
     for _ in range(25):
         seen = LINKS.present & (rng.random(LINKS.present.shape) < availability)

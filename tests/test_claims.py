@@ -107,3 +107,72 @@ def test_a_ratio_to_runs_that_diverged_does_not_hold():
 def test_a_span_holds_both_of_its_ends():
     assert SECONDS[claims.within(SECONDS, (2.0, 4.0))].tolist() == [2.0, 3.0, 4.0]
     assert SECONDS[claims.within(SECONDS, (7.5, None))].tolist() == [8.0, 9.0]
+
+
+# Straight lines on a logarithmic axis
+
+
+LATER = np.linspace(0.0, 10.0, 101)
+FALLS = np.exp(-0.7 * LATER)
+
+
+def falling(*others, runs=20):
+    """Runs that fall exponentially, each from a height of its own; these in place of the first."""
+    heights = np.linspace(0.5, 3.0, runs)[:, None]
+    return np.concatenate([np.stack(others), heights[len(others) :] * FALLS]) if others else heights * FALLS
+
+
+def test_an_exponential_falls_along_a_line_at_its_rate():
+    verdict = claims.exponential("says", LATER, falling(), (0.0, None))
+    assert verdict.says == "says"
+    assert verdict.holds
+    assert verdict.found == "100% of the runs fall along a line (R² at least 0.99), by 0.7 1/s"
+
+
+def test_an_exponential_under_a_little_noise_still_falls_along_a_line():
+    noise = 1.0 + 0.02 * np.random.default_rng(3).standard_normal((20, 101))
+    assert claims.exponential("says", LATER, falling() * noise, (0.0, None)).holds
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        1.0 / (0.1 + LATER),
+        1.0 / FALLS,
+        np.exp(-0.05 * LATER**2),
+        FALLS + 0.01,
+        np.exp(-0.1 * LATER + np.sin(5.0 * LATER)),
+    ],
+    ids=["1/t", "growth", "bell", "floor", "waves"],
+)
+def test_what_does_not_fall_along_a_line_is_no_exponential(other):
+    assert not claims.exponential("says", LATER, other * np.linspace(0.5, 3.0, 20)[:, None], (0.0, None)).holds
+
+
+def test_runs_are_counted_one_in_ten_may_do_otherwise():
+    verdict = claims.exponential("says", LATER, falling(1 / FALLS, 1 / (0.1 + LATER)), (0.0, None))
+    assert verdict.holds
+    assert verdict.found.startswith("90% of the runs fall")
+    verdict = claims.exponential("says", LATER, falling(1 / FALLS, 1 / (0.1 + LATER), FALLS + 0.01), (0.0, None))
+    assert not verdict.holds
+    assert verdict.found.startswith("85% of the runs fall")
+
+
+def test_an_exponential_is_looked_for_in_its_span_only():
+    restless = np.where((LATER < 2.0) | (LATER > 6.0), 1.0 + np.sin(9.0 * LATER) ** 2, FALLS) * np.ones((20, 1))
+    assert not claims.exponential("says", LATER, restless, (0.0, None)).holds
+    assert not claims.exponential("says", LATER, restless, (2.0, None)).holds
+    assert not claims.exponential("says", LATER, restless, (0.0, 6.0)).holds
+    assert claims.exponential("says", LATER, restless, (2.0, 6.0)).holds
+    with pytest.raises(ValueError, match="no moment lies in its span from 30 s on"):
+        claims.exponential("says", LATER, restless, (30.0, None))
+
+
+@pytest.mark.parametrize("last", [np.nan, np.inf, 0.0, 1.0], ids=["diverged", "overflowed", "exact", "constant"])
+def test_a_run_without_a_line_is_one_run_that_does_not_fall(last):
+    odd = np.where(LATER < 5.0, 1.0, last)
+    verdict = claims.exponential("says", LATER, falling(odd), (0.0, None))
+    assert verdict.holds
+    assert verdict.found.startswith("95% of the runs fall")
+    rate = float(verdict.found.split("by ")[1].split(" 1/s")[0])
+    assert 0.6 < rate < 0.8

@@ -42,10 +42,20 @@ def test_a_run_is_like_itself(arrays):
         ({"newest": ((5, 2, 1), 77), "estimate": ((5, 0, 0, 0), 9.0)}, "tick 5: newest of measurement on 3->1 is "),
         ({"fates": ((3, 0, 0), Fate.DEAD), "newest": ((3, 0, 0), 9)}, "tick 3: fates of sense on 2->1 is "),
         ({"error": (12, 8.0)}, "tick 12: error is "),
+        ({"measured": ((4, 1, 1), 9.5)}, "tick 4: measured of 3->1 is "),
+        ({"measured": ((4, 6, 0), 9.5), "fates": ((4, 0, 0), Fate.DEAD)}, "tick 4: measured of "),
+        ({"measured": ((4, 6, 0), 9.5), "position": ((4, 6, 0), 9.5)}, "tick 4: position of agent 7 is "),
     ],
 )
 def test_the_first_difference_is_named(changes, named, arrays):
     assert str(compared(arrays, **changes)).startswith(named)
+
+
+def test_links_that_measured_otherwise_are_named_by_their_ends(arrays):
+    for link, (src, dst) in enumerate(zip(PLAN.world.links.src, PLAN.world.links.dst, strict=True)):
+        here = arrays["measured"][9, link, 1].item()
+        difference = compared(arrays, measured=((9, link, 1), 77.0))
+        assert str(difference) == f"tick 9: measured of {src}->{dst} is {here!r} in one run and 77.0 in the other"
 
 
 def test_zero_is_not_negative_zero(arrays):

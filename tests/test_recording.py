@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 from rerun.chunk import RrdReader
+from scipy.stats import chi2
 
 from affinet.run import fly, rehearse
 from netem.fate import Fate
@@ -40,6 +41,7 @@ def test_it_holds_the_swarm_the_graphs_the_target_and_the_metrics(chunks):
         "/swarm/graph/functional",
         "/metrics/tracking_error",
         "/metrics/psi",
+        "/metrics/consistency",
         "/metrics/infeasible",
         "/metrics/messages",
         "/events",
@@ -54,6 +56,66 @@ def test_it_is_on_simulated_time(chunks):
 def test_the_tracking_error_is_that_of_the_run(chunks, flown):
     recorded = [value[0] for value in column(chunks, "/metrics/tracking_error", "Scalars:scalars")]
     assert recorded == np.load(flown / "arrays.npz")["error"][::5].tolist()
+
+
+def normalised(plan, arrays, tick):
+    """NEES, NIS and how many edges are estimated, edge by edge."""
+    links, sensor, position = plan.world.links, plan.world.sensor, arrays["position"][tick]
+    errors, innovations = [], []
+    for i, j in np.argwhere(arrays["known"][tick]):
+        link = links.slots[i, j]
+        z, P = arrays["estimate"][tick, i, j], arrays["covariance"][tick, i, j][[[0, 1], [1, 2]]]
+        error, left = z - (position[i] - position[links.src[link] - 1]), arrays["measured"][tick, link] - z
+        errors.append(error @ np.linalg.solve(P, error))
+        if arrays["fates"][tick, 0, link] == Fate.DELIVERED:
+            innovations.append(left @ np.linalg.solve(sensor.spread(arrays["measured"][tick, link]) - P, left))
+    return np.mean(errors), np.mean(innovations), len(errors)
+
+
+def test_consistency_is_that_of_the_edges_with_a_band_as_wide_as_they_are_many(chunks, flown):
+    recorded = np.array(column(chunks, "/metrics/consistency", "Scalars:scalars"))
+    assert recorded.shape == (40, 4)
+    plan, arrays = plan_of("corridor"), np.load(flown / "arrays.npz")
+    arrays = {name: arrays[name] for name in ("position", "estimate", "known", "covariance", "measured", "fates")}
+    numbers = []
+    for moment in range(40):
+        error, innovation, number = normalised(plan, arrays, 5 * moment)
+        numbers.append(number)
+        low, high = chi2.interval(0.95, 2 * number)
+        np.testing.assert_allclose(recorded[moment], [error, innovation, low / number, high / number], rtol=1e-6)
+    assert len(set(numbers)) > 1  # somebody was dead for a while
+
+
+def test_consistency_knows_ranges_and_bearings_from_coordinates(out):
+    over = ("time.duration=0.2", 'agents.estimator="rkf"', "sensing={sigma_range=0.05, sigma_bearing=0.02}")
+    plan = plan_of("corridor", *over, "network.coupled=false")  # what is sensed is not what is heard
+    fly(plan, "inprocess", out, lambda *_: None)
+    recorded = np.array(
+        column(RrdReader(str(out / "run.rrd")).stream().to_chunks(), "/metrics/consistency", "Scalars:scalars")
+    )
+    arrays = dict(np.load(out / "arrays.npz"))
+    for moment in range(4):
+        np.testing.assert_allclose(recorded[moment, :2], normalised(plan, arrays, 5 * moment)[:2], rtol=1e-6)
+
+
+def test_where_nothing_is_estimated_there_is_no_consistency_but_a_band(out):
+    deaf = ('timeline=[{verb="cut",at=0,links=["all"]}]', 'agents.estimator="rkf"', "time.duration=0.1")
+    fly(plan_of("corridor", *deaf), "inprocess", out, lambda *_: None)
+    chunks = RrdReader(str(out / "run.rrd")).stream().to_chunks()
+    recorded = np.array(column(chunks, "/metrics/consistency", "Scalars:scalars"))
+    assert np.isnan(recorded[:, :2]).all()
+    assert (recorded[:, 2:] == recorded[0, 2:]).all()
+    np.testing.assert_allclose(recorded[0, 2:], chi2.interval(0.95, 2), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "sensing"), [("imm", "{sigma=0.1}"), ("rkf", "{sigma_range=0.05, sigma_bearing=0.02}")]
+)
+def test_a_swarm_that_diverges_in_space_is_recorded_to_the_end(estimator, sensing, out):
+    far = ("formation.spread=1e308", f'agents.estimator="{estimator}"', f"sensing={sensing}", "time.duration=0.2")
+    done = fly(plan_of("ravine", *far), "inprocess", out, lambda *_: None)
+    assert done.verdict == "fail"
+    assert "diverged" in done.reasons[0]
 
 
 def test_messages_are_counted_over_all_ticks(chunks, flown):

@@ -302,6 +302,7 @@ VERBS = (
     "cut, partition, lose, delay, degrade, heal, kill, restart, pause, resume, clock, depart, rejoin, "
     "replace, gust, bias, outlier, dropout, freeze, lie"
 )
+ONE_OF = "give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad)"
 WRONG = [
     # keys
     ("availability = 0.7", "availabilty = 0.7", "network.availabilty", "did you mean 'availability'? known here: "),
@@ -360,7 +361,24 @@ WRONG = [
     ("offset = [1.0, 0.0]", "offset = [1.0]", "manoeuvre.keyframes.2.offset", "must be 2 numbers"),
     ("1.0]], offset = [1", "1.0, 2.0]], offset = [1", "manoeuvre.keyframes.2.theta", "must be 2 x 2 numbers"),
     # sensing
-    ("sigma = 0.1", "", "sensing", "give sigma (m) or covariance (m2)"),
+    ("sigma = 0.1", "", "sensing", ONE_OF),
+    ("sigma = 0.1", "sigma_range = 0.1", "sensing", "sigma_range (m) and sigma_bearing (rad) go together"),
+    ("sigma = 0.1", "sigma_bearing = 0.1", "sensing", "sigma_range (m) and sigma_bearing (rad) go together"),
+    ("sigma = 0.1", "sigma = 0.1\nsigma_range = 0.1\nsigma_bearing = 0.1", "sensing", ONE_OF),
+    (
+        "sigma = 0.1",
+        "covariance = [[1.0, 0.0], [0.0, 1.0]]\nsigma_range = 0.1\nsigma_bearing = 0.1",
+        "sensing",
+        ONE_OF,
+    ),
+    ("sigma = 0.1", "sigma_range = 0.0\nsigma_bearing = 0.1", "sensing.sigma_range", "greater than 0"),
+    ("sigma = 0.1", "sigma_range = 0.1\nsigma_bearing = 0.0", "sensing.sigma_bearing", "greater than 0"),
+    (
+        'sigma = 0.1\n\n[agents]\nestimator = "rkf"',
+        'sigma_range = 0.1\nsigma_bearing = 0.1\n\n[agents]\nestimator = "ga-rkf"',
+        "agents",
+        "choose another, or a sensor of coordinates",
+    ),
     ("sigma = 0.1", "sigma = 0.0", "sensing", "give a small one, like 1e-6 m"),
     (
         "sigma = 0.1",

@@ -8,7 +8,10 @@ from affinet.batch import fly_all
 from affinet.inprocess import Swarm
 from affinet.run import rehearse
 from affinet.side_by_side import NotABatch, side_by_side
+from agents.estimators import kalman
+from agents.estimators.rkf import RelativeKalmanFilter
 from analysis import consistency, metrics
+from netem.fate import Fate
 from world.history import History
 
 SEEDS = (1, 7, 2**63 + 5)
@@ -28,6 +31,7 @@ AIRS = {
         '{verb="degrade",at=2.0,links=["2->4"],profile="wifi_clear"},{verb="dropout",at=2.2,links=["4"],p=0.5}]',
     ),
     "rkf": ('agents.estimator="rkf"', "dynamics.disturbance=0.01"),
+    "range-bearing": ('agents.estimator="imm"', "sensing={sigma_range=0.05, sigma_bearing=0.02}"),
 }
 
 
@@ -64,6 +68,7 @@ def test_every_run_of_a_batch_is_the_run_alone(name, air):
             np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
         for array in ("fates", "newest"):
             np.testing.assert_array_equal(flown[array][..., links], alone[array], array)
+        np.testing.assert_array_equal(flown["measured"][:, links], alone["measured"])
         assert np.isfinite(alone["position"]).all()
 
 
@@ -89,6 +94,43 @@ def test_the_runs_of_a_study_are_those_runs():
         assert getattr(runs, name).shape == (57, 15)
     assert runs.mean_error[54] == pytest.approx(alone.error.mean(), rel=1e-12)
     np.testing.assert_allclose(runs.seconds, np.arange(0.0, 3.0, 0.2))
+
+
+def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_themselves():
+    lossy = ("corridor", *SHORT, 'agents.estimator="rkf"', "network.availability=0.5")
+    plan = plan_of(*lossy)
+    links, sensor, dt = plan.world.links, plan.world.sensor, plan.world.dt
+    seeds = (4, 9)
+    runs = fly_all(plan, seeds, every=3)
+    F, Q = kalman.motion("constant-acceleration", 2, dt, RelativeKalmanFilter().sigma_w)
+    for row, seed in enumerate(seeds):
+        arrays = rehearse(plan_of(*lossy, f"seed={seed}")).arrays
+        heard = arrays["fates"][:, 0] == Fate.DELIVERED
+        assert 0.4 < heard.mean() < 0.6
+        # The filters once more, link by link, with innovations as they come.
+        means, covariances = kalman.unknown((len(links),), 2, (10.0, 2.0, 1.0))
+        known = np.zeros(len(links), dtype=bool)
+        for tick in range(60):
+            means, covariances = kalman.predict(means, covariances, F, Q)
+            innovations = arrays["measured"][tick] - means[:, :2]
+            S = covariances[:, :2, :2] + sensor.covariance
+            nis = [nu @ np.linalg.inv(each) @ nu for nu, each in zip(innovations, S, strict=True)]
+            means, covariances = kalman.correct(
+                means, covariances, arrays["measured"][tick], sensor.covariance, heard[tick]
+            )
+            known |= heard[tick]
+            position = arrays["position"][tick]
+            errors = means[:, :2] - (position[links.dst - 1] - position[links.src - 1])
+            nees = [e @ np.linalg.inv(each[:2, :2]) @ e for e, each in zip(errors, covariances, strict=True)]
+            if tick % 3 == 0:
+                assert runs.nees[row, tick // 3] == pytest.approx(np.mean(np.array(nees)[known]), rel=1e-9)
+                assert runs.nis[row, tick // 3] == pytest.approx(np.mean(np.array(nis)[heard[tick]]), rel=1e-6)
+
+
+def test_where_nothing_is_filtered_no_innovation_is_known():
+    runs = fly_all(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", 'agents.estimator="none"'), (1, 2), 1)
+    assert np.isnan(runs.nis).all()
+    assert np.isfinite(runs.nees).all()
 
 
 @pytest.mark.parametrize(

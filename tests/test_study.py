@@ -7,11 +7,13 @@ import pyarrow.parquet as pq
 import pytest
 from flying import PROCESSES
 from PIL import Image
+from scipy.stats import chi2
 
 from affinet import cli, judging, scenario, study, study_report
 from affinet import plan as planning
 from affinet.batch import Runs
 from affinet.sections import ScenarioError
+from analysis import figures
 
 pytestmark = PROCESSES
 
@@ -68,8 +70,10 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     assert len(curves["seconds"]) == 2 * 2 * 20
     assert set(curves["estimator"]) == {"none", "ga-rkf"}
     assert np.isfinite(runs["mean_error"]).all()
+    assert {"mean_nees", "std_nees", "mean_nis", "std_nis"} <= set(curves)
     with Image.open(out / "figure.png") as figure:
         assert min(figure.size) > 300
+    assert not (out / "consistency.png").exists()  # that goes with curves
     assert "does not hold" in capsys.readouterr().out
 
 
@@ -243,13 +247,15 @@ def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
     assert verdicts[2].found.startswith("ratio 0.667,")
 
 
-def test_a_study_of_a_quantity_leaves_all_quantities_and_a_figure(pair, tmp_path):
+def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path, monkeypatch):
+    shown, draw = [], figures.consistency
+    monkeypatch.setattr(figures, "consistency", lambda *given: shown.append(given) or draw(*given))
     pair = pair.model_copy(update={"claims": pair.claims[:1]})  # the others look beyond these 0.2 s
     results = study.run(pair, quick=True, watch=lambda _: None)
     study_report.save(tmp_path / "out", pair, results, judging.judge(pair, results))
     curves = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
     assert curves["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
-    for name in ("error", "procrustes", "estimation_error", "covariance_trace"):
+    for name in ("error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"):
         values = np.concatenate([getattr(one.runs, name).mean(axis=0) for one in results])
         np.testing.assert_array_equal(curves[f"mean_{name}"], values)
     # The measurement is as uncertain in every tick, and the filter less and less.
@@ -257,8 +263,52 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_a_figure(pair, tmp_path
     assert np.ptp(traces[0]) < 1e-12 < 0.1 < traces[1, 0] / traces[0, 0]
     assert traces[1, -1] < 0.2 * traces[0, -1]
     assert json.loads((tmp_path / "out" / "claims.json").read_text())[0]["found"].startswith("ratio")
-    with Image.open(tmp_path / "out" / "figure.png") as figure:
-        assert min(figure.size) > 200
+    # Nothing is filtered by MLE; the filter, and the measurement as an estimate, are as wrong as they say.
+    nees, nis = (np.array(curves[f"mean_{name}"]).reshape(2, 20) for name in ("nees", "nis"))
+    assert np.isnan(nis[0]).all()
+    for means in (nees[0], nees[1], nis[1]):
+        assert 1.5 < means.mean() < 2.5
+        assert len(np.unique(means)) == 20
+    ((_, title, normalised, axes, dimension),) = shown
+    assert (title, axes, dimension) == ("Two estimators", ["graph", "disturbance", "estimator"], 2)
+    for name, cases in normalised.items():
+        for case, one in zip(cases, results, strict=True):
+            np.testing.assert_array_equal(case.error, getattr(one.runs, name.lower()))
+    assert list(normalised) == ["NEES", "NIS"]
+    for name in ("figure", "consistency"):
+        with Image.open(tmp_path / "out" / f"{name}.png") as figure:
+            assert min(figure.size) > 200
+
+
+def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_each(monkeypatch, tmp_path):
+    drawn = []
+
+    class Kept(figures.Figure):
+        def __init__(self, **how):
+            super().__init__(**how)
+            drawn.append(self)
+
+    monkeypatch.setattr(figures, "Figure", Kept)
+    rng, seconds = np.random.default_rng(1), np.arange(6.0)
+    labels = [{"graph": "hexa10", "air": air, "filter": one} for air in ("clear", "lossy") for one in ("MLE", "KF")]
+    values = {what: rng.uniform(1.0, 3.0, (4, 5, 6)) for what in ("NEES", "NIS")}
+    values["NIS"][0] = np.nan  # MLE has none
+    cases = {
+        what: [figures.Curve(*one, np.zeros(5)) for one in zip(labels, [seconds] * 4, of_cases, strict=True)]
+        for what, of_cases in values.items()
+    }
+    figures.consistency(tmp_path / "consistency.png", "Title", cases, ["graph", "air", "filter"], 3)
+    (figure,) = drawn
+    panels = {panel.get_title(): panel for panel in figure.axes}
+    assert list(panels) == [f"{what}: hexa10, {air}" for what in ("NEES", "NIS") for air in ("clear", "lossy")]
+    for row, what in enumerate(("NEES", "NIS")):
+        for column, air in enumerate(("clear", "lossy")):
+            panel, (band,) = figure.axes[2 * row + column], figure.axes[2 * row + column].patches
+            for line, name, runs in zip(panel.lines, ("MLE", "KF"), values[what][2 * column :], strict=False):
+                assert line.get_label() == name, air
+                np.testing.assert_allclose(line.get_ydata(), runs.mean(axis=0))
+            low, high = band.get_extents().transformed(panel.transData.inverted()).intervaly
+            np.testing.assert_allclose((low, high), np.array(chi2.interval(0.95, 3 * 5)) / 5, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -26,10 +26,12 @@ def determinant(matrix: Array) -> Array:
 def inverse(matrix: Array) -> Array:
     """Inverses of regular matrices (..., D, D)."""
     if matrix.shape[-1] != 2:
-        return np.linalg.inv(matrix).astype(np.float64, copy=False)
+        # A swarm that diverges overflows at last: LAPACK would raise, and end the flight.
+        regular = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)) & (determinant(matrix) != 0.0))[..., None, None]
+        inverted = np.linalg.inv(np.where(regular, matrix, np.eye(matrix.shape[-1])))
+        return np.where(regular, inverted, np.nan)
     adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
-    inverted: Array = adjugate / determinant(matrix)[..., None, None]
-    return inverted
+    return np.asarray(adjugate / determinant(matrix)[..., None, None], dtype=np.float64)
 
 
 def rotation(matrix: Array) -> Array:
