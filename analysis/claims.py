@@ -89,9 +89,8 @@ def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, un
 def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
     """In most runs (R, T) the logarithm of the error falls along a straight line over a span of seconds."""
     inside = within(seconds, span)
-    with np.errstate(
-        divide="ignore", invalid="ignore", over="ignore"
-    ):  # of runs that diverge, stand still, or end at 0
+    # Runs may diverge, stand still, or end at 0.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         time, logarithm = seconds[inside] - seconds[inside].mean(), np.log(error[:, inside])
         slope = (logarithm @ time) / (time @ time)
         total = logarithm - logarithm.mean(axis=1, keepdims=True)
