@@ -11,7 +11,7 @@ from scipy.special import chdtri
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Of the trace of a covariance: a smallest eigenvalue below is what rounding leaves of nothing, and of a difference.
+# A smallest eigenvalue below this is what rounding leaves of nothing (of the trace), and of a difference (of R's).
 _SINGULAR, _CANCELLED = 1e-12, 1e-6
 
 
@@ -57,9 +57,8 @@ def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array
         Which edges were measured and are estimated, shape (..., N, n).
     """
     left = _certain(R - whole(covariance), seen)
-    trace = np.trace(R, axis1=-2, axis2=-1)
     lost = ~_finite(left) | ~np.isfinite(estimate).all(axis=-1)
-    filtered = seen & (lost | (_smallest(left) > _CANCELLED * trace))
+    filtered = seen & (lost | (_smallest(left) > _CANCELLED * _smallest(R)))
     residual = np.where(filtered[..., None], measured - estimate, 0.0)
     return _averaged(_normalised(residual, _certain(left, filtered)), filtered)
 

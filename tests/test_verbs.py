@@ -118,10 +118,10 @@ FIRST = {
     "rejoin": (20, "error", ""),
     "replace": (19, "fates", "sense on 5->1"),  # its process is killed in the last tick of its absence
     "gust": (21, "position", "agent 5"),
-    "bias": (20, "estimate", "agent 4"),
-    "outlier": (20, "estimate", "agent 4"),
+    "bias": (20, "measured", "2->4"),
+    "outlier": (20, "measured", "2->4"),
     "dropout": (20, "fates", "sense on 2->4"),
-    "freeze": (20, "estimate", "agent 4"),
+    "freeze": (20, "measured", "2->4"),
     "lie": (20, "psi", "agent 1"),  # the first neighbour who believes it
 }
 

@@ -73,7 +73,7 @@ def noise_of(world, ticks):
 
 @pytest.mark.parametrize("R", [[[0.01, 0.0], [0.0, 0.01]], [[0.01, 0.003], [0.003, 0.01]], [[4.0, -1.0], [-1.0, 0.5]]])
 def test_sensor_noise_has_the_covariance_asked_for(world, R):
-    drawn = noise_of(replace(world, covariance=np.array(R)), range(4200))
+    drawn = noise_of(replace(world, sensor=Sensor("coordinates", np.array(R))), range(4200))
     assert len(drawn) > 1e5
     scale = np.sqrt(np.outer(np.diag(R), np.diag(R)))
     np.testing.assert_allclose(np.cov(drawn.T) / scale, R / scale, atol=0.015)
