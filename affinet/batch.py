@@ -14,10 +14,11 @@ from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import consistency, metrics
 from analysis.localization import Edges, centroid, distance, ringing, weights
-from analysis.pursuit import position
+from analysis.pursuit import REPORTS, position
 from netem import channels
 from netem.fate import Fate
 from netem.links import Mask
+from netem.timeline import Timeline
 from world.formation import Array
 from world.history import Moment
 from world.localized import FirstMeasurements
@@ -121,7 +122,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
             target = of_runs(together.world.goal(instant.tick, instant.scene))
             errors.append(metrics.tracking_error(flown, target, present))
-            places.measure(instant)
+            places.measure(instant, plan.timeline)
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
                 kept.append(_looked_at(together, present, moment, of_runs))
@@ -146,11 +147,11 @@ class _Places:
         self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
         self._kept: list[Array] = []
 
-    def measure(self, instant: Instant) -> None:
-        """Take in the measurements of a tick."""
+    def measure(self, instant: Instant, timeline: Timeline) -> None:
+        """Take in the measurements of a tick; all runs have the faults of one."""
         if self._wanted:
             measured = instant.measured.reshape(self._runs, -1, instant.measured.shape[-1])
-            self._first.take(measured, (instant.verdicts.fate[0] == Fate.DELIVERED).reshape(self._runs, -1))
+            self._first.tick(timeline, instant.tick, measured, instant.verdicts.fate[0].reshape(self._runs, -1))
 
     def keep(self, moment: Moment) -> None:
         """Keep what the agents believe in a tick."""
@@ -197,7 +198,7 @@ def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[
     """How well a target is found and followed in a tick of all runs, shape (R,)."""
     names = ("found", "agreed", "ideal", "apart", "behind", "effort")
     pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
-    if pursuit is None or "information" not in moment.reports:
+    if pursuit is None or not moment.reports.keys() >= REPORTS:
         return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
     said = moment.reports
     target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)

@@ -292,7 +292,9 @@ def localized(level: float, by: float = 0.0) -> Checker:
         if channels.PLACE not in evidence.arrays:
             return Finding(name, "vacuous", None, "nobody said where it is")
         span = _span(evidence, by, None)
-        known = FirstMeasurements.of(evidence.plan.world, evidence.arrays["measured"], evidence.arrays["fates"][:, 0])
+        known = FirstMeasurements.of(
+            evidence.plan.world, evidence.timeline, evidence.arrays["measured"], evidence.arrays["fates"][:, 0]
+        )
         off = localization.distance(evidence.arrays[channels.PLACE][span.start : span.stop], known.edges())
         if np.isnan(off).all():
             return Finding(name, "vacuous", None, "what was measured does not join all agents")

@@ -315,7 +315,7 @@ def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
     sighting = None
     if brief.target is not None:
-        sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64))
+        sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), *np.zeros((2, *batch), dtype=np.int64))
     _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity, sighting)
     reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
     if taken := sorted(reports.keys() & TAKEN):

@@ -96,7 +96,7 @@ class Agent:
         (..., D); only who pursues a target a `sighting`.
         """
         brief = self.brief
-        own = Own(state.input if velocity is None else velocity, state.input, position, sighting)
+        own = Own(state.input if velocity is None else velocity, state.input, tick, position, sighting)
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
         law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
         if self.leaders == "distances":

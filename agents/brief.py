@@ -27,6 +27,8 @@ class Own(NamedTuple):
         Shape (..., D), in metres per second: what odometry says, or a single integrator's input.
     input
         Now flying, shape (..., D), in metres per second, or per second squared.
+    tick
+        What its clock says.
     position
         Shape (..., D), in metres; of agents that have positioning.
     sighting
@@ -35,6 +37,7 @@ class Own(NamedTuple):
 
     velocity: Array
     input: Array
+    tick: Reading = 0
     position: Array | None = None
     sighting: Sighting | None = None
 

@@ -204,10 +204,10 @@ def _sighting(said: Mapping[str, Any] | None) -> Sighting | None:
         return None
     try:
         place = np.array(said["position"], dtype=np.float64)
-        return Sighting(place, np.array(bool(said["done"])), np.array(int(said["method"])))
+        return Sighting(place, np.array(bool(said["done"])), np.array(int(said["by"])), np.array(int(said["method"])))
     except (KeyError, TypeError, ValueError) as error:
         raise wire.WireError(
-            f"a sighting has position, done and method, not {said!r} (see docs/protocol.md)"
+            f"a sighting has position, done, by and method, not {said!r} (see docs/protocol.md)"
         ) from error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -27,7 +28,11 @@ class Pursuit:
     order: ClassVar[int] = 2
     by_stress: ClassVar[bool] = False
     by_position: ClassVar[bool] = True
-    kappa: tuple[float, float] = (1.0, 2.0)
+    kappa: Sequence[float] = (1.0, 2.0)
+
+    def __post_init__(self) -> None:
+        if len(self.kappa) != 2:
+            raise ValueError(f"kappa are two gains, on position and velocity, not {self.kappa}")
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
         """Nothing to remember."""

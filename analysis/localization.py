@@ -71,9 +71,11 @@ def centred(place: Array, own: Array) -> Array:
 
 
 def centroid(place: Array, own: Array) -> Array:
-    """The weighted centroid (w^T (1 x I))^-1 w^T x of positions (..., N, D), shape (..., D), in metres."""
-    weighed = (own @ place[..., None]).sum(axis=-3)
-    return np.asarray(np.linalg.solve(own.sum(axis=-3), weighed)[..., 0], dtype=np.float64)
+    """The weighted centroid (w^T (1 x I))^-1 w^T x of positions (..., N, D), shape (..., D), in metres; NaN without weights."""
+    weighed, total = (own @ place[..., None]).sum(axis=-3), own.sum(axis=-3)
+    counts = np.asarray(np.linalg.det(total) != 0.0)[..., None, None]
+    solved = np.linalg.solve(np.where(counts, total, np.eye(total.shape[-1])), weighed)
+    return np.asarray(np.where(counts, solved, np.nan)[..., 0], dtype=np.float64)
 
 
 def optimal(edges: Edges) -> Array:
@@ -157,7 +159,7 @@ def ringing(place: Array) -> Array:
     moved = np.diff(place, axis=-3)
     back = (moved[..., 1:, :, :] * moved[..., :-1, :, :] < 0.0).mean(axis=(-2, -1))
     share: Array = np.concatenate([np.zeros((*back.shape[:-1], 2)), back], axis=-1)
-    return share
+    return share[..., : place.shape[-3]]
 
 
 def _scaled(matrix: Array, root: Array) -> Array:

@@ -25,12 +25,15 @@ class Sighting(NamedTuple):
         Of the target, when the detection began, shape (..., D), in metres; of no meaning where none is done.
     done
         Whether a detection is done in this tick, shape (...).
+    by
+        Which method found it, shape (...).
     method
         Which the detector uses from now on, shape (...).
     """
 
     position: Array
     done: NDArray[np.bool_]
+    by: NDArray[np.int64]
     method: NDArray[np.int64]
 
 

@@ -61,7 +61,7 @@ class SenseInbox(NamedTuple):
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
     positioning, get it; `velocity` its own, shape (D,), in metres per second, if it is a double integrator; `sighting` what its
     detector says of a target, if there is one: `position`, where it was when the detection began, in metres, if one is `done`,
-    and the number of the `method` that the detector uses from now on.
+    the number of the method it was found `by`, and of the `method` that the detector uses from now on.
     """
 
     k: int

@@ -1,4 +1,7 @@
-"""What a swarm at rest could know of where it is: the first measurement of every link, and the best answer they give."""
+"""What a swarm at rest could know of where it is: the first measurement of every link.
+
+An agent that restarts and knows nothing measures anew.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from analysis import localization
 from analysis.sensor import Sensor
 from netem.fate import Fate, Fates
 from netem.links import Links, Mask
+from netem.timeline import Timeline
 from world.formation import Array
 from world.world import World
 
@@ -39,13 +43,18 @@ class FirstMeasurements:
         self.seen = np.zeros((*self.batch, len(self.links)), dtype=bool)
 
     @classmethod
-    def of(cls, world: World, measured: Array, fates: Fates) -> FirstMeasurements:
+    def of(cls, world: World, timeline: Timeline, measured: Array, fates: Fates) -> FirstMeasurements:
         """Those of a whole run: measurements (T, L, D) in every tick, and their verdicts (T, L)."""
         first = cls(world.links, world.sensor, ())
-        arrived = fates == Fate.DELIVERED
-        tick = arrived.argmax(axis=0)
-        first.take(measured[tick, np.arange(len(tick))], arrived.any(axis=0))
+        for tick in range(len(measured)):
+            first.tick(timeline, tick, measured[tick], fates[tick])
         return first
+
+    def tick(self, timeline: Timeline, tick: int, measured: Array, fates: Fates) -> None:
+        """Take in a tick of the runs, each as in the timeline: measurements (..., L, D), and their verdicts (..., L)."""
+        if fresh := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
+            self.seen = self.seen & ~np.isin(self.links.dst, [*fresh])
+        self.take(measured, fates == Fate.DELIVERED)
 
     def take(self, measured: Array, delivered: Mask) -> None:
         """Keep what is new of a tick: measurements (..., L, D), and which arrived (..., L)."""

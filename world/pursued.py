@@ -65,7 +65,7 @@ class Pursuit:
         """What detectors say; `numbers` are those of the agents in their swarms, shape (N,)."""
         over = chase.due == tick
         method = np.where(over, self._chosen(tick, seed, numbers), chase.method)
-        return Sighting(chase.found, over & (tick > 0), method)
+        return Sighting(chase.found, over & (tick > 0), chase.method, method)
 
     def step(self, tick: int, seed: Seed, numbers: Integers, chase: Chase) -> Chase:
         """The next tick: detectors that are done begin again, and targets move on."""

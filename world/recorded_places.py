@@ -7,7 +7,7 @@ import rerun as rr
 
 from analysis import localization
 from netem.channels import PLACE
-from netem.fate import Fate
+from netem.timeline import Timeline
 from world.formation import Array
 from world.history import Moments
 from world.localized import FirstMeasurements
@@ -41,11 +41,11 @@ class Places:
         stream.log("swarm/measured", rr.LineStrips3D.from_fields(radii=width, colors=_ELLIPSE), static=True)
         stream.log("metrics/localization", rr.SeriesLines(names="distance from the optimal places (m)"), static=True)
 
-    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:
         """Consecutive ticks, of which those `kept` are recorded."""
         known = self._first.seen.sum()
-        for measured, fates in zip(moments.measured, moments.fates[:, 0], strict=True):
-            self._first.take(measured, fates == Fate.DELIVERED)
+        for tick, measured, fates in zip(moments.ticks.tolist(), moments.measured, moments.fates[:, 0], strict=True):
+            self._first.tick(timeline, tick, measured, fates)
         place, position = moments.reports[PLACE][kept], moments.position[kept]
         edges = self._first.edges()
         own = localization.weights(edges)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from netem.timeline import Timeline
 from world.history import Moments
 from world.stage import ellipses, points, scalars
 from world.world import World
@@ -35,7 +36,7 @@ class Pursued:
         names = ["found by oneself (m)", "agreed on (m)"]
         stream.log("metrics/target", rr.SeriesLines(names=names), static=True)
 
-    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:  # noqa: ARG002
         """Consecutive ticks, of which those `kept` are recorded."""
         target = (moments.target[kept] - self._nominal)[:, :1]
         found, agreed = moments.reports["found"][kept], moments.reports["reference"][kept][:, :, 0]

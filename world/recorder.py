@@ -114,7 +114,7 @@ class Recorder:
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
         self._log_realised(time, realised)
         for layer in self._layers:
-            layer.log(time, moments, kept)
+            layer.log(time, moments, kept, timeline)
 
     def close(self) -> None:
         """End the file."""

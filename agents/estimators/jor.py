@@ -90,7 +90,9 @@ class JacobiOverRelaxation:
         here = brief.back[..., None]
         of_me = np.take_along_axis(said.fields["measured"], here[..., None], axis=-2)[..., 0, :]
         seen = np.take_along_axis(said.fields["seen"], here, axis=-1)[..., 0]
-        other = _first(state.other, -of_me, said.fresh & seen)
+        # Who restarts measures anew, and says so in every message: both ends then go by that.
+        told_of = said.fresh & seen
+        other = Side(np.where(told_of[..., None], -of_me, state.other.measured), state.other.seen | told_of)
         theirs = np.where(said.fresh[..., None], said.fields["place"], state.theirs)
         told = state.told | said.fresh
         information, pull = _edges(brief, state.own, other)

@@ -23,19 +23,31 @@ from netem.links import Integers
 
 
 class Prediction(NamedTuple):
-    """An optimal estimate (5): mean (..., m, D), covariance (..., m, m), and the ticks since it was made, (...)."""
+    """An optimal estimate (5): mean (..., m, D), covariance (..., m, m), and the tick of which it is, (...)."""
 
     mean: Array
     covariance: Array
-    age: Integers
+    made: Integers
 
 
 class Track(NamedTuple):
-    """The last two optimal estimates, whether there are two (...), the method at work (...), and the internals of REDCHO.
+    """What an agent remembers.
 
-    These are (..., m + 1, C), for the C different numbers of information matrix and vectors.
+    Parameters
+    ----------
+    now
+        What its clock said last, shape (...); -1 before the first tick.
+    last, before
+        The last two optimal estimates.
+    settled
+        Whether there are two, shape (...).
+    method
+        Of detection, now at work, shape (...).
+    internal
+        Variables of REDCHO, shape (..., m + 1, C), for the C different numbers of information matrix and vectors.
     """
 
+    now: Integers
     last: Prediction
     before: Prediction
     settled: Mask
@@ -96,9 +108,10 @@ class TargetEstimator:
             raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
         prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
-        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.full(batch, -1, dtype=np.int64))
+        unmade = np.full(batch, -1, dtype=np.int64)
+        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, unmade)
         internal = np.zeros((*batch, order + 1, numbers(order, brief.dimension)))
-        return Track(first, first, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64), internal)
+        return Track(unmade, first, first, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64), internal)
 
     def sense(
         self,
@@ -108,7 +121,7 @@ class TargetEstimator:
         seen: Mask,  # noqa: ARG002
     ) -> tuple[Track, Mapping[str, Fields]]:
         """A tick has passed; tell the information agreed on so far."""
-        state = state._replace(last=_older(state.last), before=_older(state.before))
+        state = state._replace(now=state.now + 1)
         if not self.fuse_information:
             return state, {}
         local = packed(*self._information(brief, state))
@@ -116,7 +129,7 @@ class TargetEstimator:
 
     def fuse(self, brief: Brief, state: Track, heard: Mapping[str, Heard], own: Own) -> tuple[Track, Estimate]:
         """Take in a detection that is done; agree with the neighbours."""
-        state = self._detected(brief, state, own)
+        state = self._detected(brief, _told_the_time(state, own), own)
         Q, y = self._information(brief, state)
         local = _position(Q, y)
         reference, spread = local, np.linalg.inv(Q[0])
@@ -150,12 +163,14 @@ class TargetEstimator:
         sighting, target = own.sighting, _target(brief)
         if sighting is None:
             raise ValueError("this estimator needs a target: give the scenario a [target]")
-        seconds = _seconds(target, state, brief.dt)
-        R = target.variances[state.method]
+        latency = target.latencies[sighting.by]
+        seconds = np.asarray(latency * brief.dt, dtype=np.float64)
+        R = target.variances[sighting.by]
+        # As a rule the last estimate is of the tick in which this detection began; after a pause it is older.
+        lag = np.maximum(state.now - state.last.made - latency, 0)
+        mean, P = _carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        mean, P = state.last.mean, state.last.covariance
         L = (A @ P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
-        # The method's latency is over when the detection is done: how old the estimate is by then, it is by definition.
         corrected = A @ mean + L @ (sighting.position[..., None, :] - mean[..., :1, :])
         closed = A - L @ np.eye(1, target.order)
         covariance = closed @ P @ np.swapaxes(closed, -1, -2) + R[..., None, None] * (L @ np.swapaxes(L, -1, -2)) + W
@@ -164,19 +179,18 @@ class TargetEstimator:
         def replaced(new: Any, old: Any) -> Any:
             return np.where(done.reshape(done.shape + (1,) * (old.ndim - done.ndim)), new, old)
 
-        last = Prediction(
-            replaced(corrected, mean), replaced(covariance, P), np.where(done, 0, state.last.age).astype(np.int64)
-        )
+        made = np.asarray(np.where(done, state.now, state.last.made), dtype=np.int64)
+        last = Prediction(replaced(corrected, state.last.mean), replaced(covariance, state.last.covariance), made)
         before = Prediction(*(replaced(new, old) for new, old in zip(state.last, state.before, strict=True)))
         return state._replace(last=last, before=before, settled=state.settled | done, method=sighting.method)
 
     def _information(self, brief: Brief, state: Track) -> tuple[Array, Array]:
         """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D) (7)."""
         target = _target(brief)
-        newer = _predicted(target, state.last, brief.dt)
+        newer = _predicted(target, state.last, state.now, brief.dt)
         if self.output == "optimal":
             return newer
-        older = _predicted(target, state.before, brief.dt)
+        older = _predicted(target, state.before, state.now, brief.dt)
         share = self._share(target, state, brief.dt)
         rest = np.concatenate([1.0 - share[:1], -share[1:]])
         Q, y = (jets.scaled(rest, old) + jets.scaled(share, new) for old, new in zip(older, newer, strict=True))
@@ -186,7 +200,7 @@ class TargetEstimator:
         """The jet of eta (appendix B), shape (m + 1, ...): how far the smooth output has passed to the newer prediction."""
         latency = _seconds(target, state, dt)
         rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
-        passed = np.minimum(state.last.age * dt / latency, 1.0)
+        passed = np.minimum((state.now - state.last.made) * dt / latency, 1.0)
         rising = jets.power(passed, exponent, rate, orders)
         falling = self.alpha**exponent * jets.power(1.0 - passed, exponent, -rate, orders)
         share = jets.quotient(rising, rising + falling)
@@ -208,18 +222,32 @@ def _seconds(target: Target, state: Track, dt: float) -> Array:
     return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
 
 
-def _older(prediction: Prediction) -> Prediction:
-    return prediction._replace(age=prediction.age + 1)
+def _told_the_time(state: Track, own: Own) -> Track:
+    """What its clock says; a fresh agent knows since now what it knows."""
+    now = np.broadcast_to(np.asarray(own.tick, dtype=np.int64), state.now.shape)
+    first = state.last.made < 0
+
+    def begun(prediction: Prediction) -> Prediction:
+        return prediction._replace(made=np.asarray(np.where(first, now, prediction.made), dtype=np.int64))
+
+    return state._replace(now=now, last=begun(state.last), before=begun(state.before))
 
 
-def _predicted(target: Target, prediction: Prediction, dt: float) -> tuple[Array, Array]:
+def _carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Array, Array]:
+    """Mean and covariance after some time (6)."""
+    A = transition(target.order, seconds)
+    spread = A @ prediction.covariance @ np.swapaxes(A, -1, -2) + diffusion(target.order, seconds, target.intensity)
+    return A @ prediction.mean, spread
+
+
+def _predicted(target: Target, prediction: Prediction, now: Integers, dt: float) -> tuple[Array, Array]:
     """Jets of the information of an optimal estimate carried on (6), by the differential equations that it follows."""
-    order, seconds = target.order, np.maximum(prediction.age, 0) * dt
-    A = transition(order, seconds)
+    order = target.order
+    elapsed = np.where(prediction.made < 0, 0, np.maximum(now - prediction.made, 0))
+    first, spread = _carried(target, prediction, elapsed * dt)
     shift, driven = np.eye(order, k=1), np.zeros((order, order))
     driven[-1, -1] = target.intensity
-    mean = [A @ prediction.mean]
-    covariance = [A @ prediction.covariance @ np.swapaxes(A, -1, -2) + diffusion(order, seconds, target.intensity)]
+    mean, covariance = [first], [spread]
     for derivative in range(order):
         mean.append(shift @ mean[-1])
         moved = shift @ covariance[-1]

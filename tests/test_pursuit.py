@@ -1,0 +1,1033 @@
+"""A target that is found with a latency: filters against textbooks and finite differences, consensus, the law, the runs."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from briefs import brief
+from flying import PROCESSES, digest_of, plan_of
+from numpy.polynomial import polynomial
+from rerun.chunk import RrdReader
+from scipy.linalg import expm
+from scripted import timeline
+
+from affinet.batch import fly_all
+from affinet.inprocess import Swarm
+from affinet.plan import PlanError
+from affinet.run import fly, rehearse
+from affinet.sections import ScenarioError
+from affinet.side_by_side import side_by_side
+from agents.brief import Own
+from agents.estimators.base import Estimate, Heard
+from agents.estimators.none import NoEstimator
+from agents.estimators.redcho import Consensus
+from agents.estimators.target import TargetEstimator
+from agents.pursuit import FirstOrderPursuit, Pursuit
+from analysis import jets
+from analysis.pursuit import Sighting, Target, diffusion, numbers, packed, position, transition, unpacked
+from netem.channels import TARGET
+from world import pursued
+from world.history import History
+
+ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
+
+
+def target_of(order=2, latencies=(20, 10), variances=(0.01, 0.1), intensity=1.0):
+    return Target(order, intensity, np.array(latencies), np.array(variances))
+
+
+# Jets
+
+
+def jet_of(matrix, size, t, orders):
+    """The jet of exp(t matrix)."""
+    return np.stack([np.linalg.matrix_power(matrix, order) @ expm(t * matrix) for order in range(orders)]).reshape(
+        orders, size, size
+    )
+
+
+def derivatives(coefficients, t, orders):
+    """Of polynomials in t, coefficients (n, ...)."""
+    return np.stack([polynomial.polyval(t, polynomial.polyder(coefficients, order)) for order in range(orders)])
+
+
+def test_the_jet_of_a_product_of_polynomials_is_that_of_the_polynomial():
+    rng = np.random.default_rng(0)
+    one, other = rng.normal(size=(4, 2, 3)), rng.normal(size=(3, 3, 2))
+    product = np.zeros((6, 2, 2))
+    for low, left in enumerate(one):
+        for high, right in enumerate(other):
+            product[low + high] += left @ right
+    found = jets.times(derivatives(one, 0.7, 5), derivatives(other, 0.7, 5))
+    np.testing.assert_allclose(found, derivatives(product, 0.7, 5), rtol=1e-12, atol=1e-12)
+
+
+def test_the_jet_of_the_inverse_of_an_exponential_is_that_of_the_exponential_backwards():
+    matrix = np.random.default_rng(1).normal(size=(3, 3))
+    np.testing.assert_allclose(
+        jets.inverse(jet_of(matrix, 3, 0.4, 5)), jet_of(-matrix, 3, 0.4, 5), rtol=1e-9, atol=1e-9
+    )
+
+
+def test_the_jet_of_a_product_of_jets_with_leading_axes_is_that_of_each():
+    rng = np.random.default_rng(2)
+    one, other = rng.normal(size=(3, 5, 2, 2)), rng.normal(size=(3, 5, 2, 2))
+    for row in range(5):
+        np.testing.assert_array_equal(jets.times(one, other)[:, row], jets.times(one[:, row], other[:, row]))
+        np.testing.assert_allclose(jets.inverse(one)[:, row], jets.inverse(one[:, row]), rtol=1e-9)
+
+
+def test_the_jet_of_a_number_times_a_matrix():
+    matrix, rate = np.random.default_rng(3).normal(size=(2, 2)), 0.6
+    growing = np.array([rate**order * np.exp(0.5 * rate) for order in range(4)])
+    expected = jet_of(matrix + rate * np.eye(2), 2, 0.5, 4)
+    np.testing.assert_allclose(jets.scaled(growing, jet_of(matrix, 2, 0.5, 4)), expected, rtol=1e-11, atol=1e-11)
+
+
+def test_the_jet_of_a_quotient_is_that_of_the_tangent():
+    t = np.array([0.3, -0.8])
+    sine, cosine = (np.stack([wave(t + order * np.pi / 2) for order in range(4)]) for wave in (np.sin, np.cos))
+    tan = np.tan(t)
+    slope = 1 + tan**2
+    np.testing.assert_allclose(
+        jets.quotient(sine, cosine), [tan, slope, 2 * tan * slope, 2 * slope**2 + 4 * tan**2 * slope], rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("exponent", [0, 1, 2, 3, 5])
+def test_the_jet_of_a_power_is_that_of_the_polynomial(exponent):
+    rate, start, t = np.array([0.5, -2.0]), np.array([0.1, 1.3]), 0.7
+    found = jets.power(start + rate * t, exponent, rate, 5)
+    for row in range(2):
+        coefficients = polynomial.polypow([start[row], rate[row]], exponent)
+        np.testing.assert_allclose(found[:, row], derivatives(coefficients, t, 5), rtol=1e-11, atol=1e-12)
+
+
+# The target's own motion
+
+
+def driven(order, intensity):
+    """A and B W B' of a chain of integrators."""
+    noise = np.zeros((order, order))
+    noise[-1, -1] = intensity
+    return np.eye(order, k=1), noise
+
+
+@cache
+def van_loan(order, intensity, seconds):
+    """A_d and W_d from one matrix exponential."""
+    A, noise = driven(order, intensity)
+    whole = expm(seconds * np.block([[-A, noise], [np.zeros((order, order)), A.T]]))
+    forward = whole[order:, order:].T
+    return forward, forward @ whole[:order, order:]
+
+
+@ORDERS
+def test_the_target_moves_and_spreads_as_its_differential_equation_says(order):
+    for seconds in (0.0, 0.05, 0.7, 3.0):
+        A, W = van_loan(order, 1.7, seconds)
+        np.testing.assert_allclose(transition(order, np.array(seconds)), A, rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(diffusion(order, np.array(seconds), 1.7), W, rtol=1e-9, atol=1e-12)
+
+
+def test_motion_over_many_times_is_that_over_each():
+    seconds = np.array([[0.1, 0.2], [0.0, 2.0]])
+    for place in np.ndindex(2, 2):
+        np.testing.assert_array_equal(transition(3, seconds)[place], transition(3, seconds[place]))
+        np.testing.assert_array_equal(diffusion(3, seconds, 2.0)[place], diffusion(3, seconds[place], 2.0))
+
+
+@ORDERS
+def test_information_is_packed_without_a_loss(order):
+    rng = np.random.default_rng(order)
+    root = rng.normal(size=(4, order, order))
+    Q, y = root @ np.swapaxes(root, -1, -2) + np.eye(order), rng.normal(size=(4, order, 3))
+    said = packed(Q, y)
+    assert said.shape == (4, numbers(order, 3))
+    for mine, again in zip((Q, y), unpacked(said, 3, order), strict=True):
+        np.testing.assert_array_equal(mine, again)
+    np.testing.assert_allclose(position(said, 3, order), (np.linalg.inv(Q) @ y)[:, 0], rtol=1e-9)
+
+
+# One agent and its detector
+
+
+class Tick(NamedTuple):
+    """What came of a tick of an agent, or of many."""
+
+    truth: np.ndarray
+    sighting: Sighting
+    before: object
+    state: object
+    estimate: Estimate
+
+
+def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2, prior=(1.0, 1.0)):
+    """Agents, each after a target of its own, whose start is drawn as the prior says."""
+    rng = np.random.default_rng(seed)
+    chase_of = pursued.Pursuit(target, dt, np.zeros((target.order, dimension)))
+    seeds, first = np.arange(1, runs + 1, dtype=np.uint64) + np.uint64(1000 * seed), np.ones(runs, dtype=np.int64)
+    deviations = np.array([prior[0]] + [prior[1]] * (target.order - 1))[:, None]
+    start = deviations * rng.normal(size=(runs, target.order, dimension))
+    chase = chase_of.begin(runs, runs)._replace(target=start)
+    alone = replace(brief(np.zeros((runs, 1, dimension))), dt=dt, target=target)
+    state = estimator.init(alone, (runs,))
+    heard = {TARGET: Heard({"information": np.zeros((runs, 1, numbers(target.order, dimension)))}, alone.present)}
+    nothing = np.zeros((runs, dimension))
+    for tick in range(ticks):
+        sighting = chase_of.sighting(tick, seeds, first, chase)
+        before, _ = estimator.sense(alone, state, alone.relative, alone.present)
+        state, estimate = estimator.fuse(alone, before, heard, Own(nothing, nothing, tick, sighting=sighting))
+        yield Tick(chase.target, sighting, before, state, estimate)
+        chase = chase_of.step(tick, seeds, first, chase)
+
+
+def informed(flown, order=2, dimension=2):
+    """Mean and covariance that the information of ticks stands for."""
+    Q, y = unpacked(np.stack([tick.estimate.reports["information"] for tick in flown]), dimension, order)
+    return np.linalg.solve(Q, y), np.linalg.inv(Q)
+
+
+class Textbook:
+    """The optimal estimates of one agent (5) and what follows from them (6), (7), number by number, axis by axis."""
+
+    def __init__(self, flown, target, dt, prior=(1.0, 1.0)):
+        self.target, self.dt, order = target, dt, target.order
+        done = [0] + [tick for tick, one in enumerate(flown) if one.sighting.done[0]]
+        deviations = [prior[0]] + [prior[1]] * (order - 1)
+        axes = flown[0].truth.shape[-1]
+        self.times, self.methods = done, [int(flown[tick].sighting.method[0]) for tick in done]
+        self.means, self.covariances = [np.zeros((order, axes))], [np.diag(deviations) ** 2]
+        for (begun, over), method in zip(pairwise(done), self.methods, strict=False):
+            assert over - begun == target.latencies[method]
+            z, R = flown[over].sighting.position[0], target.variances[method]
+            A, W = van_loan(order, target.intensity, (over - begun) * dt)
+            x, P = self.means[-1], self.covariances[-1]
+            # A measurement is taken in, and the posterior predicted to the time when it is known.
+            gain = P[:, 0] / (P[0, 0] + R)
+            mean = np.zeros_like(x)
+            for axis in range(axes):
+                mean[:, axis] = A @ (x[:, axis] + gain * (z[axis] - x[0, axis]))
+            self.means.append(mean)
+            self.covariances.append(A @ (P - np.outer(gain, P[0])) @ A.T + W)
+
+    def latest(self, seconds):
+        """Which estimate is the newest at a time, the later one at a detection."""
+        return max(k for k, tick in enumerate(self.times) if tick * self.dt <= seconds + 1e-9)
+
+    def predicted(self, k, seconds):
+        A, W = van_loan(self.target.order, self.target.intensity, seconds - self.times[k] * self.dt)
+        return A @ self.means[k], A @ self.covariances[k] @ A.T + W
+
+    def smooth(self, seconds, alpha, k=None):
+        """Information matrix and vector (7) at any time."""
+        k = self.latest(seconds) if k is None else k
+        information = []
+        for number in (max(k - 1, 0), k):
+            mean, P = self.predicted(number, seconds)
+            information.append((np.linalg.inv(P), np.linalg.inv(P) @ mean))
+        latency = self.target.latencies[self.methods[k]] * self.dt
+        tau, power = (seconds - self.times[k] * self.dt) / latency, self.target.order + 1
+        eta = tau**power / (tau**power + (alpha * (1 - tau)) ** power) if k else 1.0
+        return tuple((1 - eta) * old + eta * new for old, new in zip(*information, strict=True))
+
+
+OPTIMAL = TargetEstimator(output="optimal", fuse_information=False)
+SMOOTH = TargetEstimator(fuse_information=False)
+
+
+@ORDERS
+def test_the_optimal_output_is_that_of_a_kalman_filter_written_apart(order):
+    target, dt = target_of(order), 0.05
+    flown = list(watch(OPTIMAL, target, ticks=110, seed=order + 1))
+    book = Textbook(flown, target, dt)
+    assert len(book.times) > 5
+    assert set(book.methods) == {0, 1}
+    means, covariances = informed(flown, order)
+    for tick, one in enumerate(flown):
+        k = book.latest(tick * dt)
+        np.testing.assert_allclose(one.state.last.mean[0], book.means[k], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(one.state.last.covariance[0], book.covariances[k], rtol=1e-10, atol=1e-12)
+        mean, P = book.predicted(k, tick * dt)
+        np.testing.assert_allclose(means[tick, 0], mean, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(covariances[tick, 0], P, rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(one.estimate.reports["found"][0], mean[0], rtol=1e-9, atol=1e-9)
+        assert one.estimate.reports["variance"][0] == pytest.approx(P[0, 0], rel=1e-9)
+
+
+def test_the_derivatives_of_the_optimal_output_are_those_of_the_prediction():
+    # Of the third derivative nothing is known: no noise has a derivative.
+    for one in watch(OPTIMAL, target_of(), ticks=60):
+        reference = one.estimate.reports["reference"][0]
+        mean = transition(2, (one.state.now - one.state.last.made)[0] * 0.05) @ one.state.last.mean[0]
+        np.testing.assert_allclose(reference, [*mean, np.zeros(2)], atol=1e-9)
+
+
+@pytest.mark.parametrize("alpha", [0.3, 1.0, 4.0])
+@ORDERS
+def test_the_smooth_output_passes_from_the_older_prediction_to_the_newer(order, alpha):
+    target, dt = target_of(order), 0.05
+    flown = list(watch(replace(SMOOTH, alpha=alpha), target, ticks=60, seed=order))
+    book = Textbook(flown, target, dt)
+    for tick, one in enumerate(flown):
+        Q, y = book.smooth(tick * dt, alpha)
+        said = unpacked(one.estimate.reports["information"][0], 2, order)
+        np.testing.assert_allclose(said[0], Q, rtol=1e-9, atol=1e-9 * np.abs(Q).max())
+        np.testing.assert_allclose(said[1], y, rtol=1e-9, atol=1e-9 * np.abs(y).max())
+        P = np.linalg.inv(Q)
+        np.testing.assert_allclose(one.estimate.reports["found"][0], (P @ y)[0], rtol=1e-8, atol=1e-8)
+        assert one.estimate.reports["variance"][0] == pytest.approx(P[0, 0], rel=1e-8)
+
+
+def stencil(function, at, step):
+    """Value, first and second derivative by central differences of the eighth order."""
+    points = np.array([function(at + number * step) for number in range(-4, 5)])
+    first = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+    second = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
+    return points[4], np.tensordot(first, points, 1) / step, np.tensordot(second, points, 1) / step**2
+
+
+def test_derivatives_of_the_smooth_output_are_those_of_the_function_of_time():
+    target, dt, alpha = target_of(), 0.05, 0.7
+    flown = list(watch(replace(SMOOTH, alpha=alpha), target, ticks=60))
+    book = Textbook(flown, target, dt)
+    looked_at = [tick for tick in range(1, 60) if tick not in book.times]
+    assert len(looked_at) > 50
+    for tick in looked_at:
+        k = book.latest(tick * dt)
+
+        def place(seconds, k=k):
+            return np.linalg.solve(*book.smooth(seconds, alpha, k))[0]
+
+        found = flown[tick].estimate.reports["reference"][0]
+        for mine, theirs, tolerance in zip(found, stencil(place, tick * dt, 4e-3), (1e-9, 1e-5, 1e-3), strict=True):
+            np.testing.assert_allclose(mine, theirs, rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("alpha", [0.1, 1.0, 10.0])
+def test_a_detection_that_is_taken_in_changes_no_derivative_of_the_smooth_output(order, alpha):
+    target, taken = target_of(order), 0
+    estimator = replace(SMOOTH, alpha=alpha)
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target)
+    nothing = np.zeros((1, 2))
+    for one in watch(estimator, target, ticks=100, seed=3):
+        if not one.sighting.done[0]:
+            continue
+        taken += 1
+        ignored = one.sighting._replace(done=np.array([False]), method=one.before.method)
+        _, before = estimator.fuse(
+            alone, one.before, {}, Own(nothing, nothing, int(one.before.now[0]), sighting=ignored)
+        )
+        for name in ("information", "reference", "variance"):
+            np.testing.assert_allclose(one.estimate.reports[name], before.reports[name], rtol=1e-9, atol=1e-12)
+        just_before = estimator._information(alone, one.before)
+        just_after = estimator._information(alone, one.state)
+        for mine, theirs in zip(just_before, just_after, strict=True):
+            assert len(mine) == order + 1
+            for derivative in range(order + 1):
+                np.testing.assert_allclose(
+                    theirs[derivative], mine[derivative], rtol=1e-6, atol=1e-9 * np.abs(mine[derivative]).max()
+                )
+        # A tick later, the detection counts.
+        assert np.abs(one.state.last.mean - one.before.last.mean).max() > 1e-3
+    assert taken > 4
+
+
+def test_after_a_pause_an_estimate_is_as_unsure_as_it_is_old():
+    target, dt = target_of(2, (20, 10), (0.02, 0.1)), 0.05
+    flown = [one for one in watch(OPTIMAL, target, ticks=120)]
+    done = [tick for tick, one in enumerate(flown) if one.sighting.done[0]]
+    before, after = done[1], done[3]  # it misses what is done in between
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=dt, target=target)
+    sighting, nothing = flown[after].sighting, np.zeros((1, 2))
+    state, _ = OPTIMAL.fuse(alone, flown[before].state, {}, Own(nothing, nothing, after, sighting=sighting))
+    began = after - target.latencies[sighting.by[0]]
+    assert began > before
+    A, W = van_loan(2, target.intensity, (began - before) * dt)
+    P = A @ flown[before].state.last.covariance[0] @ A.T + W
+    gain = P[:, :1] / (P[0, 0] + target.variances[sighting.by[0]])
+    A, W = van_loan(2, target.intensity, (after - began) * dt)
+    np.testing.assert_allclose(state.last.covariance[0], A @ (P - gain @ P[:1]) @ A.T + W, rtol=1e-9)
+
+
+def test_the_optimal_output_jumps_at_a_detection():
+    jumps = []
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target_of())
+    for one in watch(OPTIMAL, target_of(), ticks=100):
+        if one.sighting.done[0]:
+            mean = transition(2, (one.before.now - one.before.last.made)[0] * 0.05) @ one.before.last.mean[0]
+            jumps.append(np.abs(one.estimate.reports["found"][0] - mean[0]).max())
+    assert alone.target is not None
+    assert min(jumps) > 1e-3
+
+
+def series_quotient(numerator, denominator):
+    """Taylor coefficients of a quotient, by long division."""
+    found = []
+    for order, rest in enumerate(numerator):
+        drawn = sum(found[lower] * denominator[order - lower] for lower in range(order))
+        found.append((rest - drawn) / denominator[0])
+    return np.array(found)
+
+
+def share_of(order, alpha, latency, dt):
+    """The jet of eta at each age of a detection, as the estimator has it."""
+    target, ages = target_of(order, (latency,), (0.1,)), np.arange(latency + 1)
+    estimator = replace(SMOOTH, alpha=alpha)
+    state = estimator.init(replace(brief(np.zeros((1, 1, 2))), dt=dt, target=target), (latency + 1,))
+    settled = np.ones(latency + 1, dtype=bool)
+    return estimator._share(
+        target, state._replace(now=ages, last=state.last._replace(made=0 * ages), settled=settled), dt
+    )
+
+
+@pytest.mark.parametrize("alpha", [0.1, 1.0, 10.0])
+@ORDERS
+def test_eta_is_a_transition_function_and_that_of_appendix_b(order, alpha):
+    latency, dt = 16, 0.05
+    share = share_of(order, alpha, latency, dt)
+    np.testing.assert_allclose(share[0, [0, -1]], [0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(share[1:, [0, -1]], 0.0, atol=1e-9)
+    assert (np.diff(share[0]) > 0.0).all()
+    for age in range(latency + 1):
+        tau, rate = age / latency, 1.0 / (latency * dt)
+        # In powers of the time since then: Phi(tau + rate s), Phi(a (1 - tau - rate s)).
+        rising = polynomial.polypow([tau, rate], order + 1)[: order + 1]
+        falling = polynomial.polypow([alpha * (1 - tau), -alpha * rate], order + 1)[: order + 1]
+        series = series_quotient(rising, rising + falling)
+        expected = [factorial(power) * each for power, each in enumerate(series)]
+        np.testing.assert_allclose(share[:, age], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_smaller_alpha_the_sooner_the_newer_prediction_counts():
+    soon, mild, late = (share_of(2, alpha, 16, 0.05)[0] for alpha in (0.1, 1.0, 10.0))
+    assert (soon[1:-1] > mild[1:-1]).all()
+    assert (mild[1:-1] > late[1:-1]).all()
+    assert mild[8] == pytest.approx(0.5)
+
+
+RUNS = 1000
+
+
+@cache
+def crowd(latencies, output, alpha):
+    """Errors (T, R, m, D), covariances (T, R, m, m) of the estimate and of the optimal one, and ages (T, R), of many runs."""
+    target = target_of(2, latencies, (0.02, 0.1)[: len(latencies)])
+    flown = list(watch(TargetEstimator(output, alpha, False), target, ticks=64, runs=RUNS))[-24:]
+    means, covariances = informed(flown)
+    newest = []
+    for one in flown:
+        last = one.state.last
+        seconds = (one.state.now - last.made) * 0.05
+        A = transition(2, seconds)
+        newest.append(A @ last.covariance @ np.swapaxes(A, -1, -2) + diffusion(2, seconds, 1.0))
+    ages = np.stack([one.state.now - one.state.last.made for one in flown])
+    return means - np.stack([one.truth for one in flown]), covariances, np.stack(newest), ages
+
+
+def relative_to(moments, covariance):
+    """Eigenvalues of error moments relative to a covariance."""
+    return np.linalg.eigvals(np.linalg.solve(covariance, moments)).real
+
+
+CROWDS = [((12,), 0.1), ((12,), 10.0), ((20, 10), 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("latencies", "output", "alpha"),
+    [*((latencies, "smooth", alpha) for latencies, alpha in CROWDS), ((20, 10), "optimal", 1.0)],
+)
+def test_on_average_estimates_are_right(latencies, output, alpha):
+    errors, *_ = crowd(latencies, output, alpha)
+    standard_error = errors.std(axis=1) / np.sqrt(RUNS)
+    # Ticks of a run are not independent; four standard errors leave room for the largest of all.
+    assert (np.abs(errors.mean(axis=1)) < 4.5 * standard_error).all()
+    assert standard_error[..., 0, :].max() < 0.07
+
+
+def test_the_optimal_output_is_as_wrong_as_it_says():
+    for latencies in ((12,), (20, 10)):
+        errors, covariances, *_ = crowd(latencies, "optimal", 1.0)
+        moments = np.einsum("trid,trjd->tij", errors, errors) / (2 * RUNS)
+        # 2000 draws: deviations of a variance are 3.2 %.
+        for moment, said in zip(moments, covariances.mean(axis=1), strict=True):
+            np.testing.assert_allclose(relative_to(moment, said), 1.0, atol=0.14)
+
+
+@pytest.mark.parametrize(("latencies", "alpha"), CROWDS)
+def test_the_smooth_output_is_no_better_than_the_optimal_and_no_worse_than_it_says(latencies, alpha):
+    errors, said, best, ages = crowd(latencies, "smooth", alpha)
+    moments = np.einsum("trid,trjd->tij", errors, errors) / (2 * RUNS)
+    looser = []
+    for moment, least, most in zip(moments, best.mean(axis=1), said.mean(axis=1), strict=True):
+        assert relative_to(moment, least).min() > 1 - 0.14
+        assert relative_to(moment, most).max() < 1 + 0.14
+        looser.append(relative_to(most, least).max())
+    # The two bounds are apart, but for the sampling instants of a single latency.
+    assert max(looser) > 1.5
+    if len(latencies) == 1:
+        done = np.flatnonzero((ages == 0).all(axis=1))
+        assert len(done) == 2
+        for tick in done:
+            # Just when a detection is done, all is as the prediction before has it.
+            np.testing.assert_allclose(relative_to(moments[tick], said[tick].mean(axis=0)), 1.0, atol=0.14)
+
+
+# Consensus
+
+
+def test_what_internals_take_from_the_output_is_row_by_row_that_of_the_errata():
+    # C_0 Gamma^mu with Gamma = A_0 - diag(2, 3, 5), by hand.
+    G = np.array([[1.0, 0.0, 0.0], [-2.0, 1.0, 0.0], [4.0, -5.0, 1.0]])
+    consensus = Consensus(2, 7.0, (6.0, 11.0, 6.0), (2.0, 3.0, 5.0))
+    local, internal = np.arange(12.0).reshape(3, 1, 4), np.random.default_rng(0).normal(size=(1, 3, 4))
+    np.testing.assert_allclose(consensus.outputs(local, internal)[:, 0], local[:, 0] - G @ internal[0], atol=1e-12)
+    for order in (1, 2, 3, 4):
+        gamma = np.arange(1.0, order + 2)
+        Gamma = np.eye(order + 1, k=1) - np.diag(gamma)
+        rows = np.stack([np.linalg.matrix_power(Gamma, mu)[0] for mu in range(order + 1)])
+        mixing = -Consensus(order, 1.0, (1.0,) * (order + 1), tuple(gamma)).outputs(
+            np.zeros((order + 1, order + 1)), np.eye(order + 1)
+        )
+        np.testing.assert_allclose(mixing, rows, atol=1e-12)
+
+
+def test_a_step_of_the_consensus_by_hand():
+    consensus = Consensus(2, 10.0, (6.0, 11.0, 7.0), (2.0, 3.0, 5.0))
+    internal = np.array([[1.0], [10.0], [100.0]])
+    # The neighbours are 8 above, and 1 below: roots -4 + 1, -2 + 1, -1 + 1.
+    moved = consensus.step(internal, np.array([0.0]), np.array([[8.0], [-1.0], [0.0]]), 0.01)
+    rates = [6 * 10 * -3 + 10 - 2 * 1, 11 * 100 * -1 + 100 - 3 * 10, 7 * 1000 * 0 - 5 * 100]
+    np.testing.assert_allclose(moved[:, 0], [1 - 1.72, 10 - 10.30, 100 - 5.0], rtol=1e-12)
+    np.testing.assert_allclose(moved[:, 0], internal[:, 0] + 0.01 * np.array(rates), rtol=1e-12)
+    lonely = consensus.step(internal, np.array([3.0]), np.array([[3.0]]), 0.01)
+    np.testing.assert_allclose(lonely[:, 0], [1 + 0.01 * 8, 10 + 0.01 * 70, 95.0], rtol=1e-12)
+
+
+def ring(dt, seconds, theta=5.0):
+    """How far ten agents are from the mean of their sinusoids and of its derivatives, and the sum of their internals."""
+    agents, rng = np.arange(10), np.random.default_rng(0)
+    size, rate, phase = rng.uniform(0.5, 1.5, 10), rng.uniform(0.3, 1.0, 10), rng.uniform(0, 6, 10)
+    neighbours = np.stack([agents - 1, (agents + 1) % 10], axis=1)
+    consensus, internal = Consensus(2, theta, (6.0, 11.0, 6.0), (1.0, 1.0, 1.0)), np.zeros((10, 3, 1))
+    off, total = [], 0.0
+    for tick in range(round(seconds / dt)):
+        angle = rate * tick * dt + phase
+        local = np.stack([size * np.sin(angle), size * rate * np.cos(angle), -size * rate**2 * np.sin(angle)])[
+            ..., None
+        ]
+        said = consensus.outputs(local, internal)
+        off.append(np.abs(said - local.mean(axis=1, keepdims=True)).max(axis=(1, 2)))
+        internal = consensus.step(internal, said[0], said[0][neighbours], dt)
+        total = max(total, float(np.abs(internal.sum(axis=0)).max()))
+    return np.array(off), total, float(np.abs(internal).max())
+
+
+def test_agents_in_a_ring_agree_on_the_mean_of_their_signals_and_its_derivative():
+    off, total, largest = ring(1e-4, 0.8)
+    assert (off[0] > [0.5, 0.5, 0.2]).all()
+    assert (off[-500:].max(axis=0)[:2] < [1e-5, 1e-2]).all()
+    assert total < 1e-10 < largest
+
+
+def test_shorter_steps_make_the_agreement_closer():
+    coarse, fine = (ring(dt, 0.6)[0][-int(0.1 / dt) :].max(axis=0) for dt in (1e-3, 1e-4))
+    assert (coarse > np.array([100, 20, 3]) * fine).all()
+
+
+@cache
+def agreed(seconds=0.526, **parameters):
+    """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
+    target, dt = target_of(2, (400, 200)), 1e-3
+    estimator = TargetEstimator(theta=10.0, **parameters)
+    chase_of, who = pursued.Pursuit(target, dt, np.zeros((2, 2))), np.array([1, 2, 3])
+    chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
+    agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
+    state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
+    for tick in range(round(seconds / dt)):
+        sighting = chase_of.sighting(tick, 5, who, chase)
+        state, said = estimator.sense(agents, state, agents.relative, agents.present)
+        heard = {TARGET: Heard({"information": said[TARGET]["information"][neighbours]}, agents.present)}
+        state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=sighting))
+        flown.append((state, estimate, chase.target, said))
+        chase = chase_of.step(tick, 5, who, chase)
+    return flown
+
+
+def test_agents_agree_on_the_position_that_all_their_information_stands_for():
+    state, estimate, *_ = agreed()[-1]
+    ideal = position(estimate.reports["information"].mean(axis=0), 2, 2)
+    apart = np.abs(estimate.reports["found"] - ideal).max()
+    assert np.abs(estimate.reports["reference"][:, 0] - ideal).max() < apart / 50
+    assert np.abs(state.internal.sum(axis=0)).max() < 1e-6 * np.abs(state.internal).max()
+    Q = unpacked(estimate.reports["information"].mean(axis=0), 2, 2)[0]
+    np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=0.06)
+
+
+def test_what_is_said_is_the_agents_own_information_less_its_internals():
+    for (before, estimate, *_), (*_, said) in list(pairwise(agreed()))[::50]:
+        assert said[TARGET]["information"].shape == (3, 7)
+        assert np.isfinite(estimate.reports["information"]).all()
+        assert before.internal.shape == (3, 3, 7)
+    _, estimate, _, said = agreed()[-1]
+    # The internals of the tick before are in what was said; nothing was detected in this tick.
+    np.testing.assert_allclose(
+        said[TARGET]["information"], estimate.reports["information"] - agreed()[-2][0].internal[:, 0], rtol=1e-9
+    )
+
+
+def test_derivatives_are_the_agents_own_where_wanted():
+    own = agreed(0.35, derivatives="own")
+    shared, alone = agreed()[349][1].reports, own[-1][1].reports
+    np.testing.assert_array_equal(shared["reference"][:, 0], alone["reference"][:, 0])
+    assert np.abs(shared["reference"][:, 1] - alone["reference"][:, 1]).max() > 1e-3
+    target = target_of(2, (400, 200))
+    agents = replace(brief(np.ones((3, 2, 2))), dt=1e-3, target=target)
+    nothing = np.zeros((3, 2))
+    idle = Sighting(nothing, np.zeros(3, dtype=bool), own[-1][0].method, own[-1][0].method)
+    _, by_itself = SMOOTH.fuse(agents, own[-1][0], {}, Own(nothing, nothing, int(own[-1][0].now[0]), sighting=idle))
+    np.testing.assert_allclose(alone["reference"][:, 1:], by_itself.reports["reference"][:, 1:], rtol=1e-9)
+    np.testing.assert_allclose(alone["found"], by_itself.reports["found"], rtol=1e-9)
+
+
+def test_who_hears_nobody_goes_by_its_own_information():
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target_of())
+    assert not alone.present.any()
+    flown, by_itself = (list(watch(estimator, target_of(), ticks=60)) for estimator in (TargetEstimator(), SMOOTH))
+    for one, other in zip(flown, by_itself, strict=True):
+        for name in ("reference", "found", "variance", "information"):
+            np.testing.assert_allclose(one.estimate.reports[name], other.estimate.reports[name], rtol=1e-9, atol=1e-9)
+
+
+def test_what_a_target_estimator_knows_of_neighbours_is_nothing():
+    (one, *_) = watch(SMOOTH, target_of(), ticks=1)
+    assert not one.estimate.known.any()
+    assert np.isnan(one.estimate.psi).all()
+    assert TargetEstimator().channels(replace(brief(np.ones((2, 2))), target=target_of(3)))[TARGET][
+        "information"
+    ].shape == (6 + 3 * 2,)
+    assert SMOOTH.channels(replace(brief(np.ones((2, 2))), target=target_of())) == {}
+
+
+# The law
+
+
+def knows(*reference):
+    nothing = np.zeros((1, 2))
+    return Estimate(
+        nothing,
+        np.zeros(1, dtype=bool),
+        np.zeros((1, 2, 2)),
+        np.array(np.nan),
+        reports={"reference": np.array(reference)},
+    )
+
+
+PLACED = replace(brief(np.ones((1, 2))), nominal=np.array([3.0, -1.0]))
+
+
+def test_the_law_by_hand():
+    own = Own(np.array([0.5, 0.0]), np.zeros(2), 0, np.array([10.0, 2.0]))
+    reference = knows([4.0, 1.0], [1.0, 1.0], [0.1, -0.2])
+    law = Pursuit(kappa=(2.0, 3.0))
+    _, u = law.command(PLACED, law.init(PLACED, ()), 0, own, reference, None)
+    # Off by (10, 2) - (4, 1) - (3, -1) = (3, 2), behind by (-0.5, -1).
+    np.testing.assert_allclose(u, [0.1 - 2 * 3 + 3 * 0.5, -0.2 - 2 * 2 + 3 * 1], rtol=1e-12)
+    first = FirstOrderPursuit(kappa=2.0)
+    _, u = first.command(PLACED, first.init(PLACED, ()), 0, own, reference, None)
+    np.testing.assert_allclose(u, [1 - 2 * 3, 1 - 2 * 2], rtol=1e-12)
+    np.testing.assert_allclose(
+        Pursuit().command(PLACED, law.init(PLACED, ()), 0, own, reference, None)[1], [0.1 - 3 + 1, -0.2 - 2 + 2]
+    )
+
+
+def test_the_law_wants_a_position():
+    nowhere = Own(np.zeros(2), np.zeros(2))
+    for law in (Pursuit(), FirstOrderPursuit()):
+        with pytest.raises(ValueError, match="own position"):
+            law.command(PLACED, law.init(PLACED, ()), 0, nowhere, knows([0, 0], [0, 0], [0, 0]), None)
+
+
+NAME = "target"
+COARSE = ("time.dt=0.01", "target.latencies=[0.2,0.1]", "agents.parameters.target.theta=4")
+ALONE = "agents.parameters.target={fuse_information=false}"
+SINGLE = ('agents.law="first-order-pursuit"', 'dynamics.model="single-integrator"')
+
+
+def refusal(*overrides, name=NAME):
+    with pytest.raises((ScenarioError, PlanError)) as told:
+        plan_of(name, *overrides)
+    said = str(told.value)
+    assert "\n" not in said
+    return said
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (('agents.estimator="none"',), "choose an estimator that reports them"),
+        (("target.order=1", ALONE), "derivatives up to 2"),
+        (('agents.estimator="none"', *SINGLE), "derivatives up to 1"),
+        (("target.order=1",), "a target of order 1 needs 2 gains k and gamma"),
+        (('agents.parameters.target={output="optimal"}',), "wants output = 'smooth'"),
+        (("agents.parameters.target.alpha=0.0",), "alpha must be above 0"),
+        (("target.latencies=[0.5,0.0031]",), "target.latencies"),
+        (("target.latencies=[0.5]",), "a variance for each latency"),
+        (("target.position=[1,2,3]",), "target.position"),
+    ],
+)
+def test_what_cannot_pursue_is_refused_in_one_line(overrides, says):
+    assert says in refusal(*overrides)
+
+
+def test_latencies_that_are_no_whole_number_of_ticks_are_named():
+    said = refusal("target.latencies=[0.105,0.1]", "time.dt=0.01")
+    assert "target.latencies: [0.105, 0.1] s are not whole numbers of ticks of 0.01 s" in said
+
+
+def test_an_estimator_of_a_target_needs_one():
+    assert "give the scenario a [target]" in refusal('agents.estimator="target"', name="localization")
+    assert "give the scenario a [target]" in refusal('agents.estimator="target"', ALONE, name="localization")
+
+
+def test_gains_of_the_laws_are_read_from_the_scenario():
+    assert plan_of(NAME, "agents.parameters.pursuit={kappa=[4.0,5.0]}").law.build() == Pursuit([4.0, 5.0])
+    single = plan_of(NAME, *SINGLE, "agents.parameters.first-order-pursuit={kappa=3.0}")
+    assert single.law.build() == FirstOrderPursuit(3.0)
+
+
+# The world
+
+
+def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3):
+    start = np.zeros((target.order, 2)) if start is None else start
+    chase_of = pursued.Pursuit(target, dt, start)
+    seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
+    return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_over_a_tick_a_target_drifts_and_spreads_as_its_equation_says(order):
+    start = np.random.default_rng(order).normal(size=(order, 2))
+    target = target_of(order, intensity=2.0)
+    moved = step_of(target, start=start)
+    A, W = van_loan(order, 2.0, 0.1)
+    deviation = np.sqrt(np.diag(W))[:, None]
+    off = (moved - A @ start) / deviation
+    assert np.abs(off.mean(axis=0)).max() < 4.5 / np.sqrt(len(off))
+    scale = np.outer(deviation, deviation)
+    for axis in range(2):
+        np.testing.assert_allclose(np.cov(off[..., axis].T).reshape(order, order), W / scale, atol=0.04)
+    # Axes are independent, and so are ticks.
+    across = np.einsum("sid,sje->idje", off, off)[:, 0, :, 1] / len(off)
+    assert np.abs(across).max() < 4.5 / np.sqrt(len(off))
+    later = (step_of(target, start=start, tick=4) - A @ start) / deviation
+    assert np.abs((off * later).mean(axis=0)).max() < 4.5 / np.sqrt(len(off))
+
+
+def test_without_noise_a_target_keeps_its_velocity():
+    start = np.array([[1.0, 2.0], [0.5, -1.0]])
+    moved = step_of(target_of(intensity=0.0), start=start, swarms=3)
+    np.testing.assert_allclose(moved, np.broadcast_to([start[0] + 0.1 * start[1], start[1]], (3, 2, 2)))
+    run = rehearse(
+        plan_of(
+            NAME, *COARSE, "time.duration=0.3", "target.intensity=0", "target.position=[1,2]", "target.velocity=[3,0]"
+        )
+    )
+    centre = run.arrays["target"] - run.plan.world.formation.nominal
+    expected = np.array([1.0, 2.0]) + np.arange(30)[:, None] * 0.01 * np.array([3.0, 0.0])
+    np.testing.assert_allclose(centre, np.broadcast_to(expected[:, None], centre.shape), atol=1e-12)
+
+
+class Detection(NamedTuple):
+    """Which agent's detector, when it began and was done, by which method, and how far off it was."""
+
+    agent: int
+    begun: int
+    over: int
+    method: int
+    off: np.ndarray
+
+
+@cache
+def detections(agents=60, ticks=400):
+    target = target_of(2, (7, 3), (0.04, 0.25))
+    chase_of, who = pursued.Pursuit(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
+    chase, made = chase_of.begin(1, agents), []
+    began, method, where = np.zeros(agents, dtype=int), None, []
+    for tick in range(ticks):
+        said = chase_of.sighting(tick, 11, who, chase)
+        where.append(chase.target[0, 0])
+        for agent in np.flatnonzero(said.done).tolist():
+            off = said.position[agent] - where[began[agent]]
+            made.append(Detection(agent, int(began[agent]), tick, int(method[agent]), off))
+            began[agent] = tick
+        if method is not None:
+            # A detector keeps its method until it is done.
+            assert (said.done | (said.method == method)).all()
+        else:
+            assert not said.done.any()
+        method = said.method
+        chase = chase_of.step(tick, 11, who, chase)
+    return made, target
+
+
+def test_detections_are_done_a_latency_after_they_began():
+    made, target = detections()
+    assert len(made) > 3000
+    for one in made:
+        assert one.over - one.begun == target.latencies[one.method]
+    # Not all together.
+    assert len({tuple(each.over for each in made if each.agent == agent) for agent in range(10)}) == 10
+
+
+def test_what_is_found_is_where_the_target_was_as_surely_as_the_method_says():
+    made, target = detections()
+    for method in range(2):
+        off = np.array([one.off for one in made if one.method == method]) / np.sqrt(target.variances[method])
+        assert np.abs(off.mean(axis=0)).max() < 4.5 / np.sqrt(len(off))
+        np.testing.assert_allclose(np.cov(off.T), np.eye(2), atol=4.5 * np.sqrt(2 / len(off)))
+
+
+def test_methods_are_about_equally_frequent_whatever_came_before():
+    made, _ = detections()
+    chosen = np.array([one.method for one in made])
+    assert abs(chosen.mean() - 0.5) < 4 * 0.5 / np.sqrt(len(chosen))
+    for agent in range(60):
+        assert sum(one.agent == agent for one in made) > 10
+    following = [
+        (one.method, other.method)
+        for agent in range(60)
+        for one, other in pairwise(each for each in made if each.agent == agent)
+    ]
+    after = np.array([second for first, second in following if first == 0])
+    assert abs(after.mean() - 0.5) < 4 * 0.5 / np.sqrt(len(after))
+
+
+SEEDS = (1, 7, 2**63 + 5)
+
+
+@pytest.mark.parametrize("air", [(), ("network.availability=0.7", "network.delay_ticks=2")], ids=["clear", "lossy"])
+def test_every_swarm_side_by_side_meets_the_draws_that_it_meets_alone(air):
+    short = (*COARSE, "time.duration=0.6", *air)
+    plan = plan_of(NAME, *short)
+    batch = side_by_side(plan, SEEDS)
+    together = History(batch.world, len(batch.channels), batch.reports)
+    Swarm(batch).fly(together.extend, 20)
+    flown = together.arrays()
+    for place, seed in enumerate(SEEDS):
+        alone = rehearse(plan_of(NAME, *short, f"seed={seed}")).arrays
+        agents = slice(10 * place, 10 * (place + 1))
+        for array in ("position", "target", "reference", "found", "variance", "information", "input"):
+            np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
+        assert np.isfinite(alone["reference"]).all()
+
+
+def test_the_runs_of_a_study_are_looked_at_as_each_alone():
+    short = (*COARSE, "time.duration=0.5")
+    runs = fly_all(plan_of(NAME, *short), [3, 4], every=5)
+    for row, seed in enumerate((3, 4)):
+        run = rehearse(plan_of(NAME, *short, f"seed={seed}"))
+        arrays, nominal = {name: array[:50:5] for name, array in run.arrays.items()}, run.plan.world.formation.nominal
+        target = arrays["target"] - nominal
+        Q, y = unpacked(arrays["information"].mean(axis=1), 2, 2)
+        ideal = np.linalg.solve(Q, y)[:, :1]
+        expected = {
+            "found": arrays["found"] - target,
+            "agreed": arrays["reference"][:, :, 0] - target,
+            "ideal": np.broadcast_to(ideal, target.shape) - target,
+            "apart": arrays["reference"][:, :, 0] - ideal,
+            "behind": arrays["position"] - nominal - arrays["reference"][:, :, 0],
+            "effort": arrays["input"],
+        }
+        for name, off in expected.items():
+            rms = np.sqrt((off**2).sum(axis=-1).mean(axis=-1))
+            np.testing.assert_allclose(getattr(runs, name)[row], rms, rtol=1e-9, atol=1e-12, err_msg=name)
+    assert np.isnan(runs.localization).all()
+    assert runs.place.shape == (10, 0, 0)
+
+
+LONG = (
+    "time.dt=0.02",
+    "time.duration=6",
+    "target.latencies=[0.2,0.1]",
+    "target.intensity=1e-6",
+    "formation.spread=0.5",
+)
+
+
+CERTAIN = "agents.parameters.target={fuse_information=false,prior_derivatives=0.02}"
+
+
+def test_in_flight_agents_surround_the_target():
+    run = rehearse(plan_of(NAME, *LONG, CERTAIN))
+    # The error is that of places about the target, and falls to that of its detection.
+    assert run.error[0] > 0.2
+    assert run.error[-1] < 0.05
+    off = run.position - run.arrays["target"]
+    np.testing.assert_allclose((off**2).sum(axis=-1).mean(axis=-1), run.error, rtol=1e-9)
+
+
+def test_a_first_order_target_is_followed_by_single_integrators():
+    run = rehearse(plan_of(NAME, *LONG, *SINGLE, ALONE, "target.order=1"))
+    assert run.arrays["reference"].shape[2:] == (2, 2)
+    assert run.error[-1] < 0.02 < run.error[0]
+
+
+def test_in_three_dimensions_a_target_is_followed_too():
+    solid = "formation={nodes=[[1,0,0],[-1,0,0.5],[0,1,2]],edges=['1-2','2-3'],leaders=[],spread=0.5}"
+    run = rehearse(plan_of(NAME, *LONG[:-1], solid, CERTAIN))
+    assert run.arrays["reference"].shape[1:] == (3, 3, 3)
+    assert run.arrays["information"].shape[1:] == (3, 9)
+    assert run.error[-1] < 0.05 < 0.2 < run.error[0]
+
+
+# Reports
+
+
+@dataclass(frozen=True)
+class Reporting(NoEstimator):
+    """Says something under a name that is given."""
+
+    name: str = "said"
+
+    def fuse(self, brief, state, heard, own):
+        state, estimate = super().fuse(brief, state, heard, own)
+        number = np.arange(estimate.known.shape[0] * 3.0).reshape(-1, 3)
+        return state, estimate._replace(reports={self.name: number})
+
+
+def reporting(name):
+    return 'agents.estimator="test_pursuit:Reporting"', f'agents.parameters.test_pursuit:Reporting.name="{name}"'
+
+
+@pytest.mark.parametrize("name", ["position", "error", "fates", "target", "psi", "known"])
+def test_a_report_with_a_name_that_every_run_has_is_refused(name):
+    said = refusal(*reporting(name), name="localization")
+    assert f"reports {name}, which every run has already" in said
+
+
+def test_reports_land_in_the_arrays_by_name_and_are_no_numbers_for_who_is_dead():
+    dead = timeline({"verb": "kill", "at": 0.05, "agents": [5]}, {"verb": "restart", "at": 0.1, "agents": [5]})
+    run = rehearse(plan_of("localization", "time.duration=0.2", dead, *reporting("says")))
+    said = run.arrays["says"]
+    assert said.shape == (20, 10, 3)
+    assert run.plan.reports == {"says": (3,)}
+    gone = np.isnan(said).all(axis=-1)
+    np.testing.assert_array_equal(np.flatnonzero(gone[:, 4]), range(5, 10))
+    assert not np.delete(gone, 4, axis=1).any()
+    np.testing.assert_array_equal(said[0], np.arange(30.0).reshape(10, 3))
+
+
+def test_who_pursues_tells_where_and_how_surely():
+    dead = timeline({"verb": "kill", "at": 0.05, "agents": [5]})
+    arrays = rehearse(plan_of(NAME, *COARSE, "time.duration=0.1", dead)).arrays
+    shapes = {"reference": (3, 2), "found": (2,), "variance": (), "information": (7,)}
+    for name, shape in shapes.items():
+        assert arrays[name].shape == (10, 10, *shape)
+        assert np.isnan(arrays[name][5:, 4]).all()
+        assert np.isfinite(arrays[name][:5]).all()
+        assert np.isfinite(np.delete(arrays[name], 4, axis=1)).all()
+
+
+# Recordings
+
+
+@cache
+def recorded(out):
+    return RrdReader(str(out / "run.rrd")).stream().to_chunks()
+
+
+def column(chunks, path, name):
+    found = [chunk.to_record_batch() for chunk in chunks if str(chunk.entity_path) == path and not chunk.is_static]
+    return [value for batch in found if name in batch.schema.names for value in batch.column(name).to_pylist()]
+
+
+@pytest.fixture(scope="module")
+def pursuit_on_file(tmp_path_factory):
+    out = tmp_path_factory.mktemp("pursuit") / "run"
+    dead = timeline({"verb": "kill", "at": 0.25, "agents": [5]})
+    fly(plan_of(NAME, *COARSE, "time.duration=0.4", dead), "inprocess", out, lambda *_: None)
+    return out
+
+
+def test_a_recording_of_a_pursuit_shows_the_target_and_what_agents_know_of_it(pursuit_on_file):
+    chunks, arrays = recorded(pursuit_on_file), dict(np.load(pursuit_on_file / "arrays.npz"))
+    kept = {name: array[:40:5] for name, array in arrays.items()}
+    nominal = plan_of(NAME, *COARSE).world.formation.nominal
+    points = {
+        path: np.array(column(chunks, f"/swarm/{path}/at", "Points3D:positions"))
+        for path in ("target", "found", "agreed")
+    }
+    target = (kept["target"] - nominal)[:, :1]
+    np.testing.assert_allclose(points["target"][..., :2], target, atol=1e-5)
+    np.testing.assert_allclose(points["found"][..., :2], kept["found"], atol=1e-5)
+    np.testing.assert_allclose(points["agreed"][..., :2], kept["reference"][:, :, 0], atol=1e-5)
+    told = np.array(column(chunks, "/metrics/target", "Scalars:scalars"))
+    expected = [
+        np.sqrt(((each - target) ** 2).sum(axis=-1).mean(axis=-1))
+        for each in (kept["found"], kept["reference"][:, :, 0])
+    ]
+    np.testing.assert_allclose(told[:5], np.stack(expected, axis=-1)[:5], rtol=1e-6, atol=1e-9)
+    strips = column(chunks, "/swarm/agreed/spread", "LineStrips3D:strips")
+    assert [len(moment) for moment in strips] == [10] * 8
+    away = np.linalg.norm(np.array(strips[4])[..., :2] - kept["reference"][4, :, None, 0], axis=-1)
+    np.testing.assert_allclose(away, 2 * np.sqrt(kept["variance"][4])[:, None].repeat(25, 1), rtol=1e-4)
+
+
+def test_a_recording_of_another_flight_shows_no_pursuit_and_no_places(tmp_path):
+    mute = plan_of("localization", "time.duration=0.1", 'agents.estimator="none"')
+    fly(mute, "inprocess", tmp_path / "run", lambda *_: None)
+    paths = {str(chunk.entity_path) for chunk in recorded(tmp_path / "run")}
+    assert not paths & {"/swarm/agreed/at", "/metrics/target", "/swarm/place", "/metrics/localization"}
+
+
+def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(tmp_path):
+    blind = timeline({"verb": "cut", "at": 0, "until": 1.0, "links": ["all"]})
+    out = tmp_path / "run"
+    fly(plan_of("localization", "time.duration=1.5", blind), "inprocess", out, lambda *_: None)
+    chunks, arrays = recorded(out), dict(np.load(out / "arrays.npz"))
+    place, best = (
+        np.array(column(chunks, f"/swarm/{path}", "Points3D:positions"), dtype=float) for path in ("place", "optimal")
+    )
+    assert place.shape == best.shape == (30, 10, 3)
+    off = np.array(column(chunks, "/metrics/localization", "Scalars:scalars"), dtype=float)[:, 0]
+    # Before anything was measured, there is no best answer.
+    assert np.isnan(off[:5]).all()
+    assert np.isfinite(off[20:]).all()
+    here = np.sqrt(((place - best) ** 2).sum(axis=-1).mean(axis=-1))
+    np.testing.assert_allclose(off[20:], here[20:], rtol=1e-4, atol=1e-6)
+    assert off[20] > off[-1] > 0.0
+    # They are drawn where agents are, and not at the origin of the common frame.
+    moved = place[..., :2] - arrays["place"][:150:5]
+    np.testing.assert_allclose(moved[20:], np.broadcast_to(moved[20:, :1], moved[20:].shape), atol=1e-5)
+    away = np.linalg.norm(place[-1, :, :2] - arrays["position"][-1], axis=-1)
+    assert away.max() < 3.0 < np.linalg.norm(arrays["place"][-1] - arrays["position"][-1], axis=-1).min()
+    strips = column(chunks, "/swarm/measured", "LineStrips3D:strips")
+    assert [len(moment) for moment in strips] == [28]
+    assert {len(line) for line in strips[0]} == {25}
+
+
+# Over processes
+
+
+@PROCESSES
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        (NAME, (*COARSE, "time.duration=0.5", "network.availability=0.9")),
+        ("localization", ("time.duration=0.5", "network.availability=0.5")),
+    ],
+    ids=["target", "localization"],
+)
+def test_processes_give_the_bits_of_one_process(name, overrides, out):
+    outcome = fly(plan_of(name, *overrides), "processes", out, lambda *_: None)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of(name, *overrides)
+    # Losses that do nothing agree as well.
+    assert outcome.digest != digest_of(name, *overrides[:-1])
