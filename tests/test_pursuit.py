@@ -340,7 +340,7 @@ def test_a_detection_that_is_taken_in_changes_no_derivative_of_the_smooth_output
 
 def test_after_a_pause_an_estimate_is_as_unsure_as_it_is_old():
     target, dt = target_of(2, (20, 10), (0.02, 0.1)), 0.05
-    flown = [one for one in watch(OPTIMAL, target, ticks=120)]
+    flown = list(watch(OPTIMAL, target, ticks=120))
     done = [tick for tick, one in enumerate(flown) if one.sighting.done[0]]
     before, after = done[1], done[3]  # it misses what is done in between
     alone = replace(brief(np.zeros((1, 1, 2))), dt=dt, target=target)
