@@ -1,5 +1,6 @@
 """The property of the house: a batch of agents, or of runs, gives bit for bit what each gives alone."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
 
@@ -15,6 +16,7 @@ from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.imm import InteractingMultipleModel
 from agents.estimators.joint_kf import JointEdgeFilter
+from agents.estimators.jor import JacobiOverRelaxation
 from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
@@ -44,6 +46,7 @@ ESTIMATORS = {
     "mmse": MinimumMeanSquareError(),
     "edge-kf": EdgeKalmanFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
     "joint-kf": JointEdgeFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
+    "jor": JacobiOverRelaxation(),
 }
 LAWS = {
     "static": Static(),
@@ -130,7 +133,7 @@ def odometry(agent, velocity):
 
 def leaves(value):
     """Every array in a state, an action or a broadcast, in order."""
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return [leaf for name in sorted(value) for leaf in leaves(value[name])]
     if isinstance(value, tuple | list):
         return [leaf for entry in value for leaf in leaves(entry)]

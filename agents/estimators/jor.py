@@ -87,7 +87,7 @@ class JacobiOverRelaxation:
     ) -> tuple[Belief, Estimate]:
         """One iteration (13)."""
         said = heard[PLACE]
-        here = brief.back[..., None]
+        here = np.broadcast_to(brief.back, said.fresh.shape)[..., None]
         of_me = np.take_along_axis(said.fields["measured"], here[..., None], axis=-2)[..., 0, :]
         seen = np.take_along_axis(said.fields["seen"], here, axis=-1)[..., 0]
         # Who restarts measures anew, and says so in every message: both ends then go by that.
