@@ -137,6 +137,7 @@ def zhao7():
         sensor=Sensor("coordinates", 0.01 * np.eye(2)),
         process=np.zeros((7, 8, 8)),
         leader=formation.is_leader,
+        target=None,
         mission=corridor(np.arange(0, 125, 0.01)),
     )
 

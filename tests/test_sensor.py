@@ -307,7 +307,7 @@ def test_no_covariance_for_all_is_right_for_near_and_far_neighbours():
     found = []
     for believed in (plan.world.sensor, Sensor("coordinates", mean)):
         batch = side_by_side(believing(plan, believed), range(1, 61))
-        flown = History(batch.world, len(batch.channels))
+        flown = History(batch.world, len(batch.channels), batch.reports)
         Swarm(batch).fly(flown.extend, 20)
         arrays, neighbours = flown.arrays(), batch.world.links.neighbours
         position = arrays["position"][-2]

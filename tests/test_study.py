@@ -229,7 +229,7 @@ def made_up(labels, **quantities):
     shape = (5, 4)
     rest = {name: np.full(shape, 7e7) for name in study.NAMES}
     rest |= {name: np.broadcast_to(values, shape) for name, values in quantities.items()}
-    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), **rest)
+    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), place=np.zeros((4, 0, 0)), **rest)
     return study.Result(labels, None, runs)
 
 

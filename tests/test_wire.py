@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from agents.brief import Brief
 from agents.process import AgentBrief, Choice
 from analysis.affine import Manoeuvre
+from analysis.pursuit import Target
 from analysis.sensor import Sensor
 from netem import wire
 from netem.delay import Law
@@ -37,6 +38,7 @@ MESSAGES = [
         measured=[[0.5, -1.0]],
         position=[[1.0, 2.0], [0.5, 3.0]],
         velocity=[[0.25, 0.0], [0.0, -4.0]],
+        sightings=[{"position": [1.5, 2.0], "done": True, "by": 0, "method": 1}] * 2,
         fired=[1],
     ),
     wire.SenseInbox(
@@ -49,6 +51,7 @@ MESSAGES = [
         measured=[[0.5, 1.0]],
         position=None,
         velocity=[0.25, 0.0],
+        sighting={"position": [1.5, 2.0], "done": True, "by": 0, "method": 1},
     ),
     wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
     wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
@@ -298,6 +301,7 @@ BRIEF = Brief(
     sensor=Sensor("coordinates", 0.01 * np.eye(2)),
     process=1e-6 * np.arange(36.0).reshape(6, 6),
     leader=np.array(False),
+    target=Target(2, 1.0, np.array([100, 50]), np.array([0.01, 0.1])),
     mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),
 )
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
@@ -331,7 +335,7 @@ MEDIUM = MediumBrief(
     triggers=(Trigger(level=2.0, above=True, ticks=4), Trigger(level=0.1, above=False, ticks=1)),
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
-    leaders=np.array([True, False, False]),
+    positioned=np.array([True, False, False]),
     patience_s=10.0,
 )
 

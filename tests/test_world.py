@@ -34,7 +34,7 @@ QUIET = under()
 
 
 def scene(position, velocity=REST, measured=UNSEEN):
-    return Scene(position, velocity, measured, np.zeros_like(position))
+    return Scene(position, velocity, measured, np.zeros_like(position), None)
 
 
 def pushes(deviation):
@@ -59,6 +59,7 @@ def world():
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
         sensor=Sensor("coordinates", 0.01 * np.eye(2)),
         disturbance=pushes(0.0),
+        pursuit=None,
         start="targets",
         spread=1.0,
         swarms=1,
@@ -102,7 +103,7 @@ def test_noise_is_added_to_what_is_sensed_wherever_the_agents_are(world):
 def test_noise_of_a_link_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges))
-    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3]), under(links=small.links)
+    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3], None), under(links=small.links)
     for tick in (0, 1, 64, 5000):
         large_noise, small_noise = world.measure(tick, scene(REST), QUIET), small.measure(tick, three, nothing)
         for link, row in small.links.index.items():
@@ -229,7 +230,7 @@ def test_disturbance_of_an_agent_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges), disturbance=pushes(0.2))
     seven = moved(replace(world, disturbance=pushes(0.2)), 9, REST, REST)
-    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3])
+    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3], None)
     after = small.step(9, three, nothing, REST[:3], under(links=small.links))
     assert after.position.tobytes() == seven[:3].tobytes()
 
