@@ -13,8 +13,8 @@ from affinet.inprocess import Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import consistency, metrics
-from netem.fate import Fate
 from netem.links import Mask
+from world.edges import of_swarms
 from world.formation import Array
 from world.history import Moment
 
@@ -109,17 +109,23 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
     """What is kept of a tick of all runs of a plan; `of_runs` splits what begins with all agents into (R, N)."""
-    formation, links, sensor = plan.world.formation, plan.world.links, plan.world.sensor
+    formation = plan.world.formation
     nominal = formation.nominal[: formation.agents // plan.world.swarms]
-    true = moment.position[:, None] - moment.position[links.neighbours]
-    measured, arrived = moment.measured[links.slots], (moment.fates[0] == Fate.DELIVERED)[links.slots]
-    edges = (moment.estimate, true, measured, moment.covariance, moment.known, moment.known & arrived)
-    estimate, true, measured, covariance, known, seen = map(of_runs, edges)
+    edges = of_swarms(
+        plan.world,
+        position=moment.position,
+        measured=moment.measured,
+        fates=moment.fates[0],
+        estimate=moment.estimate,
+        covariance=moment.covariance,
+        known=moment.known,
+    )
+    innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
     return {
         "psi": of_runs(moment.psi),
         "procrustes": metrics.procrustes_error(of_runs(moment.position), nominal, present),
-        "estimation_error": metrics.estimation_error(estimate, true, known),
-        "covariance_trace": metrics.covariance_trace(covariance, formation.dimension),
-        "nees": consistency.of_errors(estimate, true, covariance, known).mean,
-        "nis": consistency.of_innovations(estimate, measured, covariance, sensor.spread(measured), seen).mean,
+        "estimation_error": metrics.estimation_error(edges.estimate, edges.true, edges.known),
+        "covariance_trace": metrics.covariance_trace(edges.covariance, formation.dimension),
+        "nees": consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known).mean,
+        "nis": innovations.mean,
     }

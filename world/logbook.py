@@ -56,10 +56,7 @@ class Logbook:
             self._recorder = Recorder(
                 out / RECORDING,
                 run=run,
-                formation=world.formation,
-                links=world.links,
-                sensor=world.sensor,
-                dt=world.dt,
+                world=world,
                 every=books.every,
                 viewer=books.viewer,
             )

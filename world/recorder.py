@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from analysis import consistency
 from analysis.metrics import procrustes_error
-from analysis.sensor import Sensor
 from netem.fate import REASONS, Fate, Fates
-from netem.links import Links
 from netem.timeline import Conditions, Timeline
+from world.edges import of_swarms
 from world.formation import Array, Formation
 from world.history import Moments
 from world.realised import Realised
+from world.world import World
 
 _TIMELINE = "sim_time"
 
@@ -45,7 +45,6 @@ _LINK_COLOURS = {
     Fate.LOST: 0xFF9F1CFF,
     Fate.OVERFLOW: 0x26C6DAFF,
 }
-_LEVEL = 0.95  # of the band of consistent filters, in which edges count as independent
 _COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
 
 
@@ -58,10 +57,8 @@ class Recorder:
         Of the recording.
     run
         Its name.
-    formation, links, sensor
-        Who flies, who is linked to whom, and what measures the edges.
-    dt
-        Tick, in seconds.
+    world
+        What is flown.
     every
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
@@ -73,22 +70,19 @@ class Recorder:
         path: Path,
         *,
         run: str,
-        formation: Formation,
-        links: Links,
-        sensor: Sensor,
-        dt: float,
+        world: World,
         every: int,
         viewer: str | None = None,
     ) -> None:
-        self._formation = formation
-        self._links = links
-        self._sensor = sensor
-        self._dt = dt
+        self._world = world
+        self._formation = world.formation
+        self._links = world.links
+        self._dt = world.dt
         self._every = every
-        self._edges = np.array(formation.edges, dtype=np.int64) - 1
+        self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
         self._stream = rr.RecordingStream("affinet", recording_id=run)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
-        self._stream.set_sinks(*sinks, default_blueprint=_blueprint(formation))
+        self._stream.set_sinks(*sinks, default_blueprint=_blueprint(world.formation))
         self._log_static()
         self._stream.flush()  # what a killed run leaves can be read from the first tick on
 
@@ -134,7 +128,7 @@ class Recorder:
             (
                 "metrics/consistency",
                 rr.SeriesLines(
-                    names=["NEES", "NIS", f"{_LEVEL:.0%} from", f"{_LEVEL:.0%} to"],
+                    names=["NEES", "NIS", *(f"{consistency.DRAWN:.0%} {end}" for end in ("from", "to"))],
                     colors=np.array([0x3DDC84FF, 0x3FA7F5FF, 0xAAAAAAFF, 0xAAAAAAFF], dtype=np.uint32),
                 ),
             ),
@@ -191,17 +185,20 @@ class Recorder:
         self._scalars("graph/rigidity", time, counts.astype(np.float64))
 
     def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
-        links, position, estimate = self._links, moments.position[kept], moments.estimate[kept]
-        known, covariance = moments.known[kept], moments.covariance[kept]
-        true = position[:, :, None] - position[:, links.neighbours]
-        measured, arrived = moments.measured[kept][:, links.slots], moments.fates[kept, 0][:, links.slots]
-        errors = consistency.of_errors(estimate, true, covariance, known)
-        innovations = consistency.of_innovations(
-            estimate, measured, covariance, self._sensor.spread(measured), known & (arrived == Fate.DELIVERED)
+        edges = of_swarms(
+            self._world,
+            position=moments.position[kept],
+            measured=moments.measured[kept],
+            fates=moments.fates[kept, 0],
+            estimate=moments.estimate[kept],
+            covariance=moments.covariance[kept],
+            known=moments.known[kept],
         )
-        dimension = position.shape[-1]
-        bands = [consistency.band(_LEVEL, dimension, max(number, 1)) for number in errors.number.tolist()]
-        self._scalars("metrics/consistency", time, np.column_stack([errors.mean, innovations.mean, np.array(bands)]))
+        errors = consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known)
+        innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+        number = np.maximum(errors.number, 1)
+        bands = consistency.band(consistency.DRAWN, self._formation.dimension, number)
+        self._scalars("metrics/consistency", time, np.concatenate([errors.mean, innovations.mean, *bands], axis=-1))
 
     def _messages_per_tick(self, moments: Moments) -> Array:
         starts = np.arange(0, len(moments.ticks), self._every)
