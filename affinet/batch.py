@@ -16,9 +16,9 @@ from analysis import consistency, metrics
 from analysis.localization import Edges, centroid, distance, ringing, weights
 from analysis.pursuit import REPORTS, position
 from netem import channels
-from netem.fate import Fate
 from netem.links import Mask
 from netem.timeline import Timeline
+from world.edges import of_swarms
 from world.formation import Array
 from world.history import Moment
 from world.localized import FirstMeasurements
@@ -177,19 +177,25 @@ class _Places:
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
     """What is kept of a tick of all runs of a plan; `of_runs` splits what begins with all agents into (R, N)."""
-    formation, links, sensor = plan.world.formation, plan.world.links, plan.world.sensor
+    formation = plan.world.formation
     nominal = formation.nominal[: formation.agents // plan.world.swarms]
-    true = moment.position[:, None] - moment.position[links.neighbours]
-    measured, arrived = moment.measured[links.slots], (moment.fates[0] == Fate.DELIVERED)[links.slots]
-    edges = (moment.estimate, true, measured, moment.covariance, moment.known, moment.known & arrived)
-    estimate, true, measured, covariance, known, seen = map(of_runs, edges)
+    edges = of_swarms(
+        plan.world,
+        position=moment.position,
+        measured=moment.measured,
+        fates=moment.fates[0],
+        estimate=moment.estimate,
+        covariance=moment.covariance,
+        known=moment.known,
+    )
+    innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
     return {
         "psi": of_runs(moment.psi),
         "procrustes": metrics.procrustes_error(of_runs(moment.position), nominal, present),
-        "estimation_error": metrics.estimation_error(estimate, true, known),
-        "covariance_trace": metrics.covariance_trace(covariance, formation.dimension),
-        "nees": consistency.of_errors(estimate, true, covariance, known).mean,
-        "nis": consistency.of_innovations(estimate, measured, covariance, sensor.spread(measured), seen).mean,
+        "estimation_error": metrics.estimation_error(edges.estimate, edges.true, edges.known),
+        "covariance_trace": metrics.covariance_trace(edges.covariance, formation.dimension),
+        "nees": consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known).mean,
+        "nis": innovations.mean,
         **_pursued(plan, moment, of_runs),
     }
 

@@ -211,8 +211,7 @@ def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
         if not tested.any():
             return Finding(name, "vacuous", None, "no edge was estimated")
         dimension = evidence.plan.world.formation.dimension
-        bands = {count: consistency.band(level, dimension, count) for count in np.unique(number[tested]).tolist()}
-        low, high = np.array([bands.get(count, (-np.inf, np.inf)) for count in number.tolist()]).T
+        low, high = consistency.band(level, dimension, np.maximum(number, 1))
         inside = (mean >= low) & (mean <= high)
         share, least = inside[tested].mean(), level - _STANDARD_ERRORS * np.sqrt(level * (1.0 - level) / tested.sum())
         says = (

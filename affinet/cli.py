@@ -12,13 +12,13 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, files, fit, scenario, show
+from affinet import compare, fit, options, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
@@ -38,9 +38,9 @@ PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     sys.path.append(os.getcwd())  # so that "module:Class" finds what lies beside the scenario
-    parsed = _parser().parse_args(arguments)
+    parsed = options.parser().parse_args(arguments)
     try:
-        status: int = parsed.command(parsed)
+        status = _COMMANDS[parsed.command](parsed)
     except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
         print(error, file=sys.stderr)  # noqa: T201
         return BAD_INPUT
@@ -50,154 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="affinet", description="Fly a swarm of agents through a network that loses, delays and cuts."
-    )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
-    check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")
-    replay = commands.add_parser("replay", help="fly again what was flown, and compare")
-    determinism = commands.add_parser(
-        "check-determinism", help="fly a scenario twice in process and once over processes, and compare every bit"
-    )
-    for command in (run, check, determinism):
-        command.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(scenario.shipped())}")
-    replay.add_argument("directory", type=Path, metavar="DIR", help="the run directory")
-    replay.add_argument(
-        "--verdicts",
-        action="store_true",
-        help="take every verdict from its journal, whatever the seed; without it the models decide again",
-    )
-    for command in (run, check, determinism, replay):
-        _add_overrides(command)
-    for command in (run, replay):
-        command.add_argument(
-            "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
-        )
-        command.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
-        command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
-    _add_hunt(commands)
-    _add_study(commands)
-    _add_fit(commands)
-    run.set_defaults(command=_run)
-    check.set_defaults(command=_check)
-    replay.set_defaults(command=_replay)
-    determinism.set_defaults(command=_check_determinism)
-    _add_inject(commands)
-    return parser
-
-
-def _add_overrides(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="override any key, like time.dt=0.02"
-    )
-    command.add_argument("--estimator", metavar="NAME", help="agents.estimator")
-    command.add_argument(
-        "--availability", metavar="P", help="network.availability, the probability that a message gets through"
-    )
-    command.add_argument("--seed", metavar="N", help="seed")
-    command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
-    command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
-
-
-def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    inject = commands.add_parser("inject", help="change the air of a run while it flies over processes")
-    inject.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
-    verbs = inject.add_subparsers(dest="verb", required=True, metavar="VERB")
-    cut = verbs.add_parser("cut", help="links that carry nothing: 1-2, 1->2, leaders->followers")
-    cut.add_argument("links", nargs="+")
-    partition = verbs.add_parser("partition", help="groups between which nothing passes: 1,2,3/4,5,6,7")
-    partition.add_argument("groups", type=_groups)
-    lose = verbs.add_parser("lose", help="a probability with which messages are lost on top")
-    lose.add_argument("loss", type=float, metavar="P")
-    lose.add_argument("--links", nargs="+", default=["all"], help="default: all")
-    for verb in (cut, partition, lose):
-        verb.add_argument(
-            "--for", dest="lasts", type=float, metavar="S", help="simulated seconds (default: until healed)"
-        )
-    for verb in (cut, partition):
-        verb.add_argument(
-            "--in-flight", choices=["drop", "deliver", "hold"], default="drop", help="default: %(default)s"
-        )
-    verbs.add_parser("heal", help="end what was injected; what the scenario scripts stays")
-    verbs.add_parser("show", help="what is imposed now")
-    inject.set_defaults(command=_inject)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
-    return int(text)
-
-
-def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    hunt = commands.add_parser(
-        "hunt",
-        help="look for the smallest fault that breaks an invariant",
-        description="Draw schedules of faults, fly them in process, and shrink the first that breaks an invariant; "
-        "the smallest is written as a scenario and confirmed over processes. Exit status 1 when one was found.",
-    )
-    hunt.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(scenario.shipped())}")
-    _add_overrides(hunt)
-    hunt.add_argument(
-        "--invariant",
-        required=True,
-        action="append",
-        metavar="CHECKER",
-        help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'",
-    )
-    hunt.add_argument(
-        "--budget", type=_count, default=100, metavar="N", help="schedules to draw (default: %(default)s)"
-    )
-    hunt.add_argument(
-        "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
-    )
-    hunt.add_argument(
-        "--out", type=Path, metavar="FILE", help="the smallest, as a scenario (default: hunted-SCENARIO.toml)"
-    )
-    hunt.set_defaults(command=_hunt)
-
-
-def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    study = commands.add_parser(
-        "study",
-        help="fly a scenario over a grid of settings and many seeds; a figure, and a verdict on every claim",
-        description="Exit status 0 whatever the verdicts on the claims: that a claim does not hold is a finding.",
-    )
-    study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
-    study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
-    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME")
-    study.set_defaults(command=_study)
-
-
-def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    fitting = commands.add_parser(
-        "fit", help="an autoregressive model of the inputs of a run, for filters that predict them"
-    )
-    fitting.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
-    fitting.add_argument(
-        "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
-    )
-    fitting.add_argument("--json", action="store_true", help="print one JSON object")
-    fitting.set_defaults(command=_fit)
-
-
-def _groups(text: str) -> tuple[tuple[int, ...], ...]:
-    try:
-        return tuple(tuple(int(agent) for agent in group.split(",")) for group in text.split("/"))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: write groups of agents as 1,2,3/4,5,6,7") from error
-
-
 def _overrides(parsed: argparse.Namespace) -> list[str]:
-    options = {
+    given = {
         "agents.estimator": parsed.estimator,
         "network.availability": parsed.availability,
         "seed": parsed.seed,
         "time.duration": parsed.duration,
     }
-    return [*parsed.set, *(f"{key}={value}" for key, value in options.items() if value is not None)]
+    return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
 
 
 def _check(parsed: argparse.Namespace) -> int:
@@ -350,6 +210,17 @@ def _inject(parsed: argparse.Namespace) -> int:
     show.answer(answer, flown.time.dt)
     return PASS
 
+
+_COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
+    "run": _run,
+    "check": _check,
+    "replay": _replay,
+    "check-determinism": _check_determinism,
+    "hunt": _hunt,
+    "study": _study,
+    "fit": _fit,
+    "inject": _inject,
+}
 
 if __name__ == "__main__":
     sys.exit(main())

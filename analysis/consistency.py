@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+DRAWN = 0.95  # how probable the bands of pictures are
 # A smallest eigenvalue below this is what rounding leaves of nothing (of the trace), and of a difference (of R's).
 _SINGULAR, _CANCELLED = 1e-12, 1e-6
 
@@ -34,8 +35,7 @@ def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> N
     known
         Which edges are estimated, shape (..., N, n).
     """
-    error = np.where(known[..., None], estimate - true, 0.0)
-    return _averaged(_normalised(error, _certain(whole(covariance), known)), known)
+    return _averaged(nees(np.where(known[..., None], estimate - true, 0.0), covariance), known)
 
 
 def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array, seen: Mask) -> Normalised:
@@ -56,15 +56,16 @@ def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array
     seen
         Which edges were measured and are estimated, shape (..., N, n).
     """
-    left = _certain(R - whole(covariance), seen)
-    lost = ~_finite(left) | ~np.isfinite(estimate).all(axis=-1)
-    filtered = seen & (lost | (_smallest(left) > _CANCELLED * _smallest(R)))
+    left = R - whole(covariance)
+    smallest = _smallest(left)
+    lost = np.isnan(smallest) | ~np.isfinite(estimate).all(axis=-1)
+    filtered = seen & (lost | (smallest > _CANCELLED * _smallest(R)))
     residual = np.where(filtered[..., None], measured - estimate, 0.0)
-    return _averaged(_normalised(residual, _certain(left, filtered)), filtered)
+    return _averaged(_normalised(residual, left, smallest), filtered)
 
 
-def band(level: float, dimension: int, number: int) -> tuple[float, float]:
-    """Between which values the mean of independent normalised errors lies with a probability.
+def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]:
+    """Between which values the mean of independent normalised errors lies with a probability, each of shape (...).
 
     Parameters
     ----------
@@ -73,11 +74,11 @@ def band(level: float, dimension: int, number: int) -> tuple[float, float]:
     dimension
         Degrees of freedom of each.
     number
-        How many are averaged.
+        How many are averaged, shape (...).
     """
-    upper_tails = np.array([(1.0 + level) / 2, (1.0 - level) / 2])
-    low, high = chdtri(dimension * number, upper_tails) / number
-    return float(low), float(high)
+    averaged = np.asarray(number)
+    low, high = (chdtri(dimension * averaged, tail) / averaged for tail in ((1.0 + level) / 2, (1.0 - level) / 2))
+    return low, high
 
 
 def nees(error: Array, covariance: Array) -> Array:
@@ -90,7 +91,8 @@ def nees(error: Array, covariance: Array) -> Array:
     covariance
         Upper triangles of their covariances, shape (..., D (D + 1) / 2).
     """
-    return _normalised(error, whole(covariance))
+    matrix = whole(covariance)
+    return _normalised(error, matrix, _smallest(matrix))
 
 
 def whole(triangles: Array) -> Array:
@@ -102,29 +104,20 @@ def whole(triangles: Array) -> Array:
     return matrices
 
 
-def _normalised(error: Array, covariance: Array) -> Array:
-    finite = _finite(covariance)
-    trace = np.where(finite, np.trace(covariance, axis1=-2, axis2=-1), 1.0)
-    singular = finite & (_smallest(covariance) <= _SINGULAR * trace)
-    regular = finite & ~singular
-    solved = np.linalg.solve(_certain(covariance, regular), error[..., None])[..., 0]
-    length = (error * solved).sum(axis=-1)
-    return np.where(singular, np.inf, np.where(finite, length, np.nan))
-
-
-def _finite(matrix: Array) -> Mask:
-    return np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+def _normalised(error: Array, covariance: Array, smallest: Array) -> Array:
+    """e^T P^-1 e, shape (...), of covariances with these smallest eigenvalues (...)."""
+    singular = smallest <= _SINGULAR * np.trace(covariance, axis1=-2, axis2=-1)
+    regular = ~(singular | np.isnan(smallest))
+    solvable = np.where(regular[..., None, None], covariance, np.eye(error.shape[-1]))
+    length = (error * np.linalg.solve(solvable, error[..., None])[..., 0]).sum(axis=-1)
+    return np.where(singular, np.inf, np.where(regular, length, np.nan))
 
 
 def _smallest(matrix: Array) -> Array:
     """The smallest eigenvalues of symmetric matrices, NaN where they are no numbers: LAPACK would raise."""
-    finite = _finite(matrix)
+    finite = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
     smallest = np.linalg.eigvalsh(np.where(finite[..., None, None], matrix, 0.0))[..., 0]
     return np.where(finite, smallest, np.nan)
-
-
-def _certain(covariance: Array, counted: Mask) -> Array:
-    return np.where(counted[..., None, None], covariance, np.eye(covariance.shape[-1]))
 
 
 def _averaged(normalised: Array, counted: Mask) -> Normalised:

@@ -12,13 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.consistency import band
+from analysis.consistency import DRAWN, band
 
 Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
 _LOST, _FAR = 1.0, 100.0  # m²
-_LEVEL = 0.95
 _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
@@ -79,7 +78,7 @@ def consistency(
             panel.plot(case.seconds, np.where(np.isfinite(mean), mean, np.nan), lw=0.8, label=case.labels[each])
             panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
         for panel in row:
-            panel.axhspan(*band(_LEVEL, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
+            panel.axhspan(*band(DRAWN, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
     _finish(figure, panels, title, "time (s)", "mean", each)
     for panel in panels.ravel():
         panel.set_yscale("linear")

@@ -17,6 +17,7 @@ from analysis import consistency
 from analysis.metrics import procrustes_error
 from netem.fate import REASONS, Fate, Fates
 from netem.timeline import Conditions, Timeline
+from world.edges import of_swarms
 from world.formation import Array, Formation
 from world.history import Moments
 from world.realised import Realised
@@ -45,7 +46,6 @@ _LINK_COLOURS = {
     Fate.LOST: 0xFF9F1CFF,
     Fate.OVERFLOW: 0x26C6DAFF,
 }
-_LEVEL = 0.95  # of the band of consistent filters, in which edges count as independent
 _COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
 
 
@@ -79,9 +79,9 @@ class Recorder:
         every: int,
         viewer: str | None = None,
     ) -> None:
+        self._world = world
         self._formation = world.formation
         self._links = world.links
-        self._sensor = world.sensor
         self._dt = world.dt
         self._every = every
         self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
@@ -139,7 +139,7 @@ class Recorder:
             (
                 "metrics/consistency",
                 rr.SeriesLines(
-                    names=["NEES", "NIS", f"{_LEVEL:.0%} from", f"{_LEVEL:.0%} to"],
+                    names=["NEES", "NIS", *(f"{consistency.DRAWN:.0%} {end}" for end in ("from", "to"))],
                     colors=np.array([0x3DDC84FF, 0x3FA7F5FF, 0xAAAAAAFF, 0xAAAAAAFF], dtype=np.uint32),
                 ),
             ),
@@ -196,17 +196,20 @@ class Recorder:
         self._scalars("graph/rigidity", time, counts.astype(np.float64))
 
     def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
-        links, position, estimate = self._links, moments.position[kept], moments.estimate[kept]
-        known, covariance = moments.known[kept], moments.covariance[kept]
-        true = position[:, :, None] - position[:, links.neighbours]
-        measured, arrived = moments.measured[kept][:, links.slots], moments.fates[kept, 0][:, links.slots]
-        errors = consistency.of_errors(estimate, true, covariance, known)
-        innovations = consistency.of_innovations(
-            estimate, measured, covariance, self._sensor.spread(measured), known & (arrived == Fate.DELIVERED)
+        edges = of_swarms(
+            self._world,
+            position=moments.position[kept],
+            measured=moments.measured[kept],
+            fates=moments.fates[kept, 0],
+            estimate=moments.estimate[kept],
+            covariance=moments.covariance[kept],
+            known=moments.known[kept],
         )
-        dimension = position.shape[-1]
-        bands = [consistency.band(_LEVEL, dimension, max(number, 1)) for number in errors.number.tolist()]
-        self._scalars("metrics/consistency", time, np.column_stack([errors.mean, innovations.mean, np.array(bands)]))
+        errors = consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known)
+        innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+        number = np.maximum(errors.number, 1)
+        bands = consistency.band(consistency.DRAWN, self._formation.dimension, number)
+        self._scalars("metrics/consistency", time, np.concatenate([errors.mean, innovations.mean, *bands], axis=-1))
 
     def _messages_per_tick(self, moments: Moments) -> Array:
         starts = np.arange(0, len(moments.ticks), self._every)

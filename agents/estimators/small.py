@@ -26,12 +26,20 @@ def determinant(matrix: Array) -> Array:
 def inverse(matrix: Array) -> Array:
     """Inverses of regular matrices (..., D, D)."""
     if matrix.shape[-1] != 2:
-        # A swarm that diverges overflows at last: LAPACK would raise, and end the flight.
-        regular = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)) & (determinant(matrix) != 0.0))[..., None, None]
-        inverted = np.linalg.inv(np.where(regular, matrix, np.eye(matrix.shape[-1])))
-        return np.where(regular, inverted, np.nan)
+        return _inverted(matrix)
     adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
     return np.asarray(adjugate / determinant(matrix)[..., None, None], dtype=np.float64)
+
+
+def _inverted(matrix: Array) -> Array:
+    try:
+        return np.linalg.inv(matrix).astype(np.float64, copy=False)
+    except np.linalg.LinAlgError:
+        # A swarm that diverges overflows at last, which is not to end the flight. A sign does not underflow, as a
+        # determinant does: the other matrices of the stack have the inverses that they have alone.
+        regular = (np.linalg.slogdet(matrix).sign != 0.0)[..., None, None]
+        inverted = np.linalg.inv(np.where(regular, matrix, np.eye(matrix.shape[-1])))
+        return np.where(regular, inverted, np.nan)
 
 
 def rotation(matrix: Array) -> Array:
