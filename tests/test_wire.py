@@ -157,7 +157,7 @@ def test_an_unknown_field_is_named(message):
 
 @pytest.mark.parametrize(("message", "field"), FIELDS)
 def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
-    wrong = "lunch" if field == "payload" else {"lunch": 1}
+    wrong = "lunch" if field in {"payload", "sighting", "reports"} else {"lunch": 1}
     data = msgpack.packb(message._asdict() | {field: wrong})
     with pytest.raises(WireError, match=rf"^{type(message).__name__}: {field}: expected .*lunch"):
         wire.unpack(type(message), data)
@@ -436,8 +436,8 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
             {"links": {"agents": 2, "src": [2**64 - 1], "dst": [1], "swarm": 2}},
             r"^links\.src: .*int64.*18446744073709551615",
         ),
-        ({"leaders": [1, 0, 2]}, r"^leaders: .*bool.*2"),
-        ({"leaders": ["no"]}, r"^leaders: .*bool.*'no'"),
+        ({"positioned": [1, 0, 2]}, r"^positioned: .*bool.*2"),
+        ({"positioned": ["no"]}, r"^positioned: .*bool.*'no'"),
         (
             {"profiles": [asdict(PROFILE), asdict(PROFILE) | {"duplicate": [None]}]},
             r"^profiles\[\]\.duplicate: .*float64.*None",
