@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
 from typing import Any
@@ -53,9 +53,11 @@ class Runs:
         from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal
         are apart; how far agents are from the places that they steer for; how hard they steer. Root mean squares over the
         agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
-    place
-        Where the agents of the first run believed they were in those ticks, shape (T, N, D), in metres; of no agents where
-        nobody localizes.
+    peak
+        The longest input of any agent since the moment before, shape (R, T), in metres per second or per second squared.
+    first
+        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position`, and
+        the `target` where there is one, (T, D), in metres.
     """
 
     seconds: Array
@@ -76,16 +78,17 @@ class Runs:
     apart: Array
     behind: Array
     effort: Array
-    place: Array
+    peak: Array
+    first: Mapping[str, Array]
 
     def together(self, other: Runs) -> Runs:
         """These runs and others of the same ticks."""
         joined = {
             field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
             for field in fields(self)
-            if field.name not in {"seconds", "place"}
+            if field.name not in {"seconds", "first"}
         }
-        return Runs(self.seconds, place=self.place, **joined)
+        return Runs(self.seconds, first=self.first, **joined)
 
 
 def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
@@ -112,6 +115,8 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     swarm = Swarm(together)
     errors: list[Array] = []
     kept: list[dict[str, Array]] = []
+    first: list[dict[str, Array]] = []
+    peak = np.zeros(len(seeds))
     places = _Places(plan, len(seeds))
 
     def of_runs(array: Any) -> Any:
@@ -123,10 +128,13 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             target = of_runs(together.world.goal(instant.tick, instant.scene))
             errors.append(metrics.tracking_error(flown, target, present))
             places.measure(instant, plan.timeline)
+            peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
-                kept.append(_looked_at(together, present, moment, of_runs))
+                kept.append({"peak": peak, **_looked_at(together, present, moment, of_runs)})
+                first.append(_shown(plan, moment))
                 places.keep(moment)
+                peak = np.zeros(len(seeds))
         error = np.stack(errors, axis=1)
         mean_error = error.mean(axis=1)
     return Runs(
@@ -134,6 +142,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         error=error[:, ::every],
         mean_error=mean_error,
         **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+        first={name: np.stack([one[name] for one in first]) for name in first[0]},
         **places.found(len(kept)),
     )
 
@@ -163,7 +172,7 @@ class _Places:
         """How far off they were, how far their centroid has gone, and how much they rang, shape (R, T)."""
         if not self._wanted:
             nothing = np.full((self._runs, moments), np.nan)
-            return {"localization": nothing, "drift": nothing, "ringing": nothing, "place": np.zeros((moments, 0, 0))}
+            return {"localization": nothing, "drift": nothing, "ringing": nothing}
         place, edges = np.stack(self._kept, axis=1), self._first.edges()
         edges = Edges(edges.information[:, None], edges.pull[:, None])
         centre = centroid(place, weights(edges))
@@ -171,7 +180,6 @@ class _Places:
             "localization": distance(place, edges),
             "drift": np.linalg.norm(centre - centre[:, :1], axis=-1),
             "ringing": ringing(place),
-            "place": place[0],
         }
 
 
@@ -200,6 +208,13 @@ def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any
     }
 
 
+def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
+    """Of the first run."""
+    size, nominal = plan.world.formation.agents, plan.world.formation.nominal
+    shown = {name: said[:size] for name, said in (*moment.reports.items(), ("position", moment.position))}
+    return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
+
+
 def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
     """How well a target is found and followed in a tick of all runs, shape (R,)."""
     names = ("found", "agreed", "ideal", "apart", "behind", "effort")
@@ -208,7 +223,7 @@ def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[
         return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
     said = moment.reports
     target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)
-    agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"]))
+    agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"][:, 0]))
     mean = np.mean(information, axis=1, keepdims=True)
     ideal = position(mean, target.shape[-1], pursuit.target.order)
     off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))

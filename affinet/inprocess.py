@@ -128,15 +128,15 @@ class Swarm:
         air, verdicts = self._medium.judge(self._air, tick, self._offered(~now.idle), scene.position)
         seen = (verdicts.fate[0] == Fate.DELIVERED)[links.slots] & links.present
         measured = np.where(seen[..., None], sensed[links.slots], 0.0)
-        velocity = self._plan.world.odometry(scene)
-        state, said = self._agents.sense(before, measured, seen, velocity)
+        motion = self._plan.world.odometry(scene)
+        state, said = self._agents.sense(before, measured, seen, motion)
         self._said[tick] = self._as_told(said, now)
         self._air, delivery = self._medium.deliver(air, tick, verdicts)
         heard = {name: self._hear(name, delivery) for name in self._fields}
         if self._centre:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
         sighting = self._plan.world.sighting(tick, scene)
-        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, velocity, sighting)
+        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
         if now.idle.any():
             state = renew(state, before, now.idle)
         self._forget(tick)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from affinet.batch import Runs
+from affinet.quantities import NAMES, Quantity, over_time
 from affinet.sections import ScenarioError
-from affinet.study import NAMES, Claim, Quantity, Result, Study, selected
+from affinet.study import Claim, Result, Study, selected
 from analysis import claims, random_graphs
 from analysis.claims import Verdict
 from world.formation import Array
@@ -37,12 +37,16 @@ def judge(study: Study, results: list[Result]) -> list[Verdict]:
 def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
     """A claim for each label of the axes it is for."""
     values = {axis.name: list(axis.values) for axis in study.axes}
+    if claim.levels is not None:
+        values[claim.each[0]] = list(claim.levels)
     for labels in itertools.product(*(values[name] for name in claim.each)):
         where = dict(zip(claim.each, labels, strict=True))
         other = None if claim.to is None else claim.to | where
-        yield claim.model_copy(
-            update={"says": ", ".join(labels) + ": " * bool(labels) + claim.says, "of": claim.of | where, "to": other}
-        )
+        says, level = ", ".join(labels) + ": " * bool(labels) + claim.says, claim.level
+        if claim.levels is not None:
+            level = claim.levels[labels[0]]
+            says += f" {level:g} {NAMES[claim.quantity or study.quantity][1]}"
+        yield claim.model_copy(update={"says": says, "of": claim.of | where, "to": other, "level": level})
 
 
 def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
@@ -52,7 +56,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     span, unit = (claim.since, claim.until), NAMES[quantity][1]
 
     def means(of: list[Result], what: Quantity = quantity) -> Array:
-        return np.array([_mean_of(one.runs, what, span) for one in of])
+        return np.array([over_time(one.runs, what, span) for one in of])
 
     other = [one for one in results if selected(one, claim.to or {})]
     others = claim.to_quantity or quantity
@@ -84,11 +88,3 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
             followers, limits, runs = one.followers, one.bounds, one.runs
             psi = (runs.psi - limits.offset)[:, :, followers]
             return claims.below_in_mean(claim.says, runs.seconds, psi, runs.error[..., None] * limits.slope[followers])
-
-
-def _mean_of(runs: Runs, quantity: Quantity, span: claims.Span) -> Array:
-    """The mean of each run over a span of seconds, shape (R,); of the tracking error over all of it, every tick counts."""
-    if quantity == "error" and span == (0.0, None):
-        return runs.mean_error
-    values: Array = getattr(runs, quantity)
-    return values[:, claims.within(runs.seconds, span)].mean(axis=1)

@@ -268,9 +268,10 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
 
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
-    if getattr(law, "order", None) not in (1, 2):
+    if getattr(law, "order", None) not in range(1, len(sections.INTEGRATORS) + 1):
         raise ScenarioError(
-            f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations"
+            f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations, 3 if jerks, "
+            "4 if snaps"
         )
     for name, what in (
         ("by_stress", "it weighs edges by the stress"),
@@ -280,9 +281,11 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
             raise ScenarioError(f"agents.law: {given.agents.law} has no {name!r}: whether {what}")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
+    if given.formation.leaders and law.order > 2:
+        raise ScenarioError("formation.leaders: who leads is steered by velocities or accelerations; give none")
     if law.order != given.dynamics.order:
-        steers = ("velocities", "accelerations")[law.order - 1]
-        fits = ("single-integrator", "double-integrator")[law.order - 1]
+        steers = ("velocities", "accelerations", "jerks", "snaps")[law.order - 1]
+        fits = sections.INTEGRATORS[law.order - 1]
         raise ScenarioError(
             f"dynamics.model: {given.agents.law} steers {steers}, and bodies are {given.dynamics.model}s; "
             f"set it to {fits!r}, or choose another law"
@@ -305,8 +308,8 @@ def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     """One tick in silence: what law and estimator want of each other shows before anything starts; what will be reported."""
     brief, batch = agents.brief, agents.brief.present.shape[:1]
     nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
-    velocity = nowhere if agents.law.order == 2 else None
-    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, velocity)
+    motion = np.repeat(nowhere[:, None], agents.law.order - 1, axis=1) if agents.law.order > 1 else None
+    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, motion)
     silence = {
         channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
         for channel, fields in agents.channels().items()
@@ -316,7 +319,7 @@ def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     sighting = None
     if brief.target is not None:
         sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), *np.zeros((2, *batch), dtype=np.int64))
-    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, velocity, sighting)
+    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, motion, sighting)
     reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
     if taken := sorted(reports.keys() & TAKEN):
         raise ValueError(f"the estimator reports {', '.join(taken)}, which every run has already: give it another name")

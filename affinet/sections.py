@@ -154,13 +154,18 @@ class Kernel(Section):
     positions: Literal["nominal", "true"] = "nominal"
 
 
+INTEGRATORS = ("single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator")
+
+
 class Dynamics(Section):
     """What the bodies are, and what displaces them in a tick: a standard deviation per axis, in metres, or a covariance, in m2.
 
     `kernel` correlates agents, `persistence` successive ticks.
     """
 
-    model: Literal["single-integrator", "double-integrator"] = "single-integrator"
+    model: Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"] = (
+        "single-integrator"
+    )
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
     kernel: Kernel | None = None
@@ -175,7 +180,7 @@ class Dynamics(Section):
     @property
     def order(self) -> int:
         """How often the input is integrated to a position."""
-        return 2 if self.model == "double-integrator" else 1
+        return 1 + INTEGRATORS.index(self.model)
 
 
 class Target(Section):

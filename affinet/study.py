@@ -22,47 +22,13 @@ from affinet import scenario as scenarios
 from affinet.batch import Runs, fly_all
 from affinet.impairments import Section
 from affinet.plan import Plan, PlanError
+from affinet.quantities import Quantity
 from affinet.sections import ScenarioError
 from analysis.graph import adjacency
 from analysis.indicator import Bounds, bounds
 from netem.links import Mask
 
 Labels = dict[str, str]
-Quantity = Literal[
-    "error",
-    "procrustes",
-    "estimation_error",
-    "covariance_trace",
-    "nees",
-    "nis",
-    "localization",
-    "drift",
-    "ringing",
-    "found",
-    "agreed",
-    "ideal",
-    "apart",
-    "behind",
-    "effort",
-]
-
-NAMES: dict[Quantity, tuple[str, str]] = {
-    "error": ("tracking error", "m²"),
-    "procrustes": ("Procrustes error", "m"),
-    "estimation_error": ("estimation error", "m"),
-    "covariance_trace": ("trace of the covariances", "m²"),
-    "nees": ("normalised estimation error squared", ""),
-    "nis": ("normalised innovation squared", ""),
-    "localization": ("distance from the optimal places", "m"),
-    "drift": ("drift of the weighted centroid", "m"),
-    "ringing": ("share of steps that go back", ""),
-    "found": ("error of the target by oneself", "m"),
-    "agreed": ("error of the target together", "m"),
-    "ideal": ("error of the target with all that is known", "m"),
-    "apart": ("distance of agreement from all that is known", "m"),
-    "behind": ("distance from the places steered for", "m"),
-    "effort": ("input", "m/s²"),
-}
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
 
@@ -75,7 +41,10 @@ class Axis(Section):
 
 
 class Claim(Section):
-    """What a paper says, for `each` label of some axes, and the check that decides it over the cases of these labels."""
+    """What a paper says, for `each` label of some axes, and the check that decides it over the cases of these labels.
+
+    With `levels`, a level for each label of the one axis in `each`, it says so of these labels only.
+    """
 
     says: str
     each: list[str] = Field(default_factory=list)
@@ -96,6 +65,7 @@ class Claim(Section):
     quantity: Quantity | None = None
     to_quantity: Quantity | None = None
     level: float | None = None
+    levels: dict[str, float] | None = None
     between: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     since: float = 0.0
     until: float | None = None
@@ -104,6 +74,8 @@ class Claim(Section):
     def _compared(self) -> Claim:
         if (self.to is None) == (self.check in ("approaches", "lower", "ratio")):
             raise ValueError(f"the check {self.check!r} {'needs' if self.to is None else 'has no use for'} to")
+        if self.levels is not None and len(self.each) != 1:
+            raise ValueError("levels are for the labels of one axis: name it in each")
         return self
 
 
@@ -122,7 +94,7 @@ class Size(Section):
 
 
 class Study(Section):
-    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis."""
+    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis, `since` a second."""
 
     title: str
     source: str
@@ -135,13 +107,14 @@ class Study(Section):
     quick: Size
     axes: list[Axis]
     along: str | None = None
+    since: float = 0.0
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _drawn(self) -> Study:
-        if self.figure in ("sweep", "map") and self.quantity != "error":
-            raise ValueError(f"a {self.figure} shows the mean tracking error, and no {self.quantity}")
+        if self.figure == "map" and self.quantity != "error":
+            raise ValueError(f"a map shows the mean tracking error, and no {self.quantity}")
         return self
 
 

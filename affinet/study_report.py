@@ -15,10 +15,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from affinet.judging import GRAPHS
-from affinet.study import NAMES, Quantity, Result, Study
+from affinet.quantities import NAMES, Quantity, over_time
+from affinet.study import Result, Study
 from analysis import figures, random_graphs
 from analysis.claims import Verdict
 from analysis.figures import Curve
+from netem.channels import PLACE
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
@@ -29,20 +31,22 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
-    if results[0].runs.place.size:
+    if PLACE in results[0].runs.first:
         figures.evolution(
-            out / "evolution.png", study.title, [(one.labels, one.runs.seconds, one.runs.place) for one in results]
+            out / "evolution.png",
+            study.title,
+            [(one.labels, one.runs.seconds, one.runs.first[PLACE]) for one in results],
         )
     axes = [axis.name for axis in study.axes]
-    curves = _curves(results, study.quantity)
+    curves, quantity = _curves(results, study.quantity, study.since), figures.said(*NAMES[study.quantity])
+    bound = None if study.bound is None else (study.bound.at, study.bound.says)
     if study.figure == "curves":
-        bound = None if study.bound is None else (study.bound.at, study.bound.says)
-        figures.curves(out / "figure.png", study.title, curves, axes, figures.said(*NAMES[study.quantity]), bound)
+        figures.curves(out / "figure.png", study.title, curves, axes, quantity, bound)
         dimension = results[0].plan.world.formation.dimension
-        normalised = {what.upper(): _curves(results, what) for what in ("nees", "nis")}
+        normalised = {what.upper(): _curves(results, what, study.since) for what in ("nees", "nis")}
         figures.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
     elif study.figure == "sweep":
-        figures.sweep(out / "figure.png", study.title, curves, axes, study.along or "")
+        figures.sweep(out / "figure.png", study.title, curves, axes, study.along or "", quantity, bound)
     elif study.figure == "map":
         figures.settings(out / "figure.png", study.title, curves, axes)
     else:
@@ -53,8 +57,11 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
         figures.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())
 
 
-def _curves(results: list[Result], quantity: Quantity) -> list[Curve]:
-    return [Curve(one.labels, one.runs.seconds, getattr(one.runs, quantity), one.runs.mean_error) for one in results]
+def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Curve]:
+    return [
+        Curve(one.labels, one.runs.seconds, getattr(one.runs, quantity), over_time(one.runs, quantity, (since, None)))
+        for one in results
+    ]
 
 
 def _moments(one: Result) -> pa.Table:

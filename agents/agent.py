@@ -16,6 +16,9 @@ from analysis.affine import Manoeuvre
 from analysis.pursuit import Sighting
 from netem.channels import INPUT
 
+# What an input is, by the order of the bodies that fly it; lower ones are motion.
+_DERIVATIVES = ("velocity", "acceleration", "jerk", "snap")
+
 
 class AgentState(NamedTuple):
     """What an agent remembers from tick to tick; every array begins with the batch axes."""
@@ -26,7 +29,7 @@ class AgentState(NamedTuple):
 
 
 class Action(NamedTuple):
-    """What an agent does in a tick: its input (..., D), a velocity or an acceleration, and the estimate behind it."""
+    """What an agent does in a tick: its input (..., D), a velocity, an acceleration ..., and the estimate behind it."""
 
     input: Array
     estimate: Estimate
@@ -59,7 +62,7 @@ class Agent:
 
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
-        moves = ("velocity", "acceleration")[: self.law.order]
+        moves = _DERIVATIVES[: self.law.order]
         return {INPUT: {name: Field((self.brief.dimension,)) for name in moves}, **self.estimator.channels(self.brief)}
 
     def init(self, batch: tuple[int, ...]) -> AgentState:
@@ -71,15 +74,16 @@ class Agent:
         )
 
     def sense(
-        self, state: AgentState, measured: Array, seen: Mask, velocity: Array | None
+        self, state: AgentState, measured: Array, seen: Mask, motion: Array | None
     ) -> tuple[AgentState, Mapping[str, Fields]]:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
 
-        The input broadcast is the one now flying, of the tick before; only double integrators have a `velocity` (..., D) too.
+        The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
+        (..., m - 1, D) of integrators of an order m above 1.
         """
         estimator, said = self.estimator.sense(self.brief, state.estimator, measured, seen)
-        moves = {"velocity": state.input} if velocity is None else {"velocity": velocity, "acceleration": state.input}
-        return state._replace(estimator=estimator), {INPUT: moves, **said}
+        moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
+        return state._replace(estimator=estimator), {INPUT: dict(zip(_DERIVATIVES, moves, strict=False)), **said}
 
     def act(
         self,
@@ -87,16 +91,18 @@ class Agent:
         tick: Reading,
         heard: Mapping[str, Heard],
         position: Array | None,
-        velocity: Array | None,
+        motion: Array | None,
         sighting: Sighting | None,
     ) -> tuple[AgentState, Action]:
         """Estimate from what was heard, and steer; `tick` is what its clock says.
 
-        Only leaders, and those whose law wants it, have their own `position` (..., D); only double integrators a `velocity`
-        (..., D); only who pursues a target a `sighting`.
+        Only leaders, and those whose law wants it, have their own `position` (..., D); only integrators of an order m
+        above 1 a `motion` (..., m - 1, D); only who pursues a target a `sighting`.
         """
         brief = self.brief
-        own = Own(state.input if velocity is None else velocity, state.input, tick, position, sighting)
+        own = Own(state.input, state.input, tick, position, sighting)
+        if motion is not None:
+            own = own._replace(velocity=motion[..., 0, :], higher=motion[..., 1:, :])
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
         law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
         if self.leaders == "distances":

@@ -33,6 +33,8 @@ class Own(NamedTuple):
         Shape (..., D), in metres; of agents that have positioning.
     sighting
         What its detector says, if there is a target.
+    higher
+        Derivatives of the velocity that its body integrates, shape (..., m - 2, D), of integrators of an order m above 2.
     """
 
     velocity: Array
@@ -40,6 +42,7 @@ class Own(NamedTuple):
     tick: Reading = 0
     position: Array | None = None
     sighting: Sighting | None = None
+    higher: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,17 @@ State = TypeVar("State")
 class Law(Protocol[State]):
     """A control law for followers.
 
-    `order` is that of the bodies it steers, by a velocity (1) or an acceleration (2); `by_stress` says whether it weighs the
-    edges by the stress of the formation, which then must have one; `by_position` whether it needs the agent's own position.
+    `order` is that of the bodies it steers, by a velocity (1), an acceleration (2) or a higher derivative; `by_stress` says
+    whether it weighs the edges by the stress of the formation, which then must have one; `by_position` whether it needs the
+    agent's own position.
     """
 
-    order: ClassVar[int]
     by_stress: ClassVar[bool]
     by_position: ClassVar[bool]
+
+    @property
+    def order(self) -> int:
+        """Of the bodies."""
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> State:
         """The state before the first tick, with `batch` as its leading axes."""

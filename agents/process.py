@@ -126,7 +126,7 @@ class Node:
         if inbox.neighbours:
             slots = [self._slot[number] for number in inbox.neighbours]
             measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, measured, seen, _numbers(inbox.velocity))
+        self._state, said = self._agent.sense(self._state, measured, seen, _numbers(inbox.motion))
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
             self._broadcasts[name].put(
@@ -136,9 +136,9 @@ class Node:
     def _exchange(self, inbox: wire.ExchangeInbox, sensed: wire.SenseInbox) -> None:
         self._heard += len(inbox.messages)
         heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
-        position, velocity = _numbers(sensed.position), _numbers(sensed.velocity)
+        position, motion = _numbers(sensed.position), _numbers(sensed.motion)
         sighting = _sighting(sensed.sighting)
-        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, velocity, sighting)
+        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, motion, sighting)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)

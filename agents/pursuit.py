@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import ClassVar
 
 import numpy as np
@@ -15,24 +16,29 @@ from agents.estimators.base import Estimate, Heard
 
 @dataclass(frozen=True)
 class Pursuit:
-    """u_i = p_i,2 - kappa_0 (p_i - p_i,0 - d_i) - kappa_1 (p_i' - p_i,1): a place about the target, for double integrators.
+    """u_i = p_i,m - sum_mu kappa_mu (x_i^(mu) - p_i,mu), with p_i,0 + d_i for mu = 0: a place about the target.
 
     The place d_i is the nominal position; p_i,mu are what the estimator reports as `reference`: position and derivatives.
 
     Parameters
     ----------
     kappa
-        Gains on position and velocity, per second squared and per second.
+        Gains on position, velocity and so on, one for each of the m times that bodies integrate their input: kappa_mu in
+        1/s^(m - mu).
     """
 
-    order: ClassVar[int] = 2
     by_stress: ClassVar[bool] = False
     by_position: ClassVar[bool] = True
     kappa: Sequence[float] = (1.0, 2.0)
 
     def __post_init__(self) -> None:
-        if len(self.kappa) != 2:
-            raise ValueError(f"kappa are two gains, on position and velocity, not {self.kappa}")
+        if not self.kappa:
+            raise ValueError("kappa needs a gain for each time that bodies integrate their input; give [1.0, 2.0]")
+
+    @property
+    def order(self) -> int:
+        """m, of the bodies."""
+        return len(self.kappa)
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
         """Nothing to remember."""
@@ -48,55 +54,23 @@ class Pursuit:
         inputs: Heard,  # noqa: ARG002
     ) -> tuple[Nothing, Array]:
         """Go after the reference."""
-        reference, position = _reference(estimate, self.order), _position(own)
-        off = position - reference[..., 0, :] - brief.nominal
-        behind = own.velocity - reference[..., 1, :]
-        return state, reference[..., 2, :] - self.kappa[0] * off - self.kappa[1] * behind
+        reference, flown = self._reference(estimate), self._flown(brief, own)
+        pulls = [kappa * (flown[mu] - reference[..., mu, :]) for mu, kappa in enumerate(self.kappa)]
+        return state, reduce(np.subtract, pulls, reference[..., self.order, :])
 
+    def _flown(self, brief: Brief, own: Own) -> list[Array]:
+        """Own position less that of the place, and its derivatives."""
+        if own.position is None:
+            raise ValueError("this law steers by its own position, and has none")
+        motion = [] if self.order == 1 else [own.velocity]
+        if own.higher is not None:
+            motion += [*np.moveaxis(own.higher, -2, 0)]
+        return [own.position - brief.nominal, *motion]
 
-@dataclass(frozen=True)
-class FirstOrderPursuit:
-    """u_i = p_i,1 - kappa_0 (p_i - p_i,0 - d_i): the same for single integrators, and a target of the first order.
-
-    Parameters
-    ----------
-    kappa
-        Gain on position, per second.
-    """
-
-    order: ClassVar[int] = 1
-    by_stress: ClassVar[bool] = False
-    by_position: ClassVar[bool] = True
-    kappa: float = 1.0
-
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
-        """Nothing to remember."""
-        return Nothing()
-
-    def command(
-        self,
-        brief: Brief,
-        state: Nothing,
-        tick: Reading,  # noqa: ARG002
-        own: Own,
-        estimate: Estimate,
-        inputs: Heard,  # noqa: ARG002
-    ) -> tuple[Nothing, Array]:
-        """Go after the reference."""
-        reference, position = _reference(estimate, self.order), _position(own)
-        return state, reference[..., 1, :] - self.kappa * (position - reference[..., 0, :] - brief.nominal)
-
-
-def _reference(estimate: Estimate, order: int) -> Array:
-    reference = estimate.reports.get("reference")
-    if reference is None or reference.shape[-2] <= order:
-        raise ValueError(
-            f"this law follows a target and its derivatives up to {order}; choose an estimator that reports them"
-        )
-    return np.asarray(reference, dtype=np.float64)
-
-
-def _position(own: Own) -> Array:
-    if own.position is None:
-        raise ValueError("this law steers by its own position, and has none")
-    return own.position
+    def _reference(self, estimate: Estimate) -> Array:
+        reference = estimate.reports.get("reference")
+        if reference is None or reference.shape[-2] <= self.order:
+            raise ValueError(
+                f"this law follows a target and its derivatives up to {self.order}; choose an estimator that reports them"
+            )
+        return np.asarray(reference, dtype=np.float64)

@@ -18,17 +18,18 @@ Array = NDArray[np.float64]
 
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
 _LOST, _FAR = 1.0, 100.0  # m²
+_DECADES = 30.0  # labels that reach farther stand on a logarithmic axis
 _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
 @dataclass(frozen=True)
 class Curve:
-    """The error of many runs of one case: labels, moments (T,), error (R, T), and the mean error of each run (R,)."""
+    """The error of many runs of one case: labels, moments (T,), error (R, T), and what stands for each run over time (R,)."""
 
     labels: Mapping[str, str]
     seconds: Array
     error: Array
-    mean_error: Array
+    overall: Array
 
 
 def curves(
@@ -124,8 +125,16 @@ def said(what: str, unit: str) -> str:
     return f"{what} ({unit})" if unit else what
 
 
-def sweep(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], along: str) -> None:
-    """Mean error along one axis: a panel for each label of the first other axis, a curve for each of the second."""
+def sweep(
+    path: Path,
+    title: str,
+    cases: Sequence[Curve],
+    axes: Sequence[str],
+    along: str,
+    quantity: str,
+    bound: tuple[float, str] | None = None,
+) -> None:
+    """A quantity over one axis: a panel for each label of the first other axis, a curve for each of the second."""
     across, each = [name for name in axes if name != along]
     columns = _labels(cases, across)
     figure = Figure(figsize=(3.6 * len(columns), 3.0), layout="constrained", dpi=160)
@@ -134,10 +143,16 @@ def sweep(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str], a
         for label in _labels(cases, each):
             chosen = [one for one in cases if one.labels[across] == column and one.labels[each] == label]
             where = [float(one.labels[along]) for one in chosen]
-            runs = np.array([_finite(one.mean_error) for one in chosen])
+            runs = np.array([_finite(one.overall) for one in chosen])
             panel.errorbar(where, runs.mean(axis=1), yerr=runs.std(axis=1), label=label, marker="o", ms=3, capsize=2)
         panel.set_title(column)
-    _finish(figure, panels, title, along, "mean tracking error (m²)", each)
+    labels = [float(label) for label in _labels(cases, along)]
+    for panel in panels[0]:
+        if min(labels) > 0.0 and max(labels) > _DECADES * min(labels):
+            panel.set_xscale("log")
+        if bound is not None:
+            panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
+    _finish(figure, panels, title, along, quantity, each)
     figure.savefig(path)
 
 
@@ -178,7 +193,7 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
 
 def _cell(panel: Axes, row: int, column: int, case: Curve) -> float:
     """Say the mean error of a case in its place, and how it ended."""
-    mean = float(_finite(case.mean_error).mean())
+    mean = float(_finite(case.overall).mean())
     cross = " ×" if _finite(case.error)[:, -1].mean() > _LOST else ""
     said, colour = (f"{mean:.2g}{cross}", "black") if mean < _FAR else ("lost", "white")
     panel.text(column, row, said, ha="center", va="center", fontsize=6, color=colour)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# What estimators of a target report: position and derivatives to steer for, the position found by oneself, the variance of the
-# former per axis, and one's own information.
-REPORTS = frozenset({"reference", "found", "variance", "information"})
+# What estimators of a target report: position and derivatives to steer for, shape (m + 1, D), the position found by oneself,
+# (D,), the variance of the former per axis, and one's own information and that found together, with m derivatives, (m + 1, C).
+REPORTS = frozenset({"reference", "found", "variance", "information", "fused"})
 
 
 class Sighting(NamedTuple):

@@ -251,7 +251,7 @@ class Relay:
                 neighbours=neighbours,
                 measured=[sense.measured[link] for link in links],
                 position=sense.position[agent - 1] if self._brief.positioned[agent - 1] else None,
-                velocity=None if sense.velocity is None else sense.velocity[agent - 1],
+                motion=None if sense.motion is None else sense.motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
             self._inboxes[agent].put(wire.pack(inbox))

@@ -38,9 +38,9 @@ class Sense(NamedTuple):
     """World to medium: the raw sensing of tick k; `last` says that the run is over and nothing was sensed.
 
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
-    (N, D), both in metres; `velocity` the true velocities, shape (N, D), in metres per second, where agents are told theirs;
-    `sightings` what each agent's detector says of a target, as in `SenseInbox`, if there is one;
-    `fired` are the numbers of the triggers that fire in this tick.
+    (N, D), both in metres; `motion` the true velocities and higher derivatives, shape (N, m - 1, D), where the bodies are
+    integrators of an order m above 1; `sightings` what each agent's detector says of a target, as in `SenseInbox`, if there
+    is one; `fired` are the numbers of the triggers that fire in this tick.
     """
 
     k: int
@@ -49,7 +49,7 @@ class Sense(NamedTuple):
     last: bool
     measured: Array | Rows
     position: Array | Rows
-    velocity: Array | Rows | None
+    motion: Array | Rows | None
     sightings: Rows | None
     fired: Rows
 
@@ -59,9 +59,10 @@ class SenseInbox(NamedTuple):
 
     `clock` is what the agent's own clock says, in ticks; `neighbours` are the agents measured, shape (m,), `measured` their
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
-    positioning, get it; `velocity` its own, shape (D,), in metres per second, if it is a double integrator; `sighting` what its
-    detector says of a target, if there is one: `position`, where it was when the detection began, in metres, if one is `done`,
-    the number of the method it was found `by`, and of the `method` that the detector uses from now on.
+    positioning, get it; `motion` its own velocity and higher derivatives, shape (m - 1, D), in metres per second, per second
+    squared ..., if it integrates its input m > 1 times to a position; `sighting` what its detector says of a target, if there
+    is one: `position`, where it was when the detection began, in metres, if one is `done`, the number of the method it was
+    found `by`, and of the `method` that the detector uses from now on.
     """
 
     k: int
@@ -72,7 +73,7 @@ class SenseInbox(NamedTuple):
     neighbours: Rows
     measured: Rows
     position: Rows | None
-    velocity: Rows | None
+    motion: Rows | None
     sighting: dict[str, Any] | None
 
 

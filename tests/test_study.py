@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from affinet import cli, judging, scenario, study, study_report
 from affinet import plan as planning
 from affinet.batch import Runs
+from affinet.quantities import NAMES
 from affinet.sections import ScenarioError
 from analysis import figures
 
@@ -224,12 +225,12 @@ def pair(tmp_path):
     return study.load(str(path))
 
 
-def made_up(labels, **quantities):
+def made_up(labels, **values_of):
     """A case whose runs hold these values, over four seconds."""
     shape = (5, 4)
-    rest = {name: np.full(shape, 7e7) for name in study.NAMES}
-    rest |= {name: np.broadcast_to(values, shape) for name, values in quantities.items()}
-    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), place=np.zeros((4, 0, 0)), **rest)
+    rest = {name: np.full(shape, 7e7) for name in NAMES}
+    rest |= {name: np.broadcast_to(values, shape) for name, values in values_of.items()}
+    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), first={}, **rest)
     return study.Result(labels, None, runs)
 
 

@@ -1,6 +1,10 @@
-"""Single integrators (paper 000, eq. 4), double integrators, and bodies that do not obey."""
+"""Chains of integrators (paper 000, eq. 4; paper 002, eq. 1), and bodies that do not obey."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from math import factorial
 
 import numpy as np
 
@@ -8,14 +12,13 @@ from netem.timeline import Conditions
 from world.formation import Array
 
 
-def single_integrator(position: Array, velocity: Array, dt: float, disturbance: Array) -> Array:
-    """z_k+1 = z_k + dt u_k + w_k, shape (..., N, D), in metres; the disturbance w is a displacement per tick."""
-    return position + dt * velocity + disturbance
+def carried(derivatives: Sequence[Array], dt: float) -> Array:
+    """A quantity a tick later, of which these are the value and its derivatives (...), the last of them held.
 
-
-def double_integrator(position: Array, velocity: Array, acceleration: Array, dt: float, disturbance: Array) -> Array:
-    """z_k+1 = z_k + dt zdot_k + dt^2 / 2 u_k + w_k, shape (..., N, D), in metres; w is a displacement per tick."""
-    return position + dt * velocity + 0.5 * dt**2 * acceleration + disturbance
+    z_k+1 = z_k + dt u_k for single integrators, z_k + dt zdot_k + dt^2 / 2 u_k for double ones, and so on.
+    """
+    value, *rates = derivatives
+    return reduce(np.add, [dt**order / factorial(order) * rate for order, rate in enumerate(rates, 1)], value)
 
 
 def flown(commanded: Array, coasting: Array, now: Conditions) -> Array:

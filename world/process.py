@@ -106,9 +106,9 @@ class Theatre:
             self._heard[agent] = 0
 
     def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
-        number, velocity = self._numbers.next("sense"), self._world.odometry(scene)
+        number, motion = self._numbers.next("sense"), self._world.odometry(scene)
         sense = wire.Sense(
-            tick, WORLD, number, False, measured, scene.position, velocity, self._sightings(tick, scene), fired
+            tick, WORLD, number, False, measured, scene.position, motion, self._sightings(tick, scene), fired
         )
         self._sense.put(wire.pack(sense))
 

@@ -29,8 +29,9 @@ class Scene(NamedTuple):
     ----------
     position
         Of the agents, shape (N, D), in metres.
-    velocity
-        Theirs, shape (N, D), in metres per second: of single integrators, the input they flew in the tick before.
+    motion
+        Their velocities and higher derivatives, as far as the bodies integrate them, shape (N, order - 1, D), in metres per
+        second, per second squared ...: of single integrators, the input they flew in the tick before, shape (N, 1, D).
     measured
         What was measured in the tick before, shape (L, D), in metres.
     disturbance
@@ -40,10 +41,15 @@ class Scene(NamedTuple):
     """
 
     position: Array
-    velocity: Array
+    motion: Array
     measured: Array
     disturbance: Array
     chase: Chase | None
+
+    @property
+    def velocity(self) -> Array:
+        """Shape (N, D), in metres per second."""
+        return self.motion[:, 0]
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ class World:
     ticks
         How many there are.
     order
-        Of the bodies: single integrators (1) or double integrators (2).
+        Of the bodies: how often they integrate their input to a position; 1 for single integrators.
     formation, links, manoeuvre
         Who flies, who is linked to whom, and what the leaders fly.
     sensor
@@ -98,9 +104,10 @@ class World:
         position = offset
         if self.start == "targets":
             position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
-        rest = np.zeros_like(position)
+        still = np.zeros_like(position)
+        rest = np.repeat(still[:, None], max(1, self.order - 1), axis=1)
         chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
-        return Scene(position, rest, sensors.relative(position, self.links), rest, chase)
+        return Scene(position, rest, sensors.relative(position, self.links), still, chase)
 
     def target(self, tick: int | NDArray[np.int64]) -> Array:
         """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
@@ -139,22 +146,21 @@ class World:
         return dynamics.flown(commanded, coasting, now)
 
     def odometry(self, scene: Scene) -> Array | None:
-        """The velocities that agents are told, shape (N, D), in metres per second; single integrators know their input."""
-        return None if self.order == 1 else scene.velocity
+        """The motion that agents are told, as in `Scene`, shape (N, order - 1, D); single integrators know their input."""
+        return None if self.order == 1 else scene.motion
 
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
         noise, still = self._disturb(tick, scene), now.still[:, None]
-        if self.order == 1:
-            velocity = flown
-            moved = dynamics.single_integrator(scene.position, flown + now.push, self.dt, noise)
-        else:
-            velocity = np.where(still, 0.0, scene.velocity + self.dt * flown)
-            moved = dynamics.double_integrator(scene.position, scene.velocity + now.push, flown, self.dt, noise)
+        kept = [] if self.order == 1 else [*np.moveaxis(scene.motion, 1, 0)]
+        driven = [*kept, flown]
+        moved = dynamics.carried([scene.position, driven[0] + now.push, *driven[1:]], self.dt) + noise
+        led = [dynamics.carried(driven[order:], self.dt) for order in range(len(kept))]
+        motion = np.stack([np.where(still, 0.0, each) for each in led] if led else [flown], axis=1)
         chase = scene.chase
         if self.pursuit is not None and chase is not None:
             chase = self.pursuit.step(tick, self.seed, self._numbers, chase)
-        return Scene(np.where(still, scene.position, moved), velocity, measured, noise, chase)
+        return Scene(np.where(still, scene.position, moved), motion, measured, noise, chase)
 
     @cached_property
     def _sensor_noise(self) -> Tape:

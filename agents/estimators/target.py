@@ -2,7 +2,7 @@
 
 Every axis is a filter of its own, with one covariance for all. Between detections the optimal estimate is predicted, and jumps
 when one is done (DOE); the smooth one passes from the last prediction to this one in between (SOE). What is exchanged is
-information; consensus on it and its derivatives gives all agents one estimate.
+information: consensus on it and its derivatives gives all agents one estimate; or each takes the mean of what it hears.
 """
 
 from __future__ import annotations
@@ -65,11 +65,13 @@ class TargetEstimator:
         "smooth" (SOE), or "optimal" (DOE), which jumps.
     alpha
         Of the transition function (appendix B): the smaller, the sooner the newer prediction counts.
-    fuse
-        Whether agents agree on what they know (REDCHO); wants the smooth output.
+    fusion
+        What becomes of information: all agents agree on their mean (REDCHO); each takes the mean of its own and that of the
+        neighbours it hears ("mean", which is (8) where everybody hears everybody); or each keeps to its own ("none"). The
+        former two want the smooth output.
     derivatives
-        Whose derivatives go with the position that agents agree on: those agreed on too (Algorithm 1), or the agent's own. The
-        former want far shorter ticks than networks have (docs/studies.md).
+        Whose derivatives go with the position found together: those found together too (Algorithm 1), or the agent's own. Those
+        of REDCHO want far shorter ticks than networks have (docs/studies.md).
     theta, k, gamma
         Gains of REDCHO (14), k and gamma one for each derivative from 0 to m.
     prior_position, prior_derivatives
@@ -78,7 +80,7 @@ class TargetEstimator:
 
     output: Literal["smooth", "optimal"] = "smooth"
     alpha: float = 1.0
-    fuse_information: bool = True
+    fusion: Literal["redcho", "mean", "none"] = "redcho"
     derivatives: Literal["agreed", "own"] = "agreed"
     theta: float = 16.0
     k: Sequence[float] = (6.0, 11.0, 6.0)
@@ -87,24 +89,29 @@ class TargetEstimator:
     prior_derivatives: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.fuse_information and self.output == "optimal":
+        if self.fusion != "none" and self.output == "optimal":
             raise ValueError(
-                "an output that jumps has no derivatives to agree on: fuse_information wants output = 'smooth'"
+                f"an output that jumps has no derivatives to fuse: fusion = {self.fusion!r} wants output = 'smooth'"
             )
         if self.alpha <= 0.0:
             raise ValueError(f"alpha must be above 0, not {self.alpha}")
 
     def channels(self, brief: Brief) -> Channels:
-        """The information, as agreed on so far."""
+        """The information: as agreed on so far, or one's own with its derivatives."""
         order = _target(brief).order
-        if not self.fuse_information:
-            return {}
-        return {TARGET: {"information": Field((numbers(order, brief.dimension),))}}
+        different = numbers(order, brief.dimension)
+        match self.fusion:
+            case "redcho":
+                return {TARGET: {"information": Field((different,))}}
+            case "mean":
+                return {TARGET: {"information": Field((order + 1, different))}}
+            case "none":
+                return {}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Track:
         """The target is at the origin and at rest, as far as is known."""
         order = _target(brief).order
-        if self.fuse_information and not len(self.k) == len(self.gamma) == order + 1:
+        if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
             raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
         prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
@@ -120,43 +127,54 @@ class TargetEstimator:
         measured: Array,  # noqa: ARG002
         seen: Mask,  # noqa: ARG002
     ) -> tuple[Track, Mapping[str, Fields]]:
-        """A tick has passed; tell the information agreed on so far."""
+        """A tick has passed; tell the information."""
         state = state._replace(now=state.now + 1)
-        if not self.fuse_information:
+        if self.fusion == "none":
             return state, {}
-        local = packed(*self._information(brief, state))
-        return state, {TARGET: {"information": self._consensus(brief).outputs(local, state.internal)[0]}}
+        own = packed(*self._information(brief, state))
+        told = (
+            np.moveaxis(own, 0, -2) if self.fusion == "mean" else self._consensus(brief).outputs(own, state.internal)[0]
+        )
+        return state, {TARGET: {"information": told}}
 
     def fuse(self, brief: Brief, state: Track, heard: Mapping[str, Heard], own: Own) -> tuple[Track, Estimate]:
-        """Take in a detection that is done; agree with the neighbours."""
+        """Take in a detection that is done; put together what is known."""
         state = self._detected(brief, _told_the_time(state, own), own)
         Q, y = self._information(brief, state)
-        local = _position(Q, y)
-        reference, spread = local, np.linalg.inv(Q[0])
-        if self.fuse_information:
-            consensus, said = self._consensus(brief), heard[TARGET]
-            agreed = consensus.outputs(packed(Q, y), state.internal)
-            theirs = np.where(said.fresh[..., None], said.fields["information"], agreed[0][..., None, :])
-            internal = consensus.step(state.internal, agreed[0], theirs, brief.dt)
-            state = state._replace(internal=internal)
-            shared, vectors = unpacked(agreed, brief.dimension, _target(brief).order)
-            # While agreement is far off, what is agreed on need not be the information of anything.
-            sound = np.linalg.eigvalsh(shared[0])[..., 0] > 0.0
-            shared = np.where(sound[..., None, None], shared, Q)
-            fused = _position(shared, np.where(sound[..., None, None], vectors, y))
-            reference = fused if self.derivatives == "agreed" else np.concatenate([fused[:1], local[1:]])
-            spread = np.linalg.inv(shared[0])
+        alone = packed(Q, y)
+        state, fused = self._fused(brief, state, alone, heard)
+        shared, vectors = unpacked(fused, brief.dimension, _target(brief).order)
+        # While agreement is far off, what is agreed on need not be the information of anything.
+        sound = (np.linalg.eigvalsh(shared[0])[..., 0] > 0.0)[..., None, None]
+        shared, vectors = np.where(sound, shared, Q), np.where(sound, vectors, y)
+        together, local = _position(shared, vectors), _position(Q, y)
+        reference = together if self.derivatives == "agreed" else np.concatenate([together[:1], local[1:]])
         reports = {
             "reference": np.moveaxis(reference, 0, -2),
             "found": local[0],
-            "variance": spread[..., 0, 0],
-            "information": packed(Q[0], y[0]),
+            "variance": np.linalg.inv(shared[0])[..., 0, 0],
+            "information": np.moveaxis(alone, 0, -2),
+            "fused": np.moveaxis(fused, 0, -2),
         }
         nothing = np.zeros(brief.relative.shape)
         known = np.zeros_like(brief.present)
         return state, Estimate(
             nothing, known, nothing[..., None] * nothing[..., None, :], no_indicator(known), reports=reports
         )
+
+    def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
+        """The information found together, jets (m + 1, ..., C) like the agent's own."""
+        if self.fusion == "none":
+            return state, own
+        said = heard[TARGET]
+        fresh, theirs = said.fresh, said.fields["information"]
+        if self.fusion == "mean":
+            counted = np.where(fresh[..., None, None], theirs, 0.0).sum(axis=-3)
+            return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
+        consensus = self._consensus(brief)
+        agreed = consensus.outputs(own, state.internal)
+        theirs = np.where(fresh[..., None], theirs, agreed[0][..., None, :])
+        return state._replace(internal=consensus.step(state.internal, agreed[0], theirs, brief.dt)), agreed
 
     def _detected(self, brief: Brief, state: Track, own: Own) -> Track:
         """The optimal estimate of the tick in which the detection was done (5), where one was."""
