@@ -17,10 +17,14 @@ import pyarrow.parquet as pq
 from affinet.judging import GRAPHS
 from affinet.quantities import NAMES, Quantity, over_time
 from affinet.study import Result, Study
-from analysis import figures, random_graphs
+from analysis import figures, random_graphs, target_figures
 from analysis.claims import Verdict
 from analysis.figures import Curve
+from analysis.pursuit import REPORTS
+from analysis.target_figures import Flight
 from netem.channels import PLACE
+
+_MOST_FLIGHTS = 8  # in one picture
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
@@ -31,6 +35,8 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
+    if results[0].runs.first.keys() >= REPORTS:
+        _draw_pursuit(out, study, results)
     if PLACE in results[0].runs.first:
         figures.evolution(
             out / "evolution.png",
@@ -55,6 +61,30 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
         numbers = np.flatnonzero(one.followers)
         path, seen = out / "figure.png", corrected[:, :, numbers]
         figures.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())
+
+
+def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:
+    if len(results) <= _MOST_FLIGHTS:
+        target_figures.pursued(out / "target.png", study.title, [_flight(one) for one in results])
+    if len(results) == 1:
+        (one,) = results
+        order = one.runs.first["fused"].shape[-2] - 1
+        first = order * (order + 1) // 2  # behind the information matrix
+        fused, known = (one.runs.first[name][..., first] for name in ("fused", "information"))
+        target_figures.agreement(out / "agreement.png", study.title, one.runs.seconds, fused, known)
+
+
+def _flight(one: Result) -> Flight:
+    first = one.runs.first
+    return Flight(
+        labels=one.labels,
+        seconds=one.runs.seconds,
+        target=first["target"],
+        position=first["position"],
+        places=one.plan.world.formation.nominal,
+        found=first["found"],
+        reference=first["reference"][:, :, 0],
+    )
 
 
 def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Curve]:

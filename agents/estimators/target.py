@@ -141,13 +141,15 @@ class TargetEstimator:
         """Take in a detection that is done; put together what is known."""
         state = self._detected(brief, _told_the_time(state, own), own)
         Q, y = self._information(brief, state)
-        alone = packed(Q, y)
-        state, fused = self._fused(brief, state, alone, heard)
-        shared, vectors = unpacked(fused, brief.dimension, _target(brief).order)
-        # While agreement is far off, what is agreed on need not be the information of anything.
-        sound = (np.linalg.eigvalsh(shared[0])[..., 0] > 0.0)[..., None, None]
-        shared, vectors = np.where(sound, shared, Q), np.where(sound, vectors, y)
-        together, local = _position(shared, vectors), _position(Q, y)
+        alone, local = packed(Q, y), _position(Q, y)
+        fused, together, shared = alone, local, Q
+        if self.fusion != "none":
+            state, fused = self._fused(brief, state, alone, heard)
+            shared, vectors = unpacked(fused, brief.dimension, _target(brief).order)
+            # While agreement is far off, what is agreed on need not be the information of anything.
+            sound = (np.linalg.eigvalsh(shared[0])[..., 0] > 0.0)[..., None, None]
+            shared, vectors = np.where(sound, shared, Q), np.where(sound, vectors, y)
+            together = _position(shared, vectors)
         reference = together if self.derivatives == "agreed" else np.concatenate([together[:1], local[1:]])
         reports = {
             "reference": np.moveaxis(reference, 0, -2),
@@ -164,8 +166,6 @@ class TargetEstimator:
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
         """The information found together, jets (m + 1, ..., C) like the agent's own."""
-        if self.fusion == "none":
-            return state, own
         said = heard[TARGET]
         fresh, theirs = said.fresh, said.fields["information"]
         if self.fusion == "mean":
@@ -205,13 +205,15 @@ class TargetEstimator:
     def _information(self, brief: Brief, state: Track) -> tuple[Array, Array]:
         """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D) (7)."""
         target = _target(brief)
-        newer = _predicted(target, state.last, state.now, brief.dt)
         if self.output == "optimal":
-            return newer
-        older = _predicted(target, state.before, state.now, brief.dt)
+            return _predicted(target, state.last, state.now, brief.dt)
+        both = Prediction(*(np.stack(pair) for pair in zip(state.before, state.last, strict=True)))
         share = self._share(target, state, brief.dt)
         rest = np.concatenate([1.0 - share[:1], -share[1:]])
-        Q, y = (jets.scaled(rest, old) + jets.scaled(share, new) for old, new in zip(older, newer, strict=True))
+        Q, y = (
+            jets.scaled(rest, of_both[:, 0]) + jets.scaled(share, of_both[:, 1])
+            for of_both in _predicted(target, both, state.now, brief.dt)
+        )
         return Q, y
 
     def _share(self, target: Target, state: Track, dt: float) -> Array:
