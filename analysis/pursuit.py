@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis import jets
+
 Array = NDArray[np.float64]
 
 # What estimators of a target report: position and derivatives to steer for, shape (m + 1, D), the position found by oneself,
@@ -102,3 +104,19 @@ def position(information: Array, dimension: int, order: int) -> Array:
     """The position that information (..., C) stands for (8), shape (..., D), in metres."""
     Q, y = unpacked(information, dimension, order)
     return np.asarray(np.linalg.solve(Q, y)[..., 0, :], dtype=np.float64)
+
+
+def position_jet(Q: Array, y: Array) -> Array:
+    """The position and its derivatives that jets of information stand for (Algorithm 1, lemma 1).
+
+    Parameters
+    ----------
+    Q, y
+        Information matrices (m + 1, ..., m, m) and vectors (m + 1, ..., m, D).
+
+    Returns
+    -------
+    Shape (m + 1, ..., D), in metres, metres per second ...
+    """
+    found: Array = jets.times(jets.inverse(Q), y)[..., 0, :]
+    return found

@@ -17,9 +17,11 @@ from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
 from agents.estimators.redcho import Consensus
 from analysis import jets
-from analysis.pursuit import Target, diffusion, numbers, packed, transition, unpacked
+from analysis.pursuit import Target, diffusion, numbers, packed, position_jet, transition, unpacked
 from netem.channels import TARGET
 from netem.links import Integers
+
+_LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
 
 class Prediction(NamedTuple):
@@ -45,6 +47,8 @@ class Track(NamedTuple):
         Of detection, now at work, shape (...).
     internal
         Variables of REDCHO, shape (..., m + 1, C), for the C different numbers of information matrix and vectors.
+    theirs, met
+        What neighbours said last, shape (..., n, C), and which have said anything, shape (..., n).
     """
 
     now: Integers
@@ -53,6 +57,8 @@ class Track(NamedTuple):
     settled: Mask
     method: Integers
     internal: Array
+    theirs: Array
+    met: Mask
 
 
 @dataclass(frozen=True)
@@ -117,8 +123,17 @@ class TargetEstimator:
         prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
         unmade = np.full(batch, -1, dtype=np.int64)
         first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, unmade)
-        internal = np.zeros((*batch, order + 1, numbers(order, brief.dimension)))
-        return Track(unmade, first, first, np.zeros(batch, dtype=bool), np.zeros(batch, dtype=np.int64), internal)
+        slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
+        return Track(
+            now=unmade,
+            last=first,
+            before=first,
+            settled=np.zeros(batch, dtype=bool),
+            method=np.zeros(batch, dtype=np.int64),
+            internal=np.zeros((*batch, order + 1, different)),
+            theirs=np.zeros((*batch, slots, different)),
+            met=np.zeros((*batch, slots), dtype=bool),
+        )
 
     def sense(
         self,
@@ -141,15 +156,15 @@ class TargetEstimator:
         """Take in a detection that is done; put together what is known."""
         state = self._detected(brief, _told_the_time(state, own), own)
         Q, y = self._information(brief, state)
-        alone, local = packed(Q, y), _position(Q, y)
+        alone, local = packed(Q, y), position_jet(Q, y)
         fused, together, shared = alone, local, Q
         if self.fusion != "none":
             state, fused = self._fused(brief, state, alone, heard)
             shared, vectors = unpacked(fused, brief.dimension, _target(brief).order)
-            # While agreement is far off, what is agreed on need not be the information of anything.
-            sound = (np.linalg.eigvalsh(shared[0])[..., 0] > 0.0)[..., None, None]
+            # While agreement is far off, what is agreed on need not be the information of anything, or of next to nothing.
+            sound = (np.linalg.eigvalsh(shared[0] - _LEAST * Q[0])[..., 0] > 0.0)[..., None, None]
             shared, vectors = np.where(sound, shared, Q), np.where(sound, vectors, y)
-            together = _position(shared, vectors)
+            together = position_jet(shared, vectors)
         reference = together if self.derivatives == "agreed" else np.concatenate([together[:1], local[1:]])
         reports = {
             "reference": np.moveaxis(reference, 0, -2),
@@ -173,8 +188,11 @@ class TargetEstimator:
             return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
         consensus = self._consensus(brief)
         agreed = consensus.outputs(own, state.internal)
-        theirs = np.where(fresh[..., None], theirs, agreed[0][..., None, :])
-        return state._replace(internal=consensus.step(state.internal, agreed[0], theirs, brief.dt)), agreed
+        # Both ends of an edge have to pull alike, or the mean drifts: who is not heard counts with what it said last.
+        held, met = np.where(fresh[..., None], theirs, state.theirs), state.met | fresh
+        counted = np.where(met[..., None], held, agreed[0][..., None, :])
+        internal = consensus.step(state.internal, agreed[0], counted, brief.dt)
+        return state._replace(internal=internal, theirs=held, met=met), agreed
 
     def _detected(self, brief: Brief, state: Track, own: Own) -> Track:
         """The optimal estimate of the tick in which the detection was done (5), where one was."""
@@ -274,9 +292,3 @@ def _predicted(target: Target, prediction: Prediction, now: Integers, dt: float)
         covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
     Q = jets.inverse(np.stack(covariance))
     return Q, jets.times(Q, np.stack(mean))
-
-
-def _position(Q: Array, y: Array) -> Array:
-    """The jet of the position (m + 1, ..., D) (Algorithm 1)."""
-    found: Array = jets.times(jets.inverse(Q), y)[..., 0, :]
-    return found
