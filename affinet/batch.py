@@ -131,7 +131,9 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
-                kept.append({"peak": peak, **_looked_at(together, present, moment, of_runs)})
+                looked_at = _looked_at(together, present, moment, of_runs)
+                awake = of_runs(~swarm.timeline.at(instant.tick).idle)
+                kept.append({"peak": peak, **looked_at, **_pursued(together, awake, moment, of_runs)})
                 first.append(_shown(plan, moment))
                 places.keep(moment)
                 peak = np.zeros(len(seeds))
@@ -204,7 +206,6 @@ def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any
         "covariance_trace": metrics.covariance_trace(edges.covariance, formation.dimension),
         "nees": consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known).mean,
         "nis": innovations.mean,
-        **_pursued(plan, moment, of_runs),
     }
 
 
@@ -215,8 +216,8 @@ def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
     return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
 
 
-def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
-    """How well a target is found and followed in a tick of all runs, shape (R,)."""
+def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """How well a target is found and followed by those awake (R, N) in a tick of all runs, shape (R,)."""
     names = ("found", "agreed", "ideal", "apart", "behind", "effort")
     pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
     if pursuit is None or not moment.reports.keys() >= REPORTS:
@@ -224,7 +225,13 @@ def _pursued(plan: Plan, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[
     said = moment.reports
     target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)
     agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"][:, 0]))
-    mean = np.mean(information, axis=1, keepdims=True)
-    ideal = position(mean, target.shape[-1], pursuit.target.order)
+    number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
+    mean = np.where(awake[..., None], information, 0.0).sum(axis=1) / number[:, None]
+    ideal = position(mean, target.shape[-1], pursuit.target.order)[:, None]
     off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))
-    return {name: np.sqrt((each**2).sum(axis=-1).mean(axis=-1)) for name, each in zip(names, off, strict=True)}
+
+    def over_agents(each: Array) -> Array:
+        squares = np.where(awake[..., None], each, 0.0) ** 2
+        return np.asarray(np.sqrt(squares.sum(axis=(-2, -1)) / number), dtype=np.float64)
+
+    return {name: over_agents(each) for name, each in zip(names, off, strict=True)}

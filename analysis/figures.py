@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
 _LOST, _FAR = 1.0, 100.0  # m²
 _DECADES = 30.0  # labels that reach farther stand on a logarithmic axis
+_LEGEND = 1.4  # inches beside the panels
 _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
@@ -46,11 +47,12 @@ def curves(
     """
     across, down, each = axes
     columns, rows = _labels(cases, across), _labels(cases, down)
-    figure = Figure(figsize=(3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
+    figure = Figure(figsize=(_LEGEND + 3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
     panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    colours = _colours(cases, each)
     for case in cases:
         panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
-        _draw(panel, case, case.labels[each])
+        _draw(panel, case, case.labels[each], colours[case.labels[each]])
         panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
     if bound is not None:
         for panel in panels.ravel():
@@ -70,13 +72,15 @@ def consistency(
     across, down, each = axes
     first = next(iter(normalised.values()))
     places = list(dict.fromkeys((case.labels[across], case.labels[down]) for case in first))
-    figure = Figure(figsize=(3.4 * len(places), 2.2 * len(normalised)), layout="constrained", dpi=160)
+    figure = Figure(figsize=(_LEGEND + 3.4 * len(places), 2.2 * len(normalised)), layout="constrained", dpi=160)
+    colours = _colours(first, each)
     panels = figure.subplots(len(normalised), len(places), sharex=True, sharey=True, squeeze=False)
     for row, (what, cases) in zip(panels, normalised.items(), strict=True):
         for case in cases:
             panel = row[places.index((case.labels[across], case.labels[down]))]
             mean = case.error.mean(axis=0)
-            panel.plot(case.seconds, np.where(np.isfinite(mean), mean, np.nan), lw=0.8, label=case.labels[each])
+            shown, label = np.where(np.isfinite(mean), mean, np.nan), case.labels[each]
+            panel.plot(case.seconds, shown, lw=0.8, label=label, color=colours[label])
             panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
         for panel in row:
             panel.axhspan(*band(DRAWN, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
@@ -137,14 +141,17 @@ def sweep(
     """A quantity over one axis: a panel for each label of the first other axis, a curve for each of the second."""
     across, each = [name for name in axes if name != along]
     columns = _labels(cases, across)
-    figure = Figure(figsize=(3.6 * len(columns), 3.0), layout="constrained", dpi=160)
+    figure = Figure(figsize=(_LEGEND + 3.0 * len(columns), 3.0), layout="constrained", dpi=160)
     panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)
+    colours = _colours(cases, each)
     for panel, column in zip(panels[0], columns, strict=True):
         for label in _labels(cases, each):
             chosen = [one for one in cases if one.labels[across] == column and one.labels[each] == label]
             where = [float(one.labels[along]) for one in chosen]
             runs = np.array([_finite(one.overall) for one in chosen])
-            panel.errorbar(where, runs.mean(axis=1), yerr=runs.std(axis=1), label=label, marker="o", ms=3, capsize=2)
+            if chosen:
+                mean, spread = runs.mean(axis=1), runs.std(axis=1)
+                panel.errorbar(where, mean, yerr=spread, label=label, color=colours[label], marker="o", ms=3, capsize=2)
         panel.set_title(column)
     labels = [float(label) for label in _labels(cases, along)]
     for panel in panels[0]:
@@ -200,13 +207,13 @@ def _cell(panel: Axes, row: int, column: int, case: Curve) -> float:
     return mean
 
 
-def _draw(panel: Axes, case: Curve, label: str) -> None:
+def _draw(panel: Axes, case: Curve, label: str, colour: str) -> None:
     error = _finite(case.error)
     mean, deviation = error.mean(axis=0), error.std(axis=0)
-    (line,) = panel.plot(case.seconds, mean, lw=1.0, label=label)
+    panel.plot(case.seconds, mean, lw=1.0, label=label, color=colour)
     # A band that reaches zero has no lower end on a logarithmic axis.
     low = np.maximum(mean - deviation, _LOWEST * mean)
-    panel.fill_between(case.seconds, low, mean + deviation, color=line.get_color(), alpha=0.15, lw=0)
+    panel.fill_between(case.seconds, low, mean + deviation, color=colour, alpha=0.15, lw=0)
 
 
 def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
@@ -215,9 +222,15 @@ def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: 
         panel.set_yscale("log")
     for panel in panels[-1]:
         panel.set_xlabel(x)
-    for panel in panels[:, 0]:
-        panel.set_ylabel(y)
-    panels[0, -1].legend(title=legend, fontsize=7)
+    figure.supylabel(y, fontsize=8)
+    drawn = [panel.get_legend_handles_labels() for panel in panels.ravel()]
+    named = {label: handle for handles, labels in drawn for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(named.values(), named.keys(), title=legend, fontsize=7, loc="outside right center")
+
+
+def _colours(cases: Sequence[Curve], axis: str) -> dict[str, str]:
+    """A colour for each label of an axis, the same in every panel."""
+    return {label: f"C{number}" for number, label in enumerate(_labels(cases, axis))}
 
 
 def _labels(cases: Sequence[Curve], axis: str) -> list[str]:

@@ -277,6 +277,10 @@ def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.B
         ),
         overrides={"swarm/trail": rrb.VisibleTimeRanges([trail])},
     )
+    local_maps = rrb.Tabs(
+        rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
+        rrb.TimeSeriesView(origin="metrics/infeasible", name="agents whose neighbours determine no local map"),
+    )
     plots = rrb.Vertical(
         rrb.Tabs(
             *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if localizes else []),
@@ -285,10 +289,7 @@ def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.B
             rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
             rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),
         ),
-        rrb.Tabs(
-            rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
-            rrb.TimeSeriesView(origin="metrics/infeasible", name="agents whose neighbours determine no local map"),
-        ),
+        *([] if localizes or pursues else [local_maps]),
         rrb.TimeSeriesView(origin="metrics/messages", name="messages per tick, by verdict"),
         rrb.Tabs(
             rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),
