@@ -45,7 +45,7 @@ def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
         says, level = ", ".join(labels) + ": " * bool(labels) + claim.says, claim.level
         if claim.levels is not None:
             level = claim.levels[labels[0]]
-            says += f" {level:g} {NAMES[claim.quantity or study.quantity][1]}"
+            says += f" {level:g} {NAMES[claim.quantity or study.quantity][1]}".rstrip()
         yield claim.model_copy(update={"says": says, "of": claim.of | where, "to": other, "level": level})
 
 

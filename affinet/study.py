@@ -74,8 +74,10 @@ class Claim(Section):
     def _compared(self) -> Claim:
         if (self.to is None) == (self.check in ("approaches", "lower", "ratio")):
             raise ValueError(f"the check {self.check!r} {'needs' if self.to is None else 'has no use for'} to")
-        if self.levels is not None and len(self.each) != 1:
-            raise ValueError("levels are for the labels of one axis: name it in each")
+        if self.levels is not None and (len(self.each) != 1 or self.level is not None):
+            raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
+        if self.levels is not None and self.check not in ("value", "stays_below", "leaves", "flat"):
+            raise ValueError(f"the check {self.check!r} has no use for levels")
         return self
 
 

@@ -35,9 +35,9 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
-    if results[0].runs.first.keys() >= REPORTS:
+    if all(one.runs.first.keys() >= REPORTS for one in results):
         _draw_pursuit(out, study, results)
-    if PLACE in results[0].runs.first:
+    if all(PLACE in one.runs.first for one in results):
         figures.evolution(
             out / "evolution.png",
             study.title,

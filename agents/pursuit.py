@@ -13,6 +13,8 @@ from agents.brief import Array, Brief, Own, Reading
 from agents.controllers import Nothing
 from agents.estimators.base import Estimate, Heard
 
+_MOST = 4  # times: quadruple integrators
+
 
 @dataclass(frozen=True)
 class Pursuit:
@@ -32,8 +34,11 @@ class Pursuit:
     kappa: Sequence[float] = (1.0, 2.0)
 
     def __post_init__(self) -> None:
-        if not self.kappa:
-            raise ValueError("kappa needs a gain for each time that bodies integrate their input; give [1.0, 2.0]")
+        if not 1 <= len(self.kappa) <= _MOST:
+            raise ValueError(
+                f"kappa needs a gain for each of 1 to {_MOST} times that bodies integrate their input, like [1.0, 2.0]; "
+                f"got {list(self.kappa)}"
+            )
 
     @property
     def order(self) -> int:

@@ -128,7 +128,7 @@ def draw(agent, links, seed, lead):
 
 
 def odometry(agent, velocity):
-    return velocity if agent.law.order == 2 else None
+    return velocity[..., None, :] if agent.law.order == 2 else None
 
 
 def leaves(value):

@@ -1,5 +1,6 @@
 """An agent's state on disk: every estimator and law goes on from it bit for bit, whenever its process dies."""
 
+from dataclasses import replace
 from importlib.metadata import entry_points
 from itertools import product
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 
+from affinet.sections import INTEGRATORS
 from agents import checkpoint
 from agents.agent import Agent
 from agents.estimators.base import Heard
@@ -16,11 +18,10 @@ from netem.channels import CENTRE
 
 ESTIMATORS, LAWS = (entry_points(group=f"affinet.{what}") for what in ("estimators", "controllers"))
 SINGLE = {"edge-kf", "joint-kf", "silent-kf", "crkf"}  # they predict by inputs that are velocities
-PURSUIT = {"pursuit", "first-order-pursuit"}
 PAIRS = [
     (estimator, law)
     for estimator, law in product(sorted(ESTIMATORS.names), sorted(LAWS.names))
-    if not (estimator in SINGLE and LAWS[law].load()().order == 2) and (estimator == "target") == (law in PURSUIT)
+    if not (estimator in SINGLE and LAWS[law].load()().order == 2) and (estimator == "target") == (law == "pursuit")
 ]
 TICKS = 6
 FORGETFUL = {"none", "mle", "ral", "crkf"}  # they say what the tick says
@@ -57,8 +58,8 @@ def lives(agent, state, ticks, seed):
         measured = np.where(
             seen[:, None], agent.brief.relative + 0.1 * rng.normal(size=agent.brief.relative.shape), 0.0
         )
-        velocity = rng.normal(size=agent.brief.dimension) if agent.law.order == 2 else None
-        state, _ = agent.sense(state, measured, seen, velocity)
+        motion = rng.normal(size=(agent.law.order - 1, agent.brief.dimension)) if agent.law.order > 1 else None
+        state, _ = agent.sense(state, measured, seen, motion)
         fresh = (rng.random(slots) < 0.8) & agent.brief.present
         heard = {
             channel: Heard(
@@ -73,17 +74,16 @@ def lives(agent, state, ticks, seed):
         if agent.brief.target is not None:
             position = rng.normal(size=agent.brief.dimension)
             sighting = Sighting(position + 1.0, np.array(rng.random() < 0.4), *rng.integers(2, size=2))
-        state, action = agent.act(state, tick, heard, position, velocity, sighting)
+        state, action = agent.act(state, tick, heard, position, motion, sighting)
         told.append(action.input)
     return state, np.array(told)
 
 
-@pytest.mark.parametrize(("estimator", "law"), PAIRS)
-def test_every_estimator_and_law_goes_on_from_its_checkpoint_bit_for_bit(estimator, law, tmp_path):
-    agent = agent_of(estimator, law)
+def lived_on(agent, file):
+    """What an agent commands after a while and a checkpoint, as it would have without one; and a fresh agent instead."""
     state, _ = lives(agent, agent.init(()), TICKS, seed=1)
-    checkpoint.save(tmp_path / "agent.npz", state)
-    loaded = checkpoint.load(tmp_path / "agent.npz", like=agent.init(()))
+    checkpoint.save(file, state)
+    loaded = checkpoint.load(file, like=agent.init(()))
     assert_equal_bits(loaded, state)
     assert repr(type(loaded.estimator)) == repr(type(state.estimator))
     later, told = lives(agent, state, TICKS, seed=2)
@@ -91,7 +91,26 @@ def test_every_estimator_and_law_goes_on_from_its_checkpoint_bit_for_bit(estimat
     assert_equal_bits(later_too, later)
     assert told_too.tobytes() == told.tobytes()
     _, of_nobody = lives(agent, agent.init(()), TICKS, seed=2)
+    return told, of_nobody
+
+
+@pytest.mark.parametrize(("estimator", "law"), PAIRS)
+def test_every_estimator_and_law_goes_on_from_its_checkpoint_bit_for_bit(estimator, law, tmp_path):
+    told, of_nobody = lived_on(agent_of(estimator, law), tmp_path / "agent.npz")
     assert estimator in FORGETFUL or law == "rest" or of_nobody.tobytes() != told.tobytes()
+
+
+@pytest.mark.parametrize("order", [1, 3, 4])
+def test_who_pursues_by_derivatives_of_any_order_goes_on_from_its_checkpoint(order, tmp_path):
+    agent = plan_of(
+        "target",
+        f"target.order={order}",
+        f"dynamics.model={INTEGRATORS[order - 1]}",
+        f"agents.parameters.pursuit.kappa={[1.0, 3.0, 3.0, 1.0][:order]}",
+        'agents.parameters.target={fusion="mean"}',
+    ).agents
+    told, of_nobody = lived_on(replace(agent, brief=agent.brief.of(4)), tmp_path / "agent.npz")
+    assert of_nobody.tobytes() != told.tobytes()
 
 
 def test_numbers_that_are_none_and_zeros_below_zero_come_back_as_they_were(tmp_path):

@@ -610,7 +610,7 @@ def test_many_runs_are_looked_at_as_each_alone():
         np.testing.assert_allclose(runs.localization[row], localization.distance(place, edges), atol=1e-12)
         np.testing.assert_allclose(runs.drift[row], np.linalg.norm(centre - centre[0], axis=-1), atol=1e-12)
         np.testing.assert_array_equal(runs.ringing[row], ringing(place))
-    np.testing.assert_array_equal(runs.place, flown(*overrides, "seed=5").arrays["place"])
+    np.testing.assert_array_equal(runs.first["place"], flown(*overrides, "seed=5").arrays["place"])
     assert runs.ringing.max() > 0.0
     assert np.isnan(runs.found).all()
 

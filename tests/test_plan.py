@@ -14,7 +14,7 @@ from agents.brief import Own
 from agents.controllers import ConstantVelocity, Static, VaryingVelocity
 from agents.estimators.base import Estimate, Heard
 from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
-from world.dynamics import double_integrator, single_integrator
+from world import dynamics
 from world.formation import PRESETS
 from world.stress import laplacian, solve
 
@@ -271,8 +271,8 @@ def tick_of(made, law, state, position, own):
     state, flown = law.command(brief, state, 0, own, estimate, Heard(said, brief.present))
     flown = np.where(brief.leader[:, None], 0.0, flown)
     if law.order == 1:
-        return state, single_integrator(position, flown, brief.dt, 0.0), Own(flown, flown)
-    position = double_integrator(position, own.velocity, flown, brief.dt, 0.0)
+        return state, dynamics.carried([position, flown], brief.dt), Own(flown, flown)
+    position = dynamics.carried([position, own.velocity, flown], brief.dt)
     return state, position, Own(own.velocity + brief.dt * flown, flown)
 
 

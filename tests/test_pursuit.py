@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import factorial
 from typing import NamedTuple
 
@@ -19,17 +19,18 @@ from affinet.batch import fly_all
 from affinet.inprocess import Swarm
 from affinet.plan import PlanError
 from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
+from affinet.sections import INTEGRATORS, ScenarioError
 from affinet.side_by_side import side_by_side
 from agents.brief import Own
 from agents.estimators.base import Estimate, Heard
 from agents.estimators.none import NoEstimator
 from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
-from agents.pursuit import FirstOrderPursuit, Pursuit
+from agents.pursuit import Pursuit
 from analysis import jets
 from analysis.pursuit import Sighting, Target, diffusion, numbers, packed, position, transition, unpacked
-from netem.channels import TARGET
+from netem.channels import INPUT, TARGET
+from netem.fate import Fate
 from world import pursued
 from world.history import History
 
@@ -176,7 +177,10 @@ def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2,
     chase = chase_of.begin(runs, runs)._replace(target=start)
     alone = replace(brief(np.zeros((runs, 1, dimension))), dt=dt, target=target)
     state = estimator.init(alone, (runs,))
-    heard = {TARGET: Heard({"information": np.zeros((runs, 1, numbers(target.order, dimension)))}, alone.present)}
+    heard = {
+        channel: Heard({name: np.zeros((runs, 1, *field.shape)) for name, field in fields.items()}, alone.present)
+        for channel, fields in estimator.channels(alone).items()
+    }
     nothing = np.zeros((runs, dimension))
     for tick in range(ticks):
         sighting = chase_of.sighting(tick, seeds, first, chase)
@@ -188,23 +192,22 @@ def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2,
 
 def informed(flown, order=2, dimension=2):
     """Mean and covariance that the information of ticks stands for."""
-    Q, y = unpacked(np.stack([tick.estimate.reports["information"] for tick in flown]), dimension, order)
+    Q, y = unpacked(np.stack([tick.estimate.reports["information"][:, 0] for tick in flown]), dimension, order)
     return np.linalg.solve(Q, y), np.linalg.inv(Q)
 
 
 class Textbook:
     """The optimal estimates of one agent (5) and what follows from them (6), (7), number by number, axis by axis."""
 
-    def __init__(self, flown, target, dt, prior=(1.0, 1.0)):
+    def __init__(self, sightings, target, dt, agent=0):
         self.target, self.dt, order = target, dt, target.order
-        done = [0] + [tick for tick, one in enumerate(flown) if one.sighting.done[0]]
-        deviations = [prior[0]] + [prior[1]] * (order - 1)
-        axes = flown[0].truth.shape[-1]
-        self.times, self.methods = done, [int(flown[tick].sighting.method[0]) for tick in done]
-        self.means, self.covariances = [np.zeros((order, axes))], [np.diag(deviations) ** 2]
+        done = [0] + [tick for tick, sighting in enumerate(sightings) if sighting.done[agent]]
+        axes = sightings[0].position.shape[-1]
+        self.times, self.methods = done, [int(sightings[tick].method[agent]) for tick in done]
+        self.means, self.covariances = [np.zeros((order, axes))], [np.eye(order)]  # the prior
         for (begun, over), method in zip(pairwise(done), self.methods, strict=False):
             assert over - begun == target.latencies[method]
-            z, R = flown[over].sighting.position[0], target.variances[method]
+            z, R = sightings[over].position[agent], target.variances[method]
             A, W = van_loan(order, target.intensity, (over - begun) * dt)
             x, P = self.means[-1], self.covariances[-1]
             # A measurement is taken in, and the posterior predicted to the time when it is known.
@@ -236,15 +239,15 @@ class Textbook:
         return tuple((1 - eta) * old + eta * new for old, new in zip(*information, strict=True))
 
 
-OPTIMAL = TargetEstimator(output="optimal", fuse_information=False)
-SMOOTH = TargetEstimator(fuse_information=False)
+OPTIMAL = TargetEstimator(output="optimal", fusion="none")
+SMOOTH = TargetEstimator(fusion="none")
 
 
 @ORDERS
 def test_the_optimal_output_is_that_of_a_kalman_filter_written_apart(order):
     target, dt = target_of(order), 0.05
     flown = list(watch(OPTIMAL, target, ticks=110, seed=order + 1))
-    book = Textbook(flown, target, dt)
+    book = Textbook([one.sighting for one in flown], target, dt)
     assert len(book.times) > 5
     assert set(book.methods) == {0, 1}
     means, covariances = informed(flown, order)
@@ -272,10 +275,10 @@ def test_the_derivatives_of_the_optimal_output_are_those_of_the_prediction():
 def test_the_smooth_output_passes_from_the_older_prediction_to_the_newer(order, alpha):
     target, dt = target_of(order), 0.05
     flown = list(watch(replace(SMOOTH, alpha=alpha), target, ticks=60, seed=order))
-    book = Textbook(flown, target, dt)
+    book = Textbook([one.sighting for one in flown], target, dt)
     for tick, one in enumerate(flown):
         Q, y = book.smooth(tick * dt, alpha)
-        said = unpacked(one.estimate.reports["information"][0], 2, order)
+        said = unpacked(one.estimate.reports["information"][0, 0], 2, order)
         np.testing.assert_allclose(said[0], Q, rtol=1e-9, atol=1e-9 * np.abs(Q).max())
         np.testing.assert_allclose(said[1], y, rtol=1e-9, atol=1e-9 * np.abs(y).max())
         P = np.linalg.inv(Q)
@@ -294,7 +297,7 @@ def stencil(function, at, step):
 def test_derivatives_of_the_smooth_output_are_those_of_the_function_of_time():
     target, dt, alpha = target_of(), 0.05, 0.7
     flown = list(watch(replace(SMOOTH, alpha=alpha), target, ticks=60))
-    book = Textbook(flown, target, dt)
+    book = Textbook([one.sighting for one in flown], target, dt)
     looked_at = [tick for tick in range(1, 60) if tick not in book.times]
     assert len(looked_at) > 50
     for tick in looked_at:
@@ -323,10 +326,12 @@ def test_a_detection_that_is_taken_in_changes_no_derivative_of_the_smooth_output
         _, before = estimator.fuse(
             alone, one.before, {}, Own(nothing, nothing, int(one.before.now[0]), sighting=ignored)
         )
-        for name in ("information", "reference", "variance"):
+        for name in ("reference", "variance"):
             np.testing.assert_allclose(one.estimate.reports[name], before.reports[name], rtol=1e-9, atol=1e-12)
         just_before = estimator._information(alone, one.before)
         just_after = estimator._information(alone, one.state)
+        for moment, reported in ((just_before, before), (just_after, one.estimate)):
+            np.testing.assert_array_equal(np.moveaxis(packed(*moment), 0, -2), reported.reports["information"])
         for mine, theirs in zip(just_before, just_after, strict=True):
             assert len(mine) == order + 1
             for derivative in range(order + 1):
@@ -418,7 +423,7 @@ RUNS = 1000
 def crowd(latencies, output, alpha):
     """Errors (T, R, m, D), covariances (T, R, m, m) of the estimate and of the optimal one, and ages (T, R), of many runs."""
     target = target_of(2, latencies, (0.02, 0.1)[: len(latencies)])
-    flown = list(watch(TargetEstimator(output, alpha, False), target, ticks=64, runs=RUNS))[-24:]
+    flown = list(watch(TargetEstimator(output, alpha, "none"), target, ticks=64, runs=RUNS))[-24:]
     means, covariances = informed(flown)
     newest = []
     for one in flown:
@@ -541,11 +546,11 @@ def test_shorter_steps_make_the_agreement_closer():
 
 
 @cache
-def agreed(seconds=0.526, **parameters):
+def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
     """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
-    target, dt = target_of(2, (400, 200)), 1e-3
+    target = target_of(order, latencies)
     estimator = TargetEstimator(theta=10.0, **parameters)
-    chase_of, who = pursued.Pursuit(target, dt, np.zeros((2, 2))), np.array([1, 2, 3])
+    chase_of, who = pursued.Pursuit(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
     chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
     agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
     state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
@@ -554,18 +559,18 @@ def agreed(seconds=0.526, **parameters):
         state, said = estimator.sense(agents, state, agents.relative, agents.present)
         heard = {TARGET: Heard({"information": said[TARGET]["information"][neighbours]}, agents.present)}
         state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=sighting))
-        flown.append((state, estimate, chase.target, said))
+        flown.append((state, estimate, sighting, said))
         chase = chase_of.step(tick, 5, who, chase)
     return flown
 
 
 def test_agents_agree_on_the_position_that_all_their_information_stands_for():
     state, estimate, *_ = agreed()[-1]
-    ideal = position(estimate.reports["information"].mean(axis=0), 2, 2)
+    ideal = position(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)
     apart = np.abs(estimate.reports["found"] - ideal).max()
     assert np.abs(estimate.reports["reference"][:, 0] - ideal).max() < apart / 50
     assert np.abs(state.internal.sum(axis=0)).max() < 1e-6 * np.abs(state.internal).max()
-    Q = unpacked(estimate.reports["information"].mean(axis=0), 2, 2)[0]
+    Q = unpacked(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)[0]
     np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=0.06)
 
 
@@ -573,12 +578,14 @@ def test_what_is_said_is_the_agents_own_information_less_its_internals():
     for (before, estimate, *_), (*_, said) in list(pairwise(agreed()))[::50]:
         assert said[TARGET]["information"].shape == (3, 7)
         assert np.isfinite(estimate.reports["information"]).all()
-        assert before.internal.shape == (3, 3, 7)
+        assert before.internal.shape == estimate.reports["fused"].shape == (3, 3, 7)
     _, estimate, _, said = agreed()[-1]
     # The internals of the tick before are in what was said; nothing was detected in this tick.
     np.testing.assert_allclose(
-        said[TARGET]["information"], estimate.reports["information"] - agreed()[-2][0].internal[:, 0], rtol=1e-9
+        said[TARGET]["information"], estimate.reports["information"][:, 0] - agreed()[-2][0].internal[:, 0], rtol=1e-9
     )
+    # It is what is agreed on so far, with derivatives that are not said.
+    np.testing.assert_allclose(said[TARGET]["information"], estimate.reports["fused"][:, 0], rtol=1e-9)
 
 
 def test_derivatives_are_the_agents_own_where_wanted():
@@ -595,23 +602,113 @@ def test_derivatives_are_the_agents_own_where_wanted():
     np.testing.assert_allclose(alone["found"], by_itself.reports["found"], rtol=1e-9)
 
 
-def test_who_hears_nobody_goes_by_its_own_information():
+@pytest.mark.parametrize("fusion", ["redcho", "mean"])
+def test_who_hears_nobody_goes_by_its_own_information(fusion):
     alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target_of())
     assert not alone.present.any()
-    flown, by_itself = (list(watch(estimator, target_of(), ticks=60)) for estimator in (TargetEstimator(), SMOOTH))
+    together = TargetEstimator(fusion=fusion)
+    flown, by_itself = (list(watch(estimator, target_of(), ticks=60)) for estimator in (together, SMOOTH))
     for one, other in zip(flown, by_itself, strict=True):
-        for name in ("reference", "found", "variance", "information"):
+        for name in ("reference", "found", "variance", "information", "fused"):
             np.testing.assert_allclose(one.estimate.reports[name], other.estimate.reports[name], rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(other.estimate.reports["fused"], other.estimate.reports["information"])
 
 
 def test_what_a_target_estimator_knows_of_neighbours_is_nothing():
     (one, *_) = watch(SMOOTH, target_of(), ticks=1)
     assert not one.estimate.known.any()
     assert np.isnan(one.estimate.psi).all()
-    assert TargetEstimator().channels(replace(brief(np.ones((2, 2))), target=target_of(3)))[TARGET][
-        "information"
-    ].shape == (6 + 3 * 2,)
-    assert SMOOTH.channels(replace(brief(np.ones((2, 2))), target=target_of())) == {}
+
+
+def test_what_is_told_is_the_information_with_the_derivatives_that_are_wanted():
+    told = replace(brief(np.ones((2, 2))), target=target_of(3))
+    assert TargetEstimator().channels(told)[TARGET]["information"].shape == (6 + 3 * 2,)
+    assert TargetEstimator(fusion="mean").channels(told)[TARGET]["information"].shape == (4, 6 + 3 * 2)
+    assert SMOOTH.channels(told) == {}
+
+
+# The mean of what is heard
+
+
+def around(function, at, orders, radius=0.02, points=16):
+    """Value and derivatives of a function of time that is real where time is, by Cauchy's formula on half a circle."""
+    turns = np.exp(2j * np.pi * np.arange(points // 2 + 1) / points)
+    series = np.fft.hfft([function(at + radius * turn) for turn in turns], points, axis=0) / points
+    return [factorial(order) * series[order] / radius**order for order in range(orders)]
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_with_the_mean_come_the_derivatives_of_the_position_that_it_stands_for(order):
+    dt, latencies = 0.05, (14, 8)
+    flown = agreed(2.0, dt, latencies, order, fusion="mean")
+    books = [Textbook([one[2] for one in flown], target_of(order, latencies), dt, agent) for agent in range(3)]
+    assert min(len(book.times) for book in books) > 2
+    for tick in range(1, 40, 5):
+        latest = [book.latest(tick * dt) for book in books]
+
+        def place(seconds, latest=latest):
+            Q, y = zip(*(book.smooth(seconds, 1.0, k) for book, k in zip(books, latest, strict=True)), strict=True)
+            return np.linalg.solve(sum(Q), sum(y))[0]
+
+        expected = around(place, tick * dt, order + 1)
+        for found in flown[tick][1].reports["reference"]:
+            for mine, theirs in zip(found, expected, strict=True):
+                np.testing.assert_allclose(mine, theirs, rtol=1e-6, atol=1e-6 * np.abs(theirs).max())
+
+
+def hearing(estimator, state, shares, fresh, tick=0):
+    """A tick of three agents without a detection, in which neighbours say these multiples of what it says itself."""
+    agents, nothing = replace(brief(np.ones((3, 2, 2))), target=target_of()), np.zeros((3, 2))
+    state, said = estimator.sense(agents, state or estimator.init(agents, (3,)), agents.relative, agents.present)
+    mine = said[TARGET]["information"]
+    theirs = np.multiply.outer(np.array(shares), np.ones(mine.shape[1:])) * mine[:, None]
+    idle = Sighting(nothing, np.zeros(3, dtype=bool), state.method, state.method)
+    heard = {TARGET: Heard({"information": theirs}, np.array(fresh))}
+    state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=idle))
+    return state, estimate.reports, mine
+
+
+PARTLY = [[True, False], [False, False], [True, True]]
+
+
+def test_what_was_lost_counts_for_nothing_in_the_mean_whatever_stands_in_its_place():
+    nan = np.nan
+    _, said, mine = hearing(TargetEstimator(fusion="mean"), None, [[2.0, nan], [nan, -7.0], [3.0, 4.0]], PARTLY)
+    # (1 + 2) / 2 and (1 + 3 + 4) / 3 of what all know alike in the first tick.
+    assert np.abs(mine).max() > 0.1
+    np.testing.assert_allclose(said["fused"], np.array([1.5, 1.0, 8 / 3])[:, None, None] * mine, rtol=1e-12)
+
+
+def test_what_was_lost_counts_in_redcho_as_what_was_said_last_and_before_that_for_nothing():
+    redcho, nan, all_heard = TargetEstimator(theta=2.0), np.nan, np.ones((3, 2), dtype=bool)
+    once, *_ = hearing(redcho, None, [[2.0, nan], [nan, nan], [3.0, 4.0]], PARTLY)
+    silent, *_ = hearing(redcho, None, [[2.0, 1.0], [1.0, 1.0], [3.0, 4.0]], all_heard)
+    np.testing.assert_array_equal(once.internal, silent.internal)
+    assert (np.abs(once.internal).max(axis=(1, 2)) > 1e-3).tolist() == [True, False, True]
+    held, _, mine = hearing(redcho, once, np.full((3, 2), nan), ~all_heard, tick=1)
+    last = np.where(np.array(PARTLY)[..., None], once.theirs, mine[:, None])
+    agents = replace(brief(np.ones((3, 2, 2))), target=target_of())
+    expected = redcho._consensus(agents).step(once.internal, mine, last, agents.dt)
+    np.testing.assert_allclose(held.internal, expected, rtol=1e-12, atol=1e-12)
+    assert np.abs(held.internal - once.internal).max() > 1e-3
+
+
+def test_an_agent_goes_by_its_own_information_where_what_is_agreed_on_is_next_to_none():
+    # In the mean a hundredth of its own is left, and a little more or less.
+    shares = np.array([-0.984, -0.976, -1.5])
+    _, said, _ = hearing(TargetEstimator(fusion="mean"), None, np.stack([shares, shares], axis=1), [[True, False]] * 3)
+    _, alone, _ = hearing(TargetEstimator(fusion="mean"), None, np.zeros((3, 2)), np.zeros((3, 2), dtype=bool))
+    np.testing.assert_allclose(said["variance"], alone["variance"] / [1.0, 0.012, 1.0], rtol=1e-9)
+
+
+def test_all_that_hear_everybody_find_the_same_with_the_mean():
+    for _, estimate, *_ in agreed(2.0, 0.05, (20, 10), fusion="mean")[1:]:
+        for name in ("reference", "variance", "fused"):
+            first, *others = estimate.reports[name]
+            for other in others:
+                np.testing.assert_allclose(other, first, rtol=1e-12, atol=1e-12 * np.abs(first).max())
+        Q = unpacked(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)[0]
+        np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=1e-9)
 
 
 # The law
@@ -638,7 +735,7 @@ def test_the_law_by_hand():
     _, u = law.command(PLACED, law.init(PLACED, ()), 0, own, reference, None)
     # Off by (10, 2) - (4, 1) - (3, -1) = (3, 2), behind by (-0.5, -1).
     np.testing.assert_allclose(u, [0.1 - 2 * 3 + 3 * 0.5, -0.2 - 2 * 2 + 3 * 1], rtol=1e-12)
-    first = FirstOrderPursuit(kappa=2.0)
+    first = Pursuit(kappa=[2.0])
     _, u = first.command(PLACED, first.init(PLACED, ()), 0, own, reference, None)
     np.testing.assert_allclose(u, [1 - 2 * 3, 1 - 2 * 2], rtol=1e-12)
     np.testing.assert_allclose(
@@ -646,17 +743,58 @@ def test_the_law_by_hand():
     )
 
 
+@pytest.mark.parametrize("batch", [(), (3, 5)], ids=["one", "many"])
+@ORDERS
+def test_the_law_of_any_order_is_that_of_the_paper(order, batch):
+    rng = np.random.default_rng(order)
+    p, x, k = rng.normal(size=(5, *batch, 2)), rng.normal(size=(4, *batch, 2)), rng.uniform(0.5, 3.0, 4)
+    place = k[0] * (x[0] - p[0] - PLACED.nominal)
+    written_out = {  # (11)
+        1: p[1] - place,
+        2: p[2] - place - k[1] * (x[1] - p[1]),
+        3: p[3] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]),
+        4: p[4] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]) - k[3] * (x[3] - p[3]),
+    }
+    law, flying = Pursuit(kappa=k[:order].tolist()), np.full((*batch, 2), 77.0)
+    assert law.order == order
+    own = Own(flying, flying, 0, x[0])
+    if order > 1:
+        own = own._replace(velocity=x[1], higher=np.moveaxis(x[2:order], 0, -2))
+    # Those who know of more derivatives than the law wants do not disturb it.
+    for known in range(order + 1, 6):
+        reference = knows(*np.zeros((known, 2)))._replace(reports={"reference": np.moveaxis(p[:known], 0, -2)})
+        _, u = law.command(PLACED, law.init(PLACED, batch), 0, own, reference, None)
+        np.testing.assert_allclose(u, written_out[order], rtol=1e-12, atol=1e-12)
+    with pytest.raises(ValueError, match=f"derivatives up to {order}; choose an estimator"):
+        law.command(PLACED, law.init(PLACED, batch), 0, own, knows(*np.zeros((order, 2))), None)
+
+
+def test_a_law_without_a_gain_is_none():
+    with pytest.raises(ValueError, match=r"kappa needs a gain .* give \[1.0, 2.0\]"):
+        Pursuit(kappa=())
+
+
 def test_the_law_wants_a_position():
     nowhere = Own(np.zeros(2), np.zeros(2))
-    for law in (Pursuit(), FirstOrderPursuit()):
+    for law in (Pursuit(), Pursuit(kappa=(1.0,))):
         with pytest.raises(ValueError, match="own position"):
             law.command(PLACED, law.init(PLACED, ()), 0, nowhere, knows([0, 0], [0, 0], [0, 0]), None)
 
 
 NAME = "target"
 COARSE = ("time.dt=0.01", "target.latencies=[0.2,0.1]", "agents.parameters.target.theta=4")
-ALONE = "agents.parameters.target={fuse_information=false}"
-SINGLE = ('agents.law="first-order-pursuit"', 'dynamics.model="single-integrator"')
+ALONE = 'agents.parameters.target={fusion="none"}'
+MEAN = 'agents.parameters.target={fusion="mean"}'
+
+
+def bodies(order, *kappa):
+    """Bodies of an order, and the gains of the law that steers them."""
+    return f'dynamics.model="{INTEGRATORS[order - 1]}"', f"agents.parameters.pursuit.kappa={list(map(float, kappa))}"
+
+
+SINGLE = bodies(1, 1)
+TRIPLE = (*bodies(3, 27, 27, 9), "target.order=3")  # thrice a pole at -3/s
+FEW = "formation={nodes=[[5,0],[-3,4],[-3,-4]],edges=['1-2','2-3'],leaders=[],spread=3.0}"
 
 
 def refusal(*overrides, name=NAME):
@@ -674,7 +812,16 @@ def refusal(*overrides, name=NAME):
         (("target.order=1", ALONE), "derivatives up to 2"),
         (('agents.estimator="none"', *SINGLE), "derivatives up to 1"),
         (("target.order=1",), "a target of order 1 needs 2 gains k and gamma"),
-        (('agents.parameters.target={output="optimal"}',), "wants output = 'smooth'"),
+        (('agents.parameters.target={output="optimal"}',), "fusion = 'redcho' wants output = 'smooth'"),
+        (('agents.parameters.target={output="optimal",fusion="mean"}',), "fusion = 'mean' wants output = 'smooth'"),
+        (('agents.parameters.target={fusion="median"}',), "'redcho', 'mean' or 'none', got 'median'"),
+        ((*bodies(3, 1, 3, 3), ALONE), "derivatives up to 3; choose an estimator that reports them"),
+        (bodies(2, 1), "bodies are double-integrators; set it to 'single-integrator'"),
+        (bodies(2, 1, 3, 3), "pursuit steers jerks, and bodies are double-integrators; set it to 'triple-integrator'"),
+        (bodies(3, 1, 4, 6, 4), "pursuit steers snaps, and bodies are triple-integrators; set it to 'quadruple-i"),
+        (bodies(4, 1, 2), "pursuit steers accelerations, and bodies are quadruple-integrators; set it to 'double-i"),
+        (bodies(2), "agents.parameters.pursuit: kappa needs a gain for each time that bodies integrate"),
+        ((*TRIPLE, ALONE, "formation.leaders=[1,2,3]"), "formation.leaders: who leads is steered by velocities or acc"),
         (("agents.parameters.target.alpha=0.0",), "alpha must be above 0"),
         (("target.latencies=[0.5,0.0031]",), "target.latencies"),
         (("target.latencies=[0.5]",), "a variance for each latency"),
@@ -697,8 +844,45 @@ def test_an_estimator_of_a_target_needs_one():
 
 def test_gains_of_the_laws_are_read_from_the_scenario():
     assert plan_of(NAME, "agents.parameters.pursuit={kappa=[4.0,5.0]}").law.build() == Pursuit([4.0, 5.0])
-    single = plan_of(NAME, *SINGLE, "agents.parameters.first-order-pursuit={kappa=3.0}")
-    assert single.law.build() == FirstOrderPursuit(3.0)
+    for order in (1, 2, 3, 4):
+        kappa = [1.0, 5.0, 2.0, 7.0][:order]
+        made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
+        assert (made.law.build(), made.world.order, made.agents.law.order) == (Pursuit(kappa), order, order)
+
+
+def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
+    for overrides in (SINGLE, ()):
+        assert plan_of(NAME, *overrides, "formation.leaders=[1,2,3]").world.formation.is_leader.sum() == 3
+
+
+# The agent
+
+
+@ORDERS
+def test_agents_say_how_they_move_up_to_their_input_and_steer_by_it(order):
+    kappa, rng = [2.0, 3.0, 5.0, 7.0][:order], np.random.default_rng(order)
+    made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
+    agent, nobody = made.agents, np.zeros_like(made.brief.present)
+    place, *moves = rng.normal(size=(order, 10, 2))
+    motion = np.stack(moves, axis=1) if moves else None
+    sighting = Sighting(rng.normal(size=(10, 2)), np.ones(10, dtype=bool), *np.zeros((2, 10), dtype=np.int64))
+    state = agent.init((10,))
+    for tick in range(2):
+        flying = state.input
+        state, said = agent.sense(state, made.brief.relative, made.brief.present, motion)
+        assert list(said[INPUT]) == ["velocity", "acceleration", "jerk", "snap"][:order]
+        assert {name: field.shape for name, field in agent.channels()[INPUT].items()} == dict.fromkeys(
+            said[INPUT], (2,)
+        )
+        for told, mine in zip(said[INPUT].values(), [*moves, flying], strict=True):
+            np.testing.assert_array_equal(told, mine)
+        heard = {INPUT: Heard({name: np.zeros((*nobody.shape, 2)) for name in said[INPUT]}, nobody)}
+        state, action = agent.act(state, tick, heard, place, motion, sighting)
+        p = np.moveaxis(action.estimate.reports["reference"], 1, 0)
+        off = [place - p[0] - made.brief.nominal, *(mine - p[mu] for mu, mine in enumerate(moves, 1))]
+        expected = p[order] - sum(gain * each for gain, each in zip(kappa, off, strict=True))
+        np.testing.assert_allclose(action.input, expected, rtol=1e-12, atol=1e-12)
+    assert (flying != 0.0).all()
 
 
 # The world
@@ -812,7 +996,13 @@ def test_methods_are_about_equally_frequent_whatever_came_before():
 SEEDS = (1, 7, 2**63 + 5)
 
 
-@pytest.mark.parametrize("air", [(), ("network.availability=0.7", "network.delay_ticks=2")], ids=["clear", "lossy"])
+LOSSY = ("network.availability=0.7", "network.delay_ticks=2")
+FOURTH = (*bodies(4, 81, 108, 54, 12), "target.order=4", MEAN, "network.availability=0.7", "time.duration=0.3")
+
+
+@pytest.mark.parametrize(
+    "air", [(), LOSSY, (MEAN, *LOSSY), FOURTH], ids=["clear", "lossy", "mean", "quadruple-integrators"]
+)
 def test_every_swarm_side_by_side_meets_the_draws_that_it_meets_alone(air):
     short = (*COARSE, "time.duration=0.6", *air)
     plan = plan_of(NAME, *short)
@@ -823,19 +1013,25 @@ def test_every_swarm_side_by_side_meets_the_draws_that_it_meets_alone(air):
     for place, seed in enumerate(SEEDS):
         alone = rehearse(plan_of(NAME, *short, f"seed={seed}")).arrays
         agents = slice(10 * place, 10 * (place + 1))
-        for array in ("position", "target", "reference", "found", "variance", "information", "input"):
+        for array in ("position", "target", "reference", "found", "variance", "information", "fused", "input"):
             np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
         assert np.isfinite(alone["reference"]).all()
 
 
-def test_the_runs_of_a_study_are_looked_at_as_each_alone():
-    short = (*COARSE, "time.duration=0.5")
+KILLED = timeline({"verb": "kill", "at": 0.2, "agents": [5]}, {"verb": "kill", "at": 0.3, "agents": [1, 2]})
+
+
+@pytest.mark.parametrize("air", [(), (KILLED,)], ids=["all", "some die"])
+def test_the_runs_of_a_study_are_looked_at_as_each_alone(air):
+    short = (*COARSE, "time.duration=0.5", *air)
     runs = fly_all(plan_of(NAME, *short), [3, 4], every=5)
     for row, seed in enumerate((3, 4)):
         run = rehearse(plan_of(NAME, *short, f"seed={seed}"))
         arrays, nominal = {name: array[:50:5] for name, array in run.arrays.items()}, run.plan.world.formation.nominal
         target = arrays["target"] - nominal
-        Q, y = unpacked(arrays["information"].mean(axis=1), 2, 2)
+        awake = np.isfinite(arrays["found"]).all(axis=-1)
+        assert awake.sum(axis=1).tolist() == ([10] * 4 + [9] * 2 + [7] * 4 if air else [10] * 10)
+        Q, y = unpacked(np.nanmean(arrays["information"][:, :, 0], axis=1), 2, 2)
         ideal = np.linalg.solve(Q, y)[:, :1]
         expected = {
             "found": arrays["found"] - target,
@@ -846,10 +1042,14 @@ def test_the_runs_of_a_study_are_looked_at_as_each_alone():
             "effort": arrays["input"],
         }
         for name, off in expected.items():
-            rms = np.sqrt((off**2).sum(axis=-1).mean(axis=-1))
+            rms = np.sqrt(np.nanmean(np.where(awake, (off**2).sum(axis=-1), np.nan), axis=-1))
             np.testing.assert_allclose(getattr(runs, name)[row], rms, rtol=1e-9, atol=1e-12, err_msg=name)
+        if row == 0:
+            assert runs.first.keys() == {"reference", "found", "variance", "information", "fused", "position", "target"}
+            for name in runs.first.keys() - {"target"}:
+                np.testing.assert_array_equal(runs.first[name], arrays[name], name)
+            np.testing.assert_allclose(runs.first["target"], target[:, 0], atol=1e-12)
     assert np.isnan(runs.localization).all()
-    assert runs.place.shape == (10, 0, 0)
 
 
 LONG = (
@@ -861,7 +1061,7 @@ LONG = (
 )
 
 
-CERTAIN = "agents.parameters.target={fuse_information=false,prior_derivatives=0.02}"
+CERTAIN = 'agents.parameters.target={fusion="none",prior_derivatives=0.02}'
 
 
 def test_in_flight_agents_surround_the_target():
@@ -883,8 +1083,88 @@ def test_in_three_dimensions_a_target_is_followed_too():
     solid = "formation={nodes=[[1,0,0],[-1,0,0.5],[0,1,2]],edges=['1-2','2-3'],leaders=[],spread=0.5}"
     run = rehearse(plan_of(NAME, *LONG[:-1], solid, CERTAIN))
     assert run.arrays["reference"].shape[1:] == (3, 3, 3)
-    assert run.arrays["information"].shape[1:] == (3, 9)
+    assert run.arrays["information"].shape[1:] == (3, 3, 9)
     assert run.error[-1] < 0.05 < 0.2 < run.error[0]
+
+
+CALM = (
+    *TRIPLE,
+    FEW,
+    "time.dt=0.01",
+    "time.duration=3",
+    "target={order=3,intensity=0,position=[0.1,-0.2],velocity=[0.02,-0.01],latencies=[0.5,0.4],variances=[1e-4,1e-4]}",
+    'agents.parameters.target={fusion="none",prior_position=0.2,prior_derivatives=0.02,k=[24.0,50.0,35.0,10.0],'
+    "gamma=[1.0,1.0,1.0,1.0]}",
+)
+
+
+def test_integrators_of_the_third_order_come_to_their_places_about_an_undisturbed_target():
+    run = rehearse(plan_of(NAME, *CALM))
+    assert run.arrays["reference"].shape[1:] == (3, 4, 2)
+    assert run.error[0] > 5.0
+    assert run.error[-1] < 0.005
+    # Off the reference, they move as three poles at -3/s say.
+    seconds, nominal = np.arange(300) * 0.01, run.plan.world.formation.nominal
+    behind = run.position[:300] - nominal - run.arrays["reference"][:300, :, 0]
+    left = (1 + 3 * seconds + 4.5 * seconds**2) * np.exp(-3 * seconds)
+    np.testing.assert_allclose(behind, left[:, None, None] * behind[0], atol=0.1)
+
+
+# Fusion in flight
+
+WHOLE = f"formation.edges={[f'{i}-{j}' for i, j in combinations(range(1, 11), 2)]}"
+GRAPHS = {"ring": (), "whole": (WHOLE,)}
+
+
+@cache
+def fused_in_flight(graph, *air):
+    """A flight, and the shares that each agent gives to what each has to say in every tick, shape (T, N, N)."""
+    run = rehearse(plan_of(NAME, *COARSE, *GRAPHS[graph], MEAN, "time.duration=0.5", *air))
+    links, told = run.plan.world.links, run.plan.channels.index(TARGET)
+    heard = np.broadcast_to(np.eye(10), (50, 10, 10)).copy()
+    heard[:, links.dst - 1, links.src - 1] = run.arrays["fates"][:, told] == Fate.DELIVERED
+    return run.arrays, heard / heard.sum(axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("air", [(), ("network.availability=0.7",)], ids=["clear", "lossy"])
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_the_mean_is_that_of_an_agents_own_information_and_of_what_it_hears_in_the_tick(graph, air):
+    arrays, shares = fused_in_flight(graph, *air)
+    degrees = np.unique((shares > 0).sum(axis=-1))
+    if air:
+        assert set(degrees) >= {1, 2, 3} if graph == "ring" else len(degrees) > 4
+    else:
+        assert degrees.tolist() == ([3] if graph == "ring" else [10])
+    information, fused = arrays["information"], arrays["fused"]
+    assert information.shape == (50, 10, 3, 7)
+    size = np.abs(information).max(axis=(0, 1))
+    np.testing.assert_allclose(fused / size, np.einsum("tij,tjmc->timc", shares, information / size), atol=1e-12)
+    np.testing.assert_allclose(arrays["reference"][:, :, 0], position(fused[:, :, 0], 2, 2), rtol=1e-9, atol=1e-12)
+    assert np.abs(information - fused).max() > 0.1 * size.max()
+
+
+def test_who_hears_everybody_finds_all_that_is_known_and_others_do_not():
+    apart = {}
+    for graph in GRAPHS:
+        arrays, _ = fused_in_flight(graph)
+        ideal = position(arrays["information"][:, :, 0].mean(axis=1, keepdims=True), 2, 2)
+        apart[graph] = np.abs(arrays["reference"][:, :, 0] - ideal).max()
+    assert apart["whole"] < 1e-12
+    assert apart["ring"] > 0.1
+    runs = fly_all(plan_of(NAME, *COARSE, WHOLE, MEAN, "time.duration=0.3"), [3, 4], every=5)
+    assert runs.apart.max() < 1e-12 < runs.ideal.max()
+
+
+def test_with_the_mean_derivatives_are_the_agents_own_where_wanted():
+    short = (*COARSE, "time.duration=0.3")
+    agreed, own, alone = (
+        rehearse(plan_of(NAME, *short, f"agents.parameters.target={{{how}}}")).arrays["reference"]
+        for how in ('fusion="mean"', 'fusion="mean",derivatives="own"', 'fusion="none"')
+    )
+    np.testing.assert_array_equal(own[:, :, 0], agreed[:, :, 0])
+    np.testing.assert_array_equal(own[:, :, 1:], alone[:, :, 1:])
+    assert np.abs(agreed - own)[:, :, 1:].max() > 0.1
+    assert np.abs(own - alone)[:, :, 0].max() > 0.1
 
 
 # Reports
@@ -927,7 +1207,7 @@ def test_reports_land_in_the_arrays_by_name_and_are_no_numbers_for_who_is_dead()
 def test_who_pursues_tells_where_and_how_surely():
     dead = timeline({"verb": "kill", "at": 0.05, "agents": [5]})
     arrays = rehearse(plan_of(NAME, *COARSE, "time.duration=0.1", dead)).arrays
-    shapes = {"reference": (3, 2), "found": (2,), "variance": (), "information": (7,)}
+    shapes = {"reference": (3, 2), "found": (2,), "variance": (), "information": (3, 7), "fused": (3, 7)}
     for name, shape in shapes.items():
         assert arrays[name].shape == (10, 10, *shape)
         assert np.isnan(arrays[name][5:, 4]).all()
@@ -1021,9 +1301,11 @@ def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(t
     ("name", "overrides"),
     [
         (NAME, (*COARSE, "time.duration=0.5", "network.availability=0.9")),
+        (NAME, (*COARSE, MEAN, FEW, "time.duration=0.3", "network.availability=0.7")),
+        (NAME, (*CALM, "time.duration=0.3", "network.availability=0.7")),
         ("localization", ("time.duration=0.5", "network.availability=0.5")),
     ],
-    ids=["target", "localization"],
+    ids=["target", "mean", "triple-integrators", "localization"],
 )
 def test_processes_give_the_bits_of_one_process(name, overrides, out):
     outcome = fly(plan_of(name, *overrides), "processes", out, lambda *_: None)

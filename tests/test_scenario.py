@@ -421,7 +421,7 @@ WRONG = [
         '"static"',
         '"statik"',
         "agents.law",
-        "no 'statik'; there are constant-velocity, double-constant-velocity, double-varying-velocity, first-order-pursuit, "
+        "no 'statik'; there are constant-velocity, double-constant-velocity, double-varying-velocity, "
         "pursuit, rest, static, varying-velocity",
     ),
     ("sigma_w = 0.5", "sigma = 0.5", "agents.parameters.rkf.sigma", "rkf has sigma_w, prior_position"),

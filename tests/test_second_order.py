@@ -18,7 +18,7 @@ from agents.estimators.none import NoEstimator
 from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity, pilot
 from analysis.affine import Manoeuvre
 from netem.channels import INPUT
-from world.dynamics import double_integrator
+from world.dynamics import carried
 from world.maneuver import hover, ravine
 
 OWN = Own(velocity=np.array([1.0, -0.5]), input=np.array([8.0, 4.0]))
@@ -159,7 +159,7 @@ RAVINE = ravine(SECONDS)
 
 
 def moved(position, velocity, u, dt):
-    return double_integrator(position, velocity, u, dt, 0.0), velocity + dt * u
+    return carried([position, velocity, u], dt), velocity + dt * u
 
 
 def test_pilot_flies_the_acceleration_of_the_target_and_pulls_twice():
@@ -247,8 +247,9 @@ def drawn(brief, seed=1):
 
 
 def act(agent, measured, position, velocity, heard, tick=2000):
-    state, _ = agent.sense(agent.init((10,)), measured, agent.brief.present, velocity)
-    return agent.act(state, tick, heard, position, velocity, None)
+    motion = None if velocity is None else velocity[:, None]
+    state, _ = agent.sense(agent.init((10,)), measured, agent.brief.present, motion)
+    return agent.act(state, tick, heard, position, motion, None)
 
 
 def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(octa10):
@@ -265,10 +266,10 @@ def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(oc
 def test_double_integrators_say_their_velocity_and_the_acceleration_now_flying(octa10):
     agent = Agent(octa10, NoEstimator(), VARYING, leaders="pilot", leader_gain=1.0, limit=None)
     measured, position, velocity, heard = drawn(octa10)
-    _, first = agent.sense(agent.init((10,)), measured, octa10.present, velocity)
+    _, first = agent.sense(agent.init((10,)), measured, octa10.present, velocity[:, None])
     np.testing.assert_array_equal(first[INPUT]["acceleration"], np.zeros((10, 3)))
     state, action = act(agent, measured, position, velocity, heard)
-    _, second = agent.sense(state, measured, octa10.present, velocity + 1.0)
+    _, second = agent.sense(state, measured, octa10.present, velocity[:, None] + 1.0)
     assert {name: field.shape for name, field in agent.channels()[INPUT].items()} == dict.fromkeys(second[INPUT], (3,))
     np.testing.assert_array_equal(second[INPUT]["velocity"], velocity + 1.0)
     np.testing.assert_array_equal(second[INPUT]["acceleration"], action.input)

@@ -96,6 +96,33 @@ def test_the_runs_of_a_study_are_those_runs():
     np.testing.assert_allclose(runs.seconds, np.arange(0.0, 3.0, 0.2))
 
 
+@pytest.mark.parametrize("every", [1, 4, 7])
+def test_the_longest_input_is_that_of_any_agent_in_any_tick_since_the_moment_kept_before(every):
+    runs = fly_all(plan_of("corridor", *SHORT), (3, 57), every=every)
+    for row, seed in enumerate((3, 57)):
+        length = np.linalg.norm(rehearse(plan_of("corridor", *SHORT, f"seed={seed}")).arrays["input"], axis=-1)
+        longest = length.max(axis=-1)
+        kept = range(0, 60, every)
+        expected = [longest[max(0, tick - every + 1) : tick + 1].max() for tick in kept]
+        np.testing.assert_array_equal(runs.peak[row], expected)
+        # Those of the moments kept alone would not do.
+        assert (runs.peak[row] == longest[::every]).all() == (every == 1)
+
+
+def test_of_the_first_run_of_a_study_everything_that_is_reported_is_kept():
+    short = (*SHORT, "time.duration=0.5")
+    runs = fly_all(plan_of("corridor", *short), range(3, 60), every=4)  # more than are flown at once
+    assert runs.first.keys() == {"position"}
+    alone = rehearse(plan_of("corridor", *short, "seed=3")).arrays
+    np.testing.assert_array_equal(runs.first["position"], alone["position"][:10:4])
+    localized = ("localization", "time.duration=0.1")
+    runs = fly_all(plan_of(*localized), (5, 6), every=3)
+    assert runs.first.keys() == {"position", "place"}
+    for name, kept in runs.first.items():
+        alone = rehearse(plan_of(*localized, "seed=5")).arrays[name]
+        np.testing.assert_array_equal(kept, alone[:10:3], name)
+
+
 def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_themselves():
     lossy = ("corridor", *SHORT, 'agents.estimator="rkf"', "network.availability=0.5")
     plan = plan_of(*lossy)

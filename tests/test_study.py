@@ -6,13 +6,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from flying import PROCESSES
+from matplotlib.text import Text
 from PIL import Image
 from scipy.stats import chi2
 
 from affinet import cli, judging, scenario, study, study_report
 from affinet import plan as planning
 from affinet.batch import Runs
-from affinet.quantities import NAMES
+from affinet.quantities import NAMES, over_time
 from affinet.sections import ScenarioError
 from analysis import figures
 
@@ -234,6 +235,31 @@ def made_up(labels, **values_of):
     return study.Result(labels, None, runs)
 
 
+LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "behind", "effort"}
+
+
+@pytest.mark.parametrize("span", [(0.0, None), (1.0, None), (0.0, 2.0), (1.5, 3.0)], ids=str)
+@pytest.mark.parametrize("quantity", NAMES)
+def test_what_stands_for_a_run_over_time_is_the_mean_the_root_mean_square_or_the_largest(quantity, span):
+    values = np.random.default_rng(1).uniform(1.0, 5.0, (5, 4))
+    since, until = span
+    inside = values[:, [second for second in range(4) if since <= second <= (until or 9.0)]]
+    expected = inside.mean(axis=1)
+    if quantity in LARGEST:
+        expected = inside.max(axis=1)
+    elif quantity in ROOTS:
+        expected = np.sqrt((inside**2).mean(axis=1))
+    elif quantity == "error" and span == (0.0, None):
+        expected = np.full(5, 9e9)  # that over all ticks, and not over those kept
+    found = over_time(made_up({}, **{quantity: values}).runs, quantity, span)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_span_in_which_nothing_is_kept_stands_for_nothing():
+    with pytest.raises(ValueError, match=r"no moment lies in its span from 3\.5 s on: the runs end at 3 s"):
+        over_time(made_up({}).runs, "peak", (3.5, None))
+
+
 def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
     labels = [case.labels for case in study.cases(pair, quick=True)]
     later = np.array([1.0, 1.0, 1 / 3, 1 / 3])
@@ -246,6 +272,58 @@ def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
     assert verdicts[0].found.startswith("ratio 0.5,")
     assert verdicts[1].found.startswith("ratio 0.333,")
     assert verdicts[2].found.startswith("ratio 0.667,")
+
+
+PRINTED = """
+[[claims]]
+says = "the error printed,"
+each = ["estimator"]
+check = "value"
+quantity = "agreed"
+levels = { RKF = 0.25, MLE = 0.5 }
+between = [0.99, 1.01]
+since = 1.0
+"""
+
+
+def claiming(tmp_path, claims):
+    """The study of two estimators, with these claims and no others."""
+    path = tmp_path / "claiming.toml"
+    path.write_text(PAIR.partition("[[claims]]")[0] + claims)
+    return study.load(str(path))
+
+
+def test_a_claim_with_levels_is_judged_for_each_label_by_its_own(tmp_path):
+    printed = claiming(tmp_path, PRINTED)
+    labels = [case.labels for case in study.cases(printed, quick=True)]
+    # Root mean squares of what comes since one second.
+    values = {"MLE": np.sqrt([9.0, 0.0, 0.25, 0.5]), "RKF": np.array([9.0, 0.3, 0.3, 0.3])}
+    results = [made_up(one, agreed=values[one["estimator"]]) for one in labels]
+    rkf, mle = judging.judge(printed, results)
+    assert (rkf.says, mle.says) == ("RKF: the error printed, 0.25 m", "MLE: the error printed, 0.5 m")
+    assert (rkf.holds, mle.holds) == (False, True)
+    assert rkf.found.startswith("ratio 1.2,")
+    assert mle.found.startswith("ratio 1,")
+
+
+def test_a_claim_with_levels_says_nothing_of_other_labels(tmp_path):
+    printed = claiming(tmp_path, PRINTED.replace("RKF = 0.25, MLE = 0.5", "MLE = 0.5"))
+    results = [made_up(case.labels, agreed=0.5) for case in study.cases(printed, quick=True)]
+    (verdict,) = judging.judge(printed, results)
+    assert (verdict.says, verdict.holds) == ("MLE: the error printed, 0.5 m", True)
+
+
+def test_a_level_of_a_label_that_there_is_not_is_named(tmp_path):
+    printed = claiming(tmp_path, PRINTED.replace("RKF = 0.25", "KF = 0.25"))
+    results = [made_up(case.labels, agreed=0.5) for case in study.cases(printed, quick=True)]
+    with pytest.raises(ScenarioError, match=r"claim 'KF: the error.*no case has the labels \{'estimator': 'KF'\}"):
+        judging.judge(printed, results)
+
+
+@pytest.mark.parametrize("each", ["[]", '["estimator", "graph"]'])
+def test_levels_are_for_the_labels_of_one_axis(each, tmp_path):
+    with pytest.raises(ScenarioError, match=r"claims\.0: .*levels are for the labels of one axis: name it in each"):
+        claiming(tmp_path, PRINTED.replace('["estimator"]', each))
 
 
 def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path, monkeypatch):
@@ -281,15 +359,72 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path,
             assert min(figure.size) > 200
 
 
-def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_each(monkeypatch, tmp_path):
-    drawn = []
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are drawn from now on."""
+    kept = []
 
     class Kept(figures.Figure):
         def __init__(self, **how):
             super().__init__(**how)
-            drawn.append(self)
+            kept.append(self)
 
     monkeypatch.setattr(figures, "Figure", Kept)
+    return kept
+
+
+def written_in(figure):
+    return {text.get_text() for text in figure.findobj(Text)}
+
+
+SWEEP = TINY.replace(
+    'along = "availability"',
+    """along = "availability"
+quantity = "peak"
+since = 1.0
+bound = { at = 2.5, says = "the most" }
+""",
+).partition("[[claims]]")[0]
+
+
+def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, drawn):
+    path = tmp_path / "sweep.toml"
+    path.write_text(SWEEP)
+    swept = study.load(str(path))
+    rng = np.random.default_rng(1)
+    early = np.full((5, 1), 1e3)  # too early to count
+    results = [
+        made_up(case.labels, peak=np.hstack([early, rng.uniform(1.0, 2.0, (5, 3))]))
+        for case in study.cases(swept, quick=True)
+    ]
+    study_report.save(tmp_path / "out", swept, results, [])
+    (figure,) = drawn
+    (panel,) = figure.axes
+    assert written_in(figure) >= {"zhao7", "longest input (m/s²)", "availability", "the most", "none", "ga-rkf"}
+    (line,) = (line for line in panel.lines if line.get_label() == "the most")
+    assert line.get_ydata() == [2.5, 2.5]
+    for bars, estimator in zip(panel.containers, ("none", "ga-rkf"), strict=True):
+        cases = [one for one in results if one.labels["estimator"] == estimator]
+        np.testing.assert_array_equal(bars[0].get_xdata(), [0.5, 1.0])
+        np.testing.assert_allclose(bars[0].get_ydata(), [one.runs.peak[:, 1:].max(axis=1).mean() for one in cases])
+
+
+@pytest.mark.parametrize(
+    ("labels", "scale"),
+    [(("0.003", "0.3"), "log"), (("0.1", "1", "3"), "linear"), (("0", "1000"), "linear")],
+    ids=str,
+)
+def test_a_sweep_over_decades_is_drawn_on_a_logarithmic_axis(labels, scale, tmp_path, drawn):
+    cases = [
+        figures.Curve({"W": W, "graph": "ring", "filter": "SOE"}, np.arange(3.0), np.ones((2, 3)), np.array([1.0, 2.0]))
+        for W in labels
+    ]
+    figures.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
+    ((panel,),) = (figure.axes for figure in drawn)
+    assert panel.get_xscale() == scale
+
+
+def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_each(drawn, tmp_path):
     rng, seconds = np.random.default_rng(1), np.arange(6.0)
     labels = [{"graph": "hexa10", "air": air, "filter": one} for air in ("clear", "lossy") for one in ("MLE", "KF")]
     values = {what: rng.uniform(1.0, 3.0, (4, 5, 6)) for what in ("NEES", "NIS")}

@@ -37,7 +37,7 @@ MESSAGES = [
         last=False,
         measured=[[0.5, -1.0]],
         position=[[1.0, 2.0], [0.5, 3.0]],
-        velocity=[[0.25, 0.0], [0.0, -4.0]],
+        motion=[[[0.25, 0.0], [1.0, 2.0]], [[0.0, -4.0], [3.0, 0.5]]],
         sightings=[{"position": [1.5, 2.0], "done": True, "by": 0, "method": 1}] * 2,
         fired=[1],
     ),
@@ -50,7 +50,7 @@ MESSAGES = [
         neighbours=[2],
         measured=[[0.5, 1.0]],
         position=None,
-        velocity=[0.25, 0.0],
+        motion=[[0.25, 0.0], [1.0, 2.0]],
         sighting={"position": [1.5, 2.0], "done": True, "by": 0, "method": 1},
     ),
     wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
@@ -128,8 +128,8 @@ def test_numbers_arrive_bit_for_bit():
 
 
 @pytest.mark.parametrize("message", MESSAGES[:2], ids=name)
-def test_single_integrators_are_told_no_velocity(message):
-    assert wire.unpack(type(message), wire.pack(message._replace(velocity=None))).velocity is None
+def test_single_integrators_are_told_no_motion(message):
+    assert wire.unpack(type(message), wire.pack(message._replace(motion=None))).motion is None
 
 
 def test_a_whole_number_will_do_for_a_number():

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from analysis.sensor import Sensor
 from netem.fault import Body, Fault, UnderWay, Verb
@@ -33,8 +34,13 @@ def under(*faults, links=SEVEN):
 QUIET = under()
 
 
-def scene(position, velocity=REST, measured=UNSEEN):
-    return Scene(position, velocity, measured, np.zeros_like(position), None)
+def scene(position, velocity=REST, measured=UNSEEN, higher=()):
+    """Bodies here and so fast; `higher` are derivatives of the velocity, of integrators that have any."""
+    return Scene(position, np.stack([velocity, *higher], axis=1), measured, np.zeros_like(position), None)
+
+
+def few_at_rest():
+    return Scene(REST[:3], REST[:3, None], np.zeros((4, 2)), REST[:3], None)
 
 
 def pushes(deviation):
@@ -103,7 +109,7 @@ def test_noise_is_added_to_what_is_sensed_wherever_the_agents_are(world):
 def test_noise_of_a_link_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges))
-    three, nothing = Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3], None), under(links=small.links)
+    three, nothing = few_at_rest(), under(links=small.links)
     for tick in (0, 1, 64, 5000):
         large_noise, small_noise = world.measure(tick, scene(REST), QUIET), small.measure(tick, three, nothing)
         for link, row in small.links.index.items():
@@ -230,8 +236,7 @@ def test_disturbance_of_an_agent_is_the_same_whatever_other_agents_exist(world):
     few = Formation(ZHAO7.nominal[:3], ((1, 2), (1, 3)), (1, 2, 3))
     small = replace(world, formation=few, links=Links.both_ways(3, few.edges), disturbance=pushes(0.2))
     seven = moved(replace(world, disturbance=pushes(0.2)), 9, REST, REST)
-    nothing, three = np.zeros((4, 2)), Scene(REST[:3], REST[:3], np.zeros((4, 2)), REST[:3], None)
-    after = small.step(9, three, nothing, REST[:3], under(links=small.links))
+    after = small.step(9, few_at_rest(), np.zeros((4, 2)), REST[:3], under(links=small.links))
     assert after.position.tobytes() == seven[:3].tobytes()
 
 
@@ -273,10 +278,12 @@ def test_a_double_integrator_gains_velocity_and_a_half_of_it_already_moves_it(he
     np.testing.assert_array_equal(after.measured, BEFORE)
 
 
-def test_only_double_integrators_are_told_how_fast_they_are(world, heavy):
-    v = np.random.default_rng(1).normal(size=(7, 2))
-    np.testing.assert_array_equal(heavy.odometry(scene(REST, velocity=v)), v)
-    assert world.odometry(scene(REST, velocity=v)) is None
+def test_only_those_that_do_not_command_their_velocity_are_told_how_they_move(world):
+    motion = np.random.default_rng(1).normal(size=(3, 7, 2))
+    assert world.odometry(scene(REST, velocity=motion[0])) is None
+    for order in (2, 3, 4):
+        told = replace(world, order=order).odometry(scene(REST, motion[0], higher=motion[1 : order - 1]))
+        np.testing.assert_array_equal(told, np.moveaxis(motion[: order - 1], 0, 1))
 
 
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
@@ -326,6 +333,112 @@ def test_gusts_and_disturbances_displace_a_double_integrator_and_give_it_no_velo
     assert (shaken.position != calm.position).all()
     np.testing.assert_array_equal(windy.velocity, calm.velocity)
     np.testing.assert_array_equal(shaken.velocity, calm.velocity)
+
+
+# ---- integrators of any order
+
+
+def chain(order, seconds):
+    """How position, its derivatives and a held input go on over a time, shape (order + 1, order + 1)."""
+    return expm(seconds * np.eye(order + 1, k=1))
+
+
+def derivatives_of(order, here):
+    """Position and the derivatives that bodies of this order have, shape (order, N, D)."""
+    return np.stack([here.position, *np.moveaxis(here.motion, 1, 0)])[:order]
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_bodies_move_as_the_exponential_of_a_chain_of_integrators_says(world, order):
+    slow = replace(world, order=order, dt=0.5)
+    z, v, a, j = np.random.default_rng(order).normal(size=(4, 7, 2))
+    here = scene(z, velocity=v, higher=(a, j)[: max(0, order - 2)])
+    for tick, u in enumerate(np.random.default_rng(7).normal(size=(3, 7, 2))):
+        before = np.concatenate([derivatives_of(order, here), u[None]])
+        expected = np.tensordot(chain(order, 0.5), before, 1)
+        here = slow.step(tick, here, UNSEEN, u, QUIET)
+        np.testing.assert_allclose(derivatives_of(order, here), expected[:order], rtol=1e-13, atol=1e-13)
+        assert here.motion.shape == (7, max(1, order - 1), 2)
+        # Without what the input does within the tick, nothing would be right.
+        assert (np.abs(expected[0] - np.tensordot(chain(order, 0.5)[0, :-1], before[:-1], 1)) > 1e-6).any()
+    if order == 1:
+        np.testing.assert_array_equal(here.velocity, u)
+    np.testing.assert_array_equal(here.velocity, here.motion[:, 0])
+
+
+def test_single_and_double_integrators_fly_the_bits_of_their_formulas(world, heavy):
+    z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
+    gust, push = Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)), np.zeros((7, 2))
+    push[[1, 4]] = (3.0, -1.0)
+    here, dt = scene(z, velocity=v), 0.7
+    single, double = (
+        replace(each, dt=dt, disturbance=pushes(0.2)).step(4, here, UNSEEN, u, under(gust)) for each in (world, heavy)
+    )
+    np.testing.assert_array_equal(single.disturbance, double.disturbance)
+    w = single.disturbance
+    assert (w != 0.0).all()
+    np.testing.assert_array_equal(single.position, z + dt * (u + push) + w)
+    np.testing.assert_array_equal(double.position, z + dt * (v + push) + 0.5 * dt**2 * u + w)
+    np.testing.assert_array_equal(single.velocity, u)
+    np.testing.assert_array_equal(double.velocity, v + dt * u)
+
+
+HIGHER = pytest.mark.parametrize("order", [3, 4])
+
+
+def moving(order, seed=1):
+    """A scene of bodies that move in every way they can, and what their agents command."""
+    z, u, v, *higher = np.random.default_rng(seed).normal(size=(order + 1, 7, 2))
+    return scene(z, velocity=v, higher=higher), u
+
+
+@HIGHER
+def test_everybody_of_any_order_starts_at_rest(world, order):
+    begun = replace(world, order=order).begin()
+    np.testing.assert_array_equal(begun.motion, np.zeros((7, order - 1, 2)))
+    np.testing.assert_array_equal(begun.position, world.begin().position)
+
+
+@HIGHER
+@pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
+def test_integrators_that_nobody_steers_fly_no_input_and_go_on_as_they_moved(world, order, fault):
+    slow, (here, u) = replace(world, order=order, dt=0.5), moving(order)
+    flown = slow.flown(here, u, under(fault))
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+    np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
+    after = slow.step(0, here, UNSEEN, flown, under(fault))
+    adrift = np.tensordot(chain(order - 1, 0.5), derivatives_of(order, here), 1)
+    np.testing.assert_allclose(derivatives_of(order, after)[:, ABSENT], adrift[:, ABSENT], rtol=1e-13, atol=1e-13)
+    assert (np.abs(derivatives_of(order, after) - adrift)[:, ~ABSENT] > 1e-4).all()
+
+
+@HIGHER
+@HELD
+def test_absent_integrators_of_any_order_stop_at_once_whatever_happens(world, order, fault):
+    heavy, (here, u) = replace(world, order=order, disturbance=pushes(0.1)), moving(order)
+    gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
+    flown = heavy.flown(here, u, under(fault))
+    after = heavy.step(0, here, UNSEEN, flown, under(fault, gust))
+    np.testing.assert_array_equal(flown[ABSENT], 0.0)
+    np.testing.assert_array_equal(after.position[ABSENT], here.position[ABSENT])
+    np.testing.assert_array_equal(after.motion[ABSENT], 0.0)
+    assert (after.position[~ABSENT] != here.position[~ABSENT]).all()
+    assert (after.motion[~ABSENT] != here.motion[~ABSENT]).all()
+
+
+@HIGHER
+def test_gusts_and_disturbances_displace_integrators_of_any_order_and_give_them_no_motion(world, order):
+    heavy, (here, u) = replace(world, order=order), moving(order)
+    gust, push = Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)), np.zeros((7, 2))
+    push[[1, 4]] = (3.0, -1.0)
+    calm = heavy.step(0, here, UNSEEN, u, QUIET)
+    windy = heavy.step(0, here, UNSEEN, heavy.flown(here, u, under(gust)), under(gust))
+    shaken = replace(heavy, disturbance=pushes(0.2)).step(0, here, UNSEEN, u, QUIET)
+    np.testing.assert_allclose(windy.position - calm.position, 0.01 * push, atol=1e-15)
+    np.testing.assert_allclose(shaken.position - calm.position, shaken.disturbance, atol=1e-15)
+    assert (shaken.disturbance != 0.0).all()
+    np.testing.assert_array_equal(windy.motion, calm.motion)
+    np.testing.assert_array_equal(shaken.motion, calm.motion)
 
 
 # ---- sensors that fail
