@@ -13,8 +13,8 @@ from affinet.inprocess import Instant, Swarm
 from affinet.plan import Plan
 from affinet.side_by_side import side_by_side
 from analysis import consistency, metrics
+from analysis.information import position, reported
 from analysis.localization import Edges, centroid, distance, ringing, weights
-from analysis.pursuit import REPORTS, position
 from netem import channels
 from netem.links import Mask
 from netem.timeline import Timeline
@@ -47,7 +47,7 @@ class Runs:
         Means over the edges, as in `analysis.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
     localization, drift, ringing
         Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
-        metres, and which share of the steps between them goes back; NaN where nobody localizes.
+        metres, and which share of the steps since the moment before went back; NaN where nobody localizes.
     found, agreed, ideal, apart, behind, effort
         Of agents that pursue a target, in those ticks, shape (R, T): how far the target is from where each finds it by itself,
         from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal
@@ -157,18 +157,24 @@ class _Places:
         self._runs = runs
         self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
         self._kept: list[Array] = []
+        self._recent: list[Array] = []
+        self._since = 0
+        self._rang: list[Array] = []
 
     def measure(self, instant: Instant, timeline: Timeline) -> None:
         """Take in the measurements of a tick; all runs have the faults of one."""
         if self._wanted:
             measured = instant.measured.reshape(self._runs, -1, instant.measured.shape[-1])
             self._first.tick(timeline, instant.tick, measured, instant.verdicts.fate[0].reshape(self._runs, -1))
+            self._recent.append(self._of_runs(instant.action.estimate.reports[channels.PLACE]))
+            self._since += 1
 
     def keep(self, moment: Moment) -> None:
         """Keep what the agents believe in a tick."""
         if self._wanted:
-            place = moment.reports[channels.PLACE]
-            self._kept.append(place.reshape(self._runs, -1, place.shape[-1]))
+            self._kept.append(self._of_runs(moment.reports[channels.PLACE]))
+            self._rang.append(ringing(np.stack(self._recent, axis=1))[:, -self._since :].mean(axis=1))
+            self._recent, self._since = self._recent[-2:], 0  # a step, and the step before it
 
     def found(self, moments: int) -> dict[str, Array]:
         """How far off they were, how far their centroid has gone, and how much they rang, shape (R, T)."""
@@ -181,8 +187,11 @@ class _Places:
         return {
             "localization": distance(place, edges),
             "drift": np.linalg.norm(centre - centre[:, :1], axis=-1),
-            "ringing": ringing(place),
+            "ringing": np.stack(self._rang, axis=1),
         }
+
+    def _of_runs(self, place: Array) -> Array:
+        return place.reshape(self._runs, -1, place.shape[-1])
 
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
@@ -220,7 +229,7 @@ def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], A
     """How well a target is found and followed by those awake (R, N) in a tick of all runs, shape (R,)."""
     names = ("found", "agreed", "ideal", "apart", "behind", "effort")
     pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
-    if pursuit is None or not moment.reports.keys() >= REPORTS:
+    if pursuit is None or not reported(moment.reports):
         return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
     said = moment.reports
     target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)

@@ -16,6 +16,7 @@ from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.joint_kf import JointEdgeFilter
 from agents.estimators.jor import JacobiOverRelaxation
+from agents.estimators.target import TargetEstimator
 from agents.second_order import DoubleVaryingVelocity
 from analysis import localization
 from analysis.affine import Array
@@ -27,6 +28,8 @@ from world.localized import FirstMeasurements
 from world.world import World
 
 Level = Literal["ok", "note", "error"]
+
+_SMALL_CHATTER = 1.0
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,30 @@ def leaders_apart(formation: Formation) -> Finding:
     return Finding("leaders apart", "ok", "the leaders all see each other, and can keep their distances")
 
 
-def inputs_in_time(estimator: Any, late: bool) -> list[Finding]:
-    """Whether inputs by which an estimator predicts arrive in the tick they are of."""
-    if not (late and isinstance(estimator, EdgeKalmanFilter | JointEdgeFilter)):
+def in_time(estimator: Any, late: bool) -> list[Finding]:
+    """Whether what an estimator takes for the present arrives in the tick it is of."""
+    if late and isinstance(estimator, EdgeKalmanFilter | JointEdgeFilter):
+        says = (
+            "inputs are heard ticks late, and taken for those of this tick: the filters will be too sure of themselves"
+        )
+        return [Finding("inputs", "note", says)]
+    if late and isinstance(estimator, TargetEstimator) and estimator.fusion != "none":
+        says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
+        return [Finding("information", "note", says)]
+    return []
+
+
+def chatter(estimator: Any, dt: float) -> list[Finding]:
+    """How hard REDCHO's sign switches in a tick (errata of paper 002)."""
+    if not (isinstance(estimator, TargetEstimator) and estimator.fusion == "redcho"):
         return []
-    says = "inputs are heard ticks late, and taken for those of this tick: the filters will be too sure of themselves"
-    return [Finding("inputs", "note", says)]
+    order = len(estimator.k) - 1
+    switched = estimator.k[order] * estimator.theta ** (order + 1) * dt
+    says = (
+        f"REDCHO switches its highest derivative by {switched:.3g} a tick (k_m theta^{order + 1} dt; 0.4 in paper 002)"
+    )
+    own = "" if estimator.derivatives == "own" or switched < _SMALL_CHATTER else "; take the agents' own derivatives"
+    return [Finding("REDCHO", "note", says + own)]
 
 
 def not_rigid(why: str) -> Finding:
@@ -75,12 +96,16 @@ def localization_step(world: World, estimator: JacobiOverRelaxation) -> Finding:
     """How fast localization comes to its answer, from measurements as they would be without noise."""
     known = FirstMeasurements(world.links, world.sensor, ())
     known.take(sensors.relative(world.formation.nominal, world.links), np.ones(len(world.links), dtype=bool))
-    edges = known.edges()
-    found = localization.rates(edges, estimator.h, anchor=0)
+    edges, leaders = known.edges(), world.formation.leaders
+    if estimator.anchor and len(leaders) != 1:
+        says = f"with an anchor exactly one agent leads: formation.leaders has {len(leaders)}"
+        return Finding("localization", "error", says)
+    anchor = leaders[0] if len(leaders) == 1 else 1
+    found = localization.rates(edges, estimator.h, anchor=anchor - 1)
     says = (
         f"rate {found.anchor if estimator.anchor else found.centroid:.4f} a tick with h {estimator.h:g} (weighted centroid "
-        f"{found.centroid:.4f}, agent 1 as the anchor {found.anchor:.4f}); h {localization.step(edges, 'smooth'):.3f} is the "
-        f"fastest without ringing, {localization.step(edges, 'fast'):.3f} of all"
+        f"{found.centroid:.4f}, agent {anchor} as the anchor {found.anchor:.4f}); "
+        f"h {localization.step(edges, 'smooth'):.3f} is the fastest without ringing, {localization.step(edges, 'fast'):.3f} of all"
     )
     return Finding("localization", "ok", says)
 

@@ -54,6 +54,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     if not chosen:
         raise ValueError(f"no case has the labels {claim.of}")
     span, unit = (claim.since, claim.until), NAMES[quantity][1]
+    level, between = claim.level or 0.0, claim.between or []  # checks that want them have been given them
 
     def means(of: list[Result], what: Quantity = quantity) -> Array:
         return np.array([over_time(one.runs, what, span) for one in of])
@@ -64,23 +65,23 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
     values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
     match claim.check:
         case "flat":
-            return claims.flat(claim.says, means(chosen), claim.level or 2.0, unit)
+            return claims.flat(claim.says, means(chosen), level, unit)
         case "approaches":
-            return claims.approaches(claim.says, means(chosen), means(other), claim.level or 0.5)
+            return claims.approaches(claim.says, means(chosen), means(other), level)
         case "lower":
             return claims.lower(claim.says, means(chosen), means(other, others), unit)
         case "ratio":
             (one,), (another,) = means(chosen), means(other, others)
-            return claims.ratio(claim.says, one, another, claim.between or [0.0, 1.0])
+            return claims.ratio(claim.says, one, another, between)
         case "stays_below":
-            return claims.stays_below(claim.says, seconds, values, claim.level or 1.0, span, unit)
+            return claims.stays_below(claim.says, seconds, values, level, span, unit)
         case "leaves":
-            return claims.leaves(claim.says, seconds, values, claim.level or 1.0, span, unit)
+            return claims.leaves(claim.says, seconds, values, level, span, unit)
         case "exponential":
             return claims.exponential(claim.says, seconds, values, span)
         case "value":
             (one,) = means(chosen)
-            return claims.ratio(claim.says, one, np.full_like(one, claim.level or 1.0), claim.between or [0.8, 1.25])
+            return claims.ratio(claim.says, one, np.full_like(one, level), between)
         case "slower_with_anchor":
             return claims.never_above(claim.says, *random_graphs.rates(GRAPHS, 10, 0.49).T)
         case "indicator_below_error":

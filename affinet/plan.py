@@ -22,7 +22,8 @@ from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.jor import JacobiOverRelaxation
 from agents.process import Choice
-from analysis.pursuit import REPORTS, Sighting
+from analysis.information import reported
+from analysis.pursuit import Sighting
 from netem import channels
 from netem.fault import Fault, Verb
 from netem.medium import Verdicted, recorded
@@ -91,7 +92,7 @@ class Plan:
     def books(self, viewer: str | None) -> Books:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
-        pursues = self.world.pursuit is not None and self.reports.keys() >= REPORTS
+        pursues = self.world.pursuit is not None and reported(self.reports)
         return Books(record.every, self.window, record.enabled, viewer, channels.PLACE in self.reports, pursues)
 
     @property
@@ -207,6 +208,7 @@ def _make(given: Scenario) -> Plan:
     world = world_of(given, formation)
     if isinstance(built := estimator.build(), JacobiOverRelaxation):
         findings.append(checks.localization_step(world, built))
+        _refuse_fatal(findings)
     brief = brief_of(world, L)
     played = script.write(given, formation, world.links)
     if isinstance(estimator.build(), CentralizedFilter):
@@ -242,7 +244,7 @@ def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: 
     if given.agents.leaders == "distances":
         findings.append(checks.leaders_apart(formation))
     late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
-    findings += checks.inputs_in_time(estimator, late)
+    findings += [*checks.in_time(estimator, late), *checks.chatter(estimator, given.time.dt)]
     _refuse_fatal(findings)
     if not law.by_stress:
         return findings, np.zeros((formation.agents, formation.agents))

@@ -33,6 +33,18 @@ _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
 
 
+# What checks compare with, and want to be told; the others need nothing.
+_WANTED: dict[str, frozenset[str]] = {
+    "flat": frozenset({"level"}),
+    "approaches": frozenset({"to", "level"}),
+    "stays_below": frozenset({"level"}),
+    "leaves": frozenset({"level"}),
+    "lower": frozenset({"to"}),
+    "ratio": frozenset({"to", "between"}),
+    "value": frozenset({"level", "between"}),
+}
+
+
 class Axis(Section):
     """A setting that is varied: for each value its label, and the overrides it stands for."""
 
@@ -72,12 +84,19 @@ class Claim(Section):
 
     @model_validator(mode="after")
     def _compared(self) -> Claim:
-        if (self.to is None) == (self.check in ("approaches", "lower", "ratio")):
-            raise ValueError(f"the check {self.check!r} {'needs' if self.to is None else 'has no use for'} to")
+        level = self.level if self.levels is None else self.levels
+        given = {
+            key for key, value in (("to", self.to), ("level", level), ("between", self.between)) if value is not None
+        }
+        wanted = _WANTED.get(self.check, frozenset())
+        if missing := sorted(wanted - given):
+            raise ValueError(f"the check {self.check!r} needs {' and '.join(missing)}")
+        if useless := sorted(given - wanted):
+            raise ValueError(f"the check {self.check!r} has no use for {' and '.join(useless)}")
+        if self.to_quantity is not None and self.to is None:
+            raise ValueError("to_quantity is that of what is compared with: give to")
         if self.levels is not None and (len(self.each) != 1 or self.level is not None):
             raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
-        if self.levels is not None and self.check not in ("value", "stays_below", "leaves", "flat"):
-            raise ValueError(f"the check {self.check!r} has no use for levels")
         return self
 
 
@@ -117,6 +136,21 @@ class Study(Section):
     def _drawn(self) -> Study:
         if self.figure == "map" and self.quantity != "error":
             raise ValueError(f"a map shows the mean tracking error, and no {self.quantity}")
+        return self
+
+    @model_validator(mode="after")
+    def _labelled(self) -> Study:
+        known = {axis.name: axis.values for axis in self.axes}
+        named = [*self.skip, *(labels for claim in self.claims for labels in (claim.of, claim.to or {}))]
+        named += [{claim.each[0]: label} for claim in self.claims for label in claim.levels or {}]
+        for axis, label in (item for labels in named for item in labels.items()):
+            if label not in known.get(axis, {}):
+                raise ValueError(
+                    f"no axis {axis!r} has the label {label!r}; there are { ({n: [*v] for n, v in known.items()}) }"
+                )
+        for axis in (axis for claim in self.claims for axis in claim.each):
+            if axis not in known:
+                raise ValueError(f"no axis is called {axis!r}; there are {', '.join(known)}")
         return self
 
 

@@ -20,7 +20,7 @@ from affinet.study import Result, Study
 from analysis import figures, random_graphs, target_figures
 from analysis.claims import Verdict
 from analysis.figures import Curve
-from analysis.pursuit import REPORTS
+from analysis.information import reported
 from analysis.target_figures import Flight
 from netem.channels import PLACE
 
@@ -35,7 +35,7 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
-    if all(one.runs.first.keys() >= REPORTS for one in results):
+    if all(reported(one.runs.first) for one in results):
         _draw_pursuit(out, study, results)
     if all(PLACE in one.runs.first for one in results):
         figures.evolution(

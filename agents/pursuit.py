@@ -39,6 +39,10 @@ class Pursuit:
                 f"kappa needs a gain for each of 1 to {_MOST} times that bodies integrate their input, like [1.0, 2.0]; "
                 f"got {list(self.kappa)}"
             )
+        if np.roots([1.0, *reversed(self.kappa)]).real.max() >= 0.0:
+            raise ValueError(
+                f"with kappa {list(self.kappa)} agents leave the reference: s^m + ... + kappa_0 is not Hurwitz"
+            )
 
     @property
     def order(self) -> int:
@@ -76,6 +80,7 @@ class Pursuit:
         reference = estimate.reports.get("reference")
         if reference is None or reference.shape[-2] <= self.order:
             raise ValueError(
-                f"this law follows a target and its derivatives up to {self.order}; choose an estimator that reports them"
+                f"this law follows a target and its derivatives up to {self.order}: the estimator has to report them, "
+                f"and the target to be of order {self.order} at least"
             )
         return np.asarray(reference, dtype=np.float64)

@@ -95,22 +95,9 @@ def optimal(edges: Edges) -> Array:
     return np.where(joined[..., None, None], relative, np.nan)
 
 
-def iteration(edges: Edges, step: float) -> Array:
-    """M_JOR = I - h D^-1 Upsilon (12), shape (..., N D, N D), with the step h."""
-    matrix, _ = system(edges)
-    own = weights(edges)
-    rows = matrix.reshape(*own.shape[:-2], own.shape[-1], matrix.shape[-1])
-    scaled = np.linalg.solve(own, rows).reshape(matrix.shape)
-    moved: Array = np.eye(matrix.shape[-1]) - step * scaled
-    return moved
-
-
 def spectrum(edges: Edges) -> Array:
     """Eigenvalues of D^-1 Upsilon, in ascending order, shape (..., N D): real, D of them zero where all agents are joined."""
-    matrix, _ = system(edges)
-    values, vectors = np.linalg.eigh(weights(edges))
-    root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
-    return np.asarray(np.linalg.eigvalsh(_scaled(matrix, root)), dtype=np.float64)
+    return np.asarray(np.linalg.eigvalsh(_symmetric(edges)), dtype=np.float64)
 
 
 def step(edges: Edges, kind: Literal["smooth", "fast"]) -> float:
@@ -121,19 +108,32 @@ def step(edges: Edges, kind: Literal["smooth", "fast"]) -> float:
     return 1.0 / largest if kind == "smooth" else 2.0 / (smallest + largest)
 
 
+def beside(place: Array, edges: Edges) -> Array:
+    """Estimated positions (..., N, D) moved onto the optimal ones, in metres: by the weighted centroid of what is between them.
+
+    An agent that says nothing, NaN, counts for nothing, and keeps saying it; where edges do not join all, places stay.
+    """
+    off: Array = place - optimal(edges)
+    told = np.asarray(~np.isnan(off).any(axis=-1))
+    own = np.where(told[..., None, None], weights(edges), 0.0)
+    between = centroid(np.where(told[..., None], off, 0.0), own)
+    return np.asarray(place - np.nan_to_num(between)[..., None, :], dtype=np.float64)
+
+
 def distance(place: Array, edges: Edges) -> Array:
     """How far agents are from the optimal estimates, root mean square, shape (...), in metres; both from the centroid (8).
 
     Parameters
     ----------
     place
-        Estimated positions, shape (..., N, D), in metres.
+        Estimated positions, shape (..., N, D), in metres; NaN of agents that say nothing, which do not count.
     edges
         What could be known.
     """
-    own = weights(edges)
-    off = ((centred(place, own) - optimal(edges)) ** 2).sum(axis=-1)
-    root: Array = np.sqrt(off.mean(axis=-1))
+    off = ((beside(place, edges) - optimal(edges)) ** 2).sum(axis=-1)
+    told = ~np.isnan(off)
+    number = np.where(told.any(axis=-1), told.sum(axis=-1), np.nan)
+    root: Array = np.sqrt(np.where(told, off, 0.0).sum(axis=-1) / number)
     return root
 
 
@@ -143,11 +143,8 @@ def rates(edges: Edges, h: float, anchor: int) -> Rates:
     moved = 1.0 - h * spectrum(edges)[dimension:]
     kept = np.delete(np.arange(len(edges.pull)), anchor)
     # Agents keep their weights Upsilon_ii: the anchor's own row and column alone are left out (definition 4.1).
-    matrix, _ = system(edges)
-    values, vectors = np.linalg.eigh(weights(edges))
-    root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     rows = (kept[:, None] * dimension + np.arange(dimension)).ravel()
-    anchored = 1.0 - h * np.linalg.eigvalsh(_scaled(matrix, root)[np.ix_(rows, rows)])
+    anchored = 1.0 - h * np.linalg.eigvalsh(_symmetric(edges)[np.ix_(rows, rows)])
     return Rates(float(np.abs(moved).max()), float(np.abs(anchored).max()))
 
 
@@ -162,8 +159,11 @@ def ringing(place: Array) -> Array:
     return share[..., : place.shape[-3]]
 
 
-def _scaled(matrix: Array, root: Array) -> Array:
-    """D^-1/2 Upsilon D^-1/2, from the roots (..., N, D, D) of the inverse weights."""
+def _symmetric(edges: Edges) -> Array:
+    """D^-1/2 Upsilon D^-1/2, shape (..., N D, N D), which has the eigenvalues of D^-1 Upsilon."""
+    matrix, _ = system(edges)
+    values, vectors = np.linalg.eigh(weights(edges))
+    root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     agents, dimension = root.shape[-3], root.shape[-1]
     blocks = matrix.reshape(*matrix.shape[:-2], agents, dimension, agents, dimension)
     blocks = np.swapaxes(blocks, -3, -2)

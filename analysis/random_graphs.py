@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import minimum_spanning_tree
@@ -39,6 +41,7 @@ def edges(seed: int, agents: int) -> Edges:
     return localization.together(said, np.where(measured[..., None, None], np.linalg.inv(spread), 0.0))
 
 
+@cache  # a study judges them, and draws them
 def rates(number: int, agents: int, h: float) -> Array:
     """Convergence rates with the weighted centroid and with agent 1 as the anchor, on so many graphs, shape (number, 2)."""
     found = [localization.rates(edges(seed, agents), h, anchor=0) for seed in range(number)]

@@ -17,9 +17,11 @@ from affinet import plan, scenario
 from affinet.batch import fly_all
 from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
-from analysis.pursuit import Array, position_jet, unpacked
+from analysis.information import Array, position_jet, unpacked
+from world.dynamics import carried
 
-_TICK = 1e-3
+_TICK = 1e-3  # s
+_AXES = 2
 _SETTLED = 1.0  # s
 
 
@@ -31,6 +33,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=2.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
+    if max(options.steps) > _TICK:
+        parser.error(f"steps are at most {_TICK:g} s, the tick of the flight")
     known, neighbours = _flown(options.seconds, options.seed)
     print("| step (s) | theta | position (m) | velocity (m/s) | acceleration (m/s2) |")
     print("|---|---|---|---|---|")
@@ -63,17 +67,16 @@ def _agree(known: Array, neighbours: Array, step: float, theta: float) -> Array:
         for now, jet in enumerate(known):
             agreed = consensus.outputs(jet, internal)
             if now * _TICK >= _SETTLED:
-                off.append(_position(agreed) - _position(jet.mean(axis=1, keepdims=True)))
+                off.append(_positions(agreed) - _positions(jet.mean(axis=1, keepdims=True)))
             for within in range(steps):
                 seconds = within * step
-                moved = jet[0] + seconds * jet[1] + 0.5 * seconds**2 * jet[2]
-                own = consensus.outputs(np.concatenate([moved[None], jet[1:]]), internal)[0]
+                own = consensus.outputs(np.concatenate([carried([*jet], seconds)[None], jet[1:]]), internal)[0]
                 internal = consensus.step(internal, own, own[neighbours], step)
         return np.asarray(np.sqrt(np.square(off).mean(axis=(0, 2, 3))))
 
 
-def _position(information: Array) -> Array:
-    return position_jet(*unpacked(information, 2, 2))
+def _positions(information: Array) -> Array:
+    return position_jet(*unpacked(information, _AXES, len(information) - 1))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from affinet.side_by_side import side_by_side
 from agents.estimators.base import Heard
 from agents.estimators.jor import JacobiOverRelaxation
 from analysis import localization, random_graphs
-from analysis.localization import Edges, centred, centroid, iteration, optimal, ringing, spectrum, system, weights
+from analysis.localization import Edges, centred, centroid, optimal, ringing, spectrum, system, weights
 from analysis.sensor import Sensor
 from netem.channels import PLACE
 from netem.fate import Fate
@@ -38,6 +38,15 @@ class Measurement(NamedTuple):
     j: int
     y: np.ndarray
     covariance: np.ndarray
+
+
+def iteration(edges, step):
+    """M_JOR = I - h D^-1 Upsilon (12), shape (..., N D, N D), with the step h."""
+    matrix, _ = system(edges)
+    own = weights(edges)
+    rows = matrix.reshape(*own.shape[:-2], own.shape[-1], matrix.shape[-1])
+    scaled = np.linalg.solve(own, rows).reshape(matrix.shape)
+    return np.eye(matrix.shape[-1]) - step * scaled
 
 
 def positive(size, rng):

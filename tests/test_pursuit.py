@@ -28,7 +28,8 @@ from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
 from agents.pursuit import Pursuit
 from analysis import jets
-from analysis.pursuit import Sighting, Target, diffusion, numbers, packed, position, transition, unpacked
+from analysis.information import numbers, packed, position, unpacked
+from analysis.pursuit import Sighting, Target, diffusion, transition
 from netem.channels import INPUT, TARGET
 from netem.fate import Fate
 from world import pursued

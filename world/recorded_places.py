@@ -48,15 +48,11 @@ class Places:
             self._first.tick(timeline, tick, measured, fates)
         place, position = moments.reports[PLACE][kept], moments.position[kept]
         edges = self._first.edges()
-        own = localization.weights(edges)
-        joined = np.linalg.det(own.sum(axis=0)) != 0.0
-        here = localization.centroid(position, own)[:, None] if joined else np.zeros((len(position), 1, 1))
-        believed = localization.centred(place, own) + here if joined else place
-        best = np.broadcast_to(localization.optimal(edges) + here, believed.shape)
-        points(self._stream, "swarm/place", time, believed)
+        here = localization.centroid(position, localization.weights(edges))[:, None]
+        best = localization.optimal(edges) + here
+        points(self._stream, "swarm/place", time, localization.beside(place, edges) + here)
         points(self._stream, "swarm/optimal", time, best)
-        off = localization.distance(place, edges) if joined else np.full(len(place), np.nan)
-        scalars(self._stream, "metrics/localization", time, off[:, None])
+        scalars(self._stream, "metrics/localization", time, localization.distance(place, edges)[:, None])
         if self._first.seen.sum() > known:
             self._log_ellipses(moments.first, position[0])
 

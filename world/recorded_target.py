@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 
 from netem.timeline import Timeline
+from world.formation import Array
 from world.history import Moments
 from world.stage import ellipses, points, scalars
 from world.world import World
@@ -42,7 +43,7 @@ class Pursued:
         found, agreed = moments.reports["found"][kept], moments.reports["reference"][kept][:, :, 0]
         for path, positions in (("target", target), ("found", found), ("agreed", agreed)):
             points(self._stream, f"swarm/{path}/at", time, positions)
-        off = [np.sqrt(((each - target) ** 2).sum(axis=-1).mean(axis=-1)) for each in (found, agreed)]
+        off = [_over_agents(each - target) for each in (found, agreed)]
         scalars(self._stream, "metrics/target", time, np.stack(off, axis=-1))
         variance = moments.reports["variance"][kept][..., None, None] * np.eye(target.shape[-1])
         known = np.asarray(np.isfinite(variance).all(axis=(-2, -1)) & np.isfinite(agreed).all(axis=-1))
@@ -52,3 +53,10 @@ class Pursued:
         strips = lines.reshape(len(lines), -1, *lines.shape[-2:])
         columns = rr.LineStrips3D.columns(strips=strips.reshape(-1, *strips.shape[-2:]))
         self._stream.send_columns("swarm/agreed/spread", time, columns.partition([strips.shape[1]] * len(strips)))
+
+
+def _over_agents(off: Array) -> Array:
+    """Root mean squares (T,) of vectors (T, N, D), over the agents that say anything."""
+    told = np.asarray(~np.isnan(off).any(axis=-1))
+    number = np.where(told.any(axis=-1), told.sum(axis=-1), np.nan)
+    return np.asarray(np.sqrt((np.where(told[..., None], off, 0.0) ** 2).sum(axis=(-2, -1)) / number))

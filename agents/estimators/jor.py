@@ -90,9 +90,11 @@ class JacobiOverRelaxation:
         here = np.broadcast_to(brief.back, said.fresh.shape)[..., None]
         of_me = np.take_along_axis(said.fields["measured"], here[..., None], axis=-2)[..., 0, :]
         seen = np.take_along_axis(said.fields["seen"], here, axis=-1)[..., 0]
-        # Who restarts measures anew, and says so in every message: both ends then go by that.
-        told_of = said.fresh & seen
-        other = Side(np.where(told_of[..., None], -of_me, state.other.measured), state.other.seen | told_of)
+        # Who restarts measures anew, or not at all, and says so in every message: both ends then go by that.
+        other = Side(
+            np.where((said.fresh & seen)[..., None], -of_me, state.other.measured),
+            np.where(said.fresh, seen, state.other.seen),
+        )
         theirs = np.where(said.fresh[..., None], said.fields["place"], state.theirs)
         told = state.told | said.fresh
         information, pull = _edges(brief, state.own, other)
@@ -100,9 +102,9 @@ class JacobiOverRelaxation:
         place = self._moved(
             brief, state.place, theirs, np.where(counts[..., None, None], information, 0.0), pull, counts
         )
-        covariance = inverse(np.where(counts[..., None, None], information, identity(brief.dimension)))
-        relative = np.where(counts[..., None], place[..., None, :] - theirs, 0.0)
-        estimate = Estimate(relative, counts, covariance, no_indicator(counts), reports={"place": place})
+        nothing, none = np.zeros(theirs.shape), np.zeros_like(counts)
+        covariance = nothing[..., None] * nothing[..., None, :]
+        estimate = Estimate(nothing, none, covariance, no_indicator(none), reports={PLACE: place})
         return Belief(place, theirs, told, state.own, other), estimate
 
     def _moved(self, brief: Brief, place: Array, theirs: Array, information: Array, pull: Array, counts: Mask) -> Array:

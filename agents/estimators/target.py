@@ -17,7 +17,8 @@ from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
 from agents.estimators.redcho import Consensus
 from analysis import jets
-from analysis.pursuit import Target, diffusion, numbers, packed, position_jet, transition, unpacked
+from analysis.information import numbers, packed, position_jet, unpacked
+from analysis.pursuit import Target, diffusion, transition
 from netem.channels import TARGET
 from netem.links import Integers
 
@@ -38,7 +39,7 @@ class Track(NamedTuple):
     Parameters
     ----------
     now
-        What its clock said last, shape (...); -1 before the first tick.
+        What its clock said last, shape (...), in ticks; -1 before it has said anything.
     last, before
         The last two optimal estimates.
     settled
@@ -47,8 +48,8 @@ class Track(NamedTuple):
         Of detection, now at work, shape (...).
     internal
         Variables of REDCHO, shape (..., m + 1, C), for the C different numbers of information matrix and vectors.
-    theirs, met
-        What neighbours said last, shape (..., n, C), and which have said anything, shape (..., n).
+    theirs, silent
+        What neighbours said last, shape (..., n, C), and for how many ticks they have not been heard, shape (..., n).
     """
 
     now: Integers
@@ -58,7 +59,7 @@ class Track(NamedTuple):
     method: Integers
     internal: Array
     theirs: Array
-    met: Mask
+    silent: Integers
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,11 @@ class TargetEstimator:
         Whose derivatives go with the position found together: those found together too (Algorithm 1), or the agent's own. Those
         of REDCHO want far shorter ticks than networks have (docs/studies.md).
     theta, k, gamma
-        Gains of REDCHO (14), k and gamma one for each derivative from 0 to m.
+        Gains of REDCHO (14): theta and gamma per second, k without a unit; k and gamma one for each derivative from 0 to m.
+    hold
+        For how many ticks REDCHO counts a neighbour that it does not hear with what that said last.
     prior_position, prior_derivatives
-        Standard deviations of the target's position and of each of its derivatives in the first tick, in SI units.
+        Standard deviations of the target's position and of each of its derivatives in tick 0, in SI units.
     """
 
     output: Literal["smooth", "optimal"] = "smooth"
@@ -91,6 +94,7 @@ class TargetEstimator:
     theta: float = 16.0
     k: Sequence[float] = (6.0, 11.0, 6.0)
     gamma: Sequence[float] = (1.0, 1.0, 1.0)
+    hold: int = 10
     prior_position: float = 1.0
     prior_derivatives: float = 1.0
 
@@ -101,6 +105,10 @@ class TargetEstimator:
             )
         if self.alpha <= 0.0:
             raise ValueError(f"alpha must be above 0, not {self.alpha}")
+        if min(self.theta, *self.k, *self.gamma) <= 0.0:
+            raise ValueError(f"REDCHO's gains must be above 0: theta {self.theta}, k {self.k}, gamma {self.gamma}")
+        if self.hold < 0:
+            raise ValueError(f"hold is a number of ticks, not {self.hold}")
 
     def channels(self, brief: Brief) -> Channels:
         """The information: as agreed on so far, or one's own with its derivatives."""
@@ -115,24 +123,23 @@ class TargetEstimator:
                 return {}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Track:
-        """The target is at the origin and at rest, as far as is known."""
+        """In tick 0 the target was at the origin and at rest, as far as is known."""
         order = _target(brief).order
         if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
             raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
         prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
-        unmade = np.full(batch, -1, dtype=np.int64)
-        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, unmade)
+        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.zeros(batch, dtype=np.int64))
         slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
         return Track(
-            now=unmade,
+            now=np.full(batch, -1, dtype=np.int64),
             last=first,
             before=first,
             settled=np.zeros(batch, dtype=bool),
             method=np.zeros(batch, dtype=np.int64),
             internal=np.zeros((*batch, order + 1, different)),
             theirs=np.zeros((*batch, slots, different)),
-            met=np.zeros((*batch, slots), dtype=bool),
+            silent=np.full((*batch, slots), self.hold, dtype=np.int64),
         )
 
     def sense(
@@ -154,7 +161,8 @@ class TargetEstimator:
 
     def fuse(self, brief: Brief, state: Track, heard: Mapping[str, Heard], own: Own) -> tuple[Track, Estimate]:
         """Take in a detection that is done; put together what is known."""
-        state = self._detected(brief, _told_the_time(state, own), own)
+        state = state._replace(now=np.broadcast_to(np.asarray(own.tick, dtype=np.int64), state.now.shape))
+        state = self._detected(brief, state, own)
         Q, y = self._information(brief, state)
         alone, local = packed(Q, y), position_jet(Q, y)
         fused, together, shared = alone, local, Q
@@ -188,11 +196,11 @@ class TargetEstimator:
             return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
         consensus = self._consensus(brief)
         agreed = consensus.outputs(own, state.internal)
-        # Both ends of an edge have to pull alike, or the mean drifts: who is not heard counts with what it said last.
-        held, met = np.where(fresh[..., None], theirs, state.theirs), state.met | fresh
-        counted = np.where(met[..., None], held, agreed[0][..., None, :])
+        # Both ends of an edge have to pull alike, or the mean drifts: what was said last counts for a while.
+        held, silent = np.where(fresh[..., None], theirs, state.theirs), np.where(fresh, 0, state.silent + 1)
+        counted = np.where((silent <= self.hold)[..., None], held, agreed[0][..., None, :])
         internal = consensus.step(state.internal, agreed[0], counted, brief.dt)
-        return state._replace(internal=internal, theirs=held, met=met), agreed
+        return state._replace(internal=internal, theirs=held, silent=silent), agreed
 
     def _detected(self, brief: Brief, state: Track, own: Own) -> Track:
         """The optimal estimate of the tick in which the detection was done (5), where one was."""
@@ -238,7 +246,7 @@ class TargetEstimator:
         """The jet of eta (appendix B), shape (m + 1, ...): how far the smooth output has passed to the newer prediction."""
         latency = _seconds(target, state, dt)
         rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
-        passed = np.minimum((state.now - state.last.made) * dt / latency, 1.0)
+        passed = np.clip((state.now - state.last.made) * dt / latency, 0.0, 1.0)
         rising = jets.power(passed, exponent, rate, orders)
         falling = self.alpha**exponent * jets.power(1.0 - passed, exponent, -rate, orders)
         share = jets.quotient(rising, rising + falling)
@@ -260,17 +268,6 @@ def _seconds(target: Target, state: Track, dt: float) -> Array:
     return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
 
 
-def _told_the_time(state: Track, own: Own) -> Track:
-    """What its clock says; a fresh agent knows since now what it knows."""
-    now = np.broadcast_to(np.asarray(own.tick, dtype=np.int64), state.now.shape)
-    first = state.last.made < 0
-
-    def begun(prediction: Prediction) -> Prediction:
-        return prediction._replace(made=np.asarray(np.where(first, now, prediction.made), dtype=np.int64))
-
-    return state._replace(now=now, last=begun(state.last), before=begun(state.before))
-
-
 def _carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Array, Array]:
     """Mean and covariance after some time (6)."""
     A = transition(target.order, seconds)
@@ -281,7 +278,7 @@ def _carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Ar
 def _predicted(target: Target, prediction: Prediction, now: Integers, dt: float) -> tuple[Array, Array]:
     """Jets of the information of an optimal estimate carried on (6), by the differential equations that it follows."""
     order = target.order
-    elapsed = np.where(prediction.made < 0, 0, np.maximum(now - prediction.made, 0))
+    elapsed = np.maximum(now - prediction.made, 0)  # a clock that is set right goes back
     first, spread = _carried(target, prediction, elapsed * dt)
     shift, driven = np.eye(order, k=1), np.zeros((order, order))
     driven[-1, -1] = target.intensity
