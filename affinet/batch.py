@@ -47,7 +47,8 @@ class Runs:
         Means over the edges, as in `analysis.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
     localization, drift, ringing
         Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
-        metres, and which share of the steps since the moment before went back; NaN where nobody localizes.
+        metres, and which share of the steps since the moment before went back; NaN where
+        nobody localizes, the second also while anybody is silent.
     found, agreed, ideal, apart, behind, effort
         Of agents that pursue a target, in those ticks, shape (R, T): how far the target is from where each finds it by itself,
         from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal

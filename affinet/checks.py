@@ -105,7 +105,8 @@ def localization_step(world: World, estimator: JacobiOverRelaxation) -> Finding:
     says = (
         f"rate {found.anchor if estimator.anchor else found.centroid:.4f} a tick with h {estimator.h:g} (weighted centroid "
         f"{found.centroid:.4f}, agent {anchor} as the anchor {found.anchor:.4f}); "
-        f"h {localization.step(edges, 'smooth'):.3f} is the fastest without ringing, {localization.step(edges, 'fast'):.3f} of all"
+        f"h {localization.step(edges, 'smooth'):.3f} is the fastest without ringing, "
+        f"{localization.step(edges, 'fast'):.3f} of all"
     )
     return Finding("localization", "ok", says)
 

@@ -1,7 +1,7 @@
 """What a study leaves: data as Parquet, figures, and the verdicts.
 
 `curves.parquet` has a row for each moment of each case, with mean and standard deviation over its runs; `runs.parquet` has a
-row for each run, with its mean error.
+row for each run, with what stands for each quantity over its time.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     """Write data, figure and verdicts into a directory."""
     out.mkdir(parents=True, exist_ok=True)
     pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
-    pq.write_table(pa.concat_tables([_runs(one) for one in results]), out / "runs.parquet")
+    pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
@@ -66,11 +66,11 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
 def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:
     if len(results) <= _MOST_FLIGHTS:
         target_figures.pursued(out / "target.png", study.title, [_flight(one) for one in results])
-    if len(results) == 1:
-        (one,) = results
-        order = one.runs.first["fused"].shape[-2] - 1
-        first = order * (order + 1) // 2  # behind the information matrix
-        fused, known = (one.runs.first[name][..., first] for name in ("fused", "information"))
+    one, *_ = results
+    order = one.runs.first["fused"].shape[-2] - 1
+    first = order * (order + 1) // 2  # behind the information matrix
+    fused, known = (one.runs.first[name][..., first] for name in ("fused", "information"))
+    if (fused != known).any():
         target_figures.agreement(out / "agreement.png", study.title, one.runs.seconds, fused, known)
 
 
@@ -104,7 +104,9 @@ def _moments(one: Result) -> pa.Table:
     return pa.table(columns)
 
 
-def _runs(one: Result) -> pa.Table:
+def _runs(one: Result, since: float) -> pa.Table:
     number = len(one.runs.mean_error)
     labels = {name: [label] * number for name, label in one.labels.items()}
-    return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error})
+    with np.errstate(invalid="ignore", over="ignore"):
+        overall = {name: over_time(one.runs, name, (since, None)) for name in NAMES}
+    return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error} | overall)

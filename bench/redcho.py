@@ -22,6 +22,7 @@ from world.dynamics import carried
 
 _TICK = 1e-3  # s
 _AXES = 2
+_WHOLE = 1e-6
 _SETTLED = 1.0  # s
 
 
@@ -33,8 +34,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=2.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    if max(options.steps) > _TICK:
-        parser.error(f"steps are at most {_TICK:g} s, the tick of the flight")
+    if not all(0.0 < step <= _TICK and abs(_TICK / step - round(_TICK / step)) < _WHOLE for step in options.steps):
+        parser.error(f"steps are at most {_TICK:g} s, the tick of the flight, and divide it")
+    if options.seconds <= _SETTLED:
+        parser.error(f"errors count from {_SETTLED:g} s on: give more seconds than that")
     known, neighbours = _flown(options.seconds, options.seed)
     print("| step (s) | theta | position (m) | velocity (m/s) | acceleration (m/s2) |")
     print("|---|---|---|---|---|")

@@ -75,12 +75,12 @@ def lives(agent, state, ticks, seed):
             position = rng.normal(size=agent.brief.dimension)
             sighting = Sighting(position + 1.0, np.array(rng.random() < 0.4), *rng.integers(2, size=2))
         state, action = agent.act(state, tick, heard, position, motion, sighting)
-        told.append(action.input)
+        told.append(np.concatenate([np.ravel(said) for said in (action.input, *action.estimate.reports.values())]))
     return state, np.array(told)
 
 
 def lived_on(agent, file):
-    """What an agent commands after a while and a checkpoint, as it would have without one; and a fresh agent instead."""
+    """What an agent commands and reports after a checkpoint, as it would have without one; and a fresh agent instead."""
     state, _ = lives(agent, agent.init(()), TICKS, seed=1)
     checkpoint.save(file, state)
     loaded = checkpoint.load(file, like=agent.init(()))
@@ -106,7 +106,7 @@ def test_who_pursues_by_derivatives_of_any_order_goes_on_from_its_checkpoint(ord
         "target",
         f"target.order={order}",
         f"dynamics.model={INTEGRATORS[order - 1]}",
-        f"agents.parameters.pursuit.kappa={[1.0, 3.0, 3.0, 1.0][:order]}",
+        f"agents.parameters.pursuit.kappa={np.poly(np.full(order, -1.0))[:0:-1].tolist()}",
         'agents.parameters.target={fusion="mean"}',
     ).agents
     told, of_nobody = lived_on(replace(agent, brief=agent.brief.of(4)), tmp_path / "agent.npz")

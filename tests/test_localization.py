@@ -14,11 +14,13 @@ from scripted import timeline
 from affinet import checkers, invariants, scenario
 from affinet.batch import fly_all
 from affinet.checkers import localized, smooth
+from affinet.plan import PlanError
 from affinet.run import rehearse
 from affinet.sections import ScenarioError
 from affinet.side_by_side import side_by_side
+from agents.estimators import jor
 from agents.estimators.base import Heard
-from agents.estimators.jor import JacobiOverRelaxation
+from agents.estimators.jor import JacobiOverRelaxation, Side
 from analysis import localization, random_graphs
 from analysis.localization import Edges, centred, centroid, optimal, ringing, spectrum, system, weights
 from analysis.sensor import Sensor
@@ -205,6 +207,39 @@ def test_how_far_agents_are_from_the_optimum_does_not_depend_on_the_common_frame
     expected = np.sqrt(((off - middle(off, own)) ** 2).sum(axis=-1).mean())
     assert localization.distance(place + np.array([7.0, -3.0]), edges) == pytest.approx(expected, rel=1e-9)
     assert localization.distance(optimal(edges) + 4.0, edges) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_agents_that_say_nothing_count_for_nothing_in_how_far_they_are_off():
+    for seed in range(10):
+        agents, made, rng = campaign(seed)
+        edges, own = edges_of(agents, made), own_weights(agents, made)
+        place = 5.0 + rng.normal(size=(4, agents, 2))
+        off, best = place - optimal(edges), optimal(edges)
+        whole = np.sqrt(((centred(place, own) - best) ** 2).sum(axis=-1).mean(axis=-1))
+        np.testing.assert_allclose(localization.distance(place, edges), whole, rtol=1e-9)
+        moved = centred(place, own)
+        np.testing.assert_allclose(localization.beside(place, edges), moved, atol=1e-9)
+        # One is silent in the second moment, another and it in the third, all in the fourth.
+        gone = np.zeros((4, agents), dtype=bool)
+        gone[1:, 1] = gone[2:, 0] = gone[3] = True
+        partly = np.where(gone[..., None], np.nan, place)
+        found, beside = localization.distance(partly, edges), localization.beside(partly, edges)
+        for moment in range(3):
+            told = ~gone[moment]
+            left = off[moment, told] - middle(off[moment, told], own[told])
+            assert found[moment] == pytest.approx(np.sqrt((left**2).sum(axis=-1).mean()), rel=1e-9)
+            np.testing.assert_allclose(beside[moment, told], best[told] + left, atol=1e-9)
+            assert np.isnan(beside[moment, gone[moment]]).all()
+        assert np.isnan(found[3])
+        assert np.isnan(beside[3]).all()
+
+
+def test_where_edges_do_not_join_all_places_stay_where_they_are_and_nothing_is_said_of_how_far_off():
+    rng = np.random.default_rng(0)
+    apart = edges_of(4, [Measurement(i, i + 1, rng.normal(size=2), np.eye(2)) for i in (0, 2)])
+    place = rng.normal(size=(3, 4, 2))
+    np.testing.assert_array_equal(localization.beside(place, apart), place)
+    assert np.isnan(localization.distance(place, apart)).all()
 
 
 # Rates
@@ -406,32 +441,33 @@ def test_what_a_neighbour_measured_of_an_edge_counts_as_much_as_ones_own():
     for name, seen in (("one", one_way), ("both", links.present)):
         state = estimator.init(agents, (links.agents,))
         for _ in range(600):
-            state, estimate = one_tick(estimator, agents, links, state, measured, seen)
+            state, _ = one_tick(estimator, agents, links, state, measured, seen)
         edges = known_from(links, measured, seen, agents.sensor)
         assert localization.distance(state.place, edges) < 1e-9
-        assert estimate.known[links.present].all()
-        covariance = np.zeros((links.agents, links.agents, 2, 2))
-        covariance[links.dst - 1, links.src - 1] = estimate.covariance[links.present]
-        for i, j in zip(links.dst - 1, links.src - 1, strict=True):
-            np.testing.assert_allclose(np.linalg.inv(covariance[i, j]), edges.information[i, j], rtol=1e-9)
-            np.testing.assert_allclose(covariance[i, j], covariance[j, i], rtol=1e-9)
-        found[name] = covariance, centred(state.place, weights(edges))
+        # Both ends count the edge alike, with all that was measured of it.
+        known, _ = jor._edges(agents, state.own, state.other)
+        for i, slot in np.argwhere(links.present).tolist():
+            j = links.neighbours[i, slot]
+            np.testing.assert_allclose(known[i, slot], edges.information[i, j], rtol=1e-12)
+            np.testing.assert_allclose(known[i, slot], known[j, links.back[i, slot]], rtol=1e-12)
+        found[name] = known[links.present][0], centred(state.place, weights(edges))
     # Two measurements are surer than one, and move the answer.
-    i, j = links.dst[0] - 1, links.src[0] - 1
-    assert np.linalg.eigvalsh(found["one"][0][i, j] - found["both"][0][i, j]).min() > 0.0
+    assert np.linalg.eigvalsh(found["both"][0] - found["one"][0]).min() > 0.0
     assert np.abs(found["one"][1] - found["both"][1]).max() > 0.01
 
 
-def test_relative_positions_are_those_of_the_places_as_last_heard():
+def test_where_agents_are_is_all_that_is_told_and_no_edge_counts_as_estimated():
     agents, links, measured = team(7)
     estimator = JacobiOverRelaxation()
     state = estimator.init(agents, (links.agents,))
     for _ in range(3):
-        said = state.place
         state, estimate = one_tick(estimator, agents, links, state, measured, links.present)
-        expected = np.where(links.present[..., None], state.place[:, None] - said[links.neighbours], 0.0)
-        np.testing.assert_allclose(estimate.relative, expected, atol=1e-15)
-        np.testing.assert_array_equal(estimate.known, links.present)
+        assert set(estimate.reports) == {"place"}
+        assert np.abs(estimate.reports["place"]).max() > 0.1
+        assert (estimate.known.shape, estimate.known.any()) == (links.present.shape, np.False_)
+        np.testing.assert_array_equal(estimate.relative, np.zeros((*links.present.shape, 2)))
+        np.testing.assert_array_equal(estimate.covariance, np.zeros((*links.present.shape, 2, 2)))
+        assert np.isnan(estimate.psi).all()
 
 
 @pytest.mark.parametrize("anchor", [False, True])
@@ -448,6 +484,25 @@ def test_only_an_anchor_stays_where_it_began(anchor):
         np.testing.assert_allclose(state.place, best - best[2], atol=1e-8)
     else:
         np.testing.assert_allclose(state.place, best, atol=1e-8)
+
+
+@pytest.mark.parametrize("heard", [True, False], ids=["heard", "lost"])
+def test_a_measurement_that_its_agent_no_longer_has_is_forgotten_at_the_other_end_once_that_is_heard(heard):
+    agents, links, measured = team(6, agents=6)
+    estimator, restarted = JacobiOverRelaxation(), 2
+    state, _ = one_tick(estimator, agents, links, estimator.init(agents, (6,)), measured, links.present)
+    others = (np.arange(6) != restarted)[:, None]
+    # It knows nothing any more, and measures nothing any more.
+    own = Side(np.where(others[..., None], state.own.measured, 0.0), state.own.seen & others)
+    state = state._replace(own=own, other=Side(np.where(others[..., None], state.other.measured, 0.0), own.seen))
+    fresh = links.present if heard else links.present & (links.neighbours != restarted)
+    state, _ = one_tick(estimator, agents, links, state, measured, links.present & others, fresh)
+    information, _ = jor._edges(agents, state.own, state.other)
+    edges = known_from(links, measured, links.present & (others if heard else True), agents.sensor)
+    for i, slot in np.argwhere(links.present & others).tolist():
+        np.testing.assert_allclose(information[i, slot], edges.information[i, links.neighbours[i, slot]], rtol=1e-12)
+    told_of = state.other.seen & links.present & (links.neighbours == restarted)
+    np.testing.assert_array_equal(told_of, links.present & (links.neighbours == restarted) & (not heard))
 
 
 @pytest.mark.parametrize("h", [0.0, 1.0, -0.3])
@@ -525,14 +580,28 @@ def test_the_check_tells_rates_and_the_fastest_steps_of_measurements_without_noi
     for anchor in ("false", "true"):
         plan = plan_of(NAME, *FOUR, f"agents.parameters.jor={{h=0.3,anchor={anchor}}}")
         (told,) = (finding for finding in plan.findings if finding.check == "localization")
-        rates = localization.rates(edges, 0.3, 0)
+        rates = localization.rates(edges, 0.3, 2)  # agent 3 leads
         chosen = rates.anchor if anchor == "true" else rates.centroid
+        assert abs(rates.anchor - localization.rates(edges, 0.3, 0).anchor) > 1e-3
         assert told.level == "ok"
         assert told.says == (
-            f"rate {chosen:.4f} a tick with h 0.3 (weighted centroid {rates.centroid:.4f}, agent 1 as the anchor "
+            f"rate {chosen:.4f} a tick with h 0.3 (weighted centroid {rates.centroid:.4f}, agent 3 as the anchor "
             f"{rates.anchor:.4f}); h {localization.step(edges, 'smooth'):.3f} is the fastest without ringing, "
             f"{localization.step(edges, 'fast'):.3f} of all"
         )
+
+
+@pytest.mark.parametrize("leaders", [[], [1, 2]], ids=str)
+def test_an_anchor_is_exactly_one_agent_that_leads(leaders):
+    chosen = f"formation.leaders={leaders}"
+    with pytest.raises(PlanError) as told:
+        plan_of(NAME, chosen, "agents.parameters.jor={anchor=true}")
+    said = f"with an anchor exactly one agent leads: formation.leaders has {len(leaders)}"
+    assert said in str(told.value)
+    assert "\n" not in str(told.value)
+    # Without an anchor any number may lead, and the rate is that with the first agent as the anchor.
+    (told,) = (found for found in plan_of(NAME, chosen).findings if found.check == "localization")
+    assert (told.level, "agent 1 as the anchor" in told.says) == ("ok", True)
 
 
 def off_at_the_end(run):
@@ -583,6 +652,18 @@ def test_who_is_restarted_and_the_others_come_to_the_same_answer(state):
     assert off_at_the_end(run) < 1e-9
 
 
+def test_who_is_restarted_and_measures_nothing_any_more_and_the_others_come_to_the_same_answer():
+    blind = timeline(
+        {"verb": "kill", "at": 0.5, "agents": [4]},
+        {"verb": "restart", "at": 1.0, "agents": [4], "state": "cold"},
+        {"verb": "dropout", "at": 1.0, "links": ["2->4", "3->4"]},
+    )
+    run = flown(*FOUR, blind, "time.duration=4")
+    with_its_own = flown(*FOUR, "time.duration=4")
+    assert np.abs(known(run).information - known(with_its_own).information).max() > 0.1
+    assert off_at_the_end(run) < 1e-9
+
+
 def test_who_is_paused_at_first_and_the_others_come_to_the_same_answer():
     asleep = timeline({"verb": "pause", "at": 0, "until": 1.0, "agents": [4]})
     assert off_at_the_end(flown(*FOUR, asleep, "time.duration=4")) < 1e-9
@@ -622,6 +703,27 @@ def test_many_runs_are_looked_at_as_each_alone():
     np.testing.assert_array_equal(runs.first["place"], flown(*overrides, "seed=5").arrays["place"])
     assert runs.ringing.max() > 0.0
     assert np.isnan(runs.found).all()
+    # Nothing is said of neighbours that could be as wrong as it says.
+    assert np.isnan(runs.nees).all()
+
+
+ROW = (
+    "formation.nodes=[[0,0],[1,0],[2,0],[3,0],[4,0],[5,0]]",
+    'formation.edges=["1-2","2-3","3-4","4-5","5-6"]',
+)
+
+
+@pytest.mark.parametrize("every", [2, 3, 7])
+def test_ringing_is_that_of_all_ticks_since_the_moment_before(every):
+    plan = plan_of(NAME, *ROW, "time.duration=0.64", "agents.parameters.jor={h=0.99}")
+    each, some = (fly_all(plan, [1, 2], every=ticks).ringing for ticks in (1, every))
+    assert each.mean() > 0.5
+    ticks = np.arange(0, 64, every)
+    for row in range(2):
+        expected = [each[row, max(tick - every + 1, 0) : tick + 1].mean() for tick in ticks]
+        np.testing.assert_allclose(some[row], expected, atol=1e-12)
+    counted = np.minimum(every, ticks + 1)
+    np.testing.assert_allclose(some @ counted / counted.sum(), each[:, : ticks[-1] + 1].mean(axis=1), atol=1e-12)
 
 
 # The sensor
@@ -739,6 +841,20 @@ def test_localized_fails_at_the_first_tick_in_which_they_are_too_far_off():
     assert localized(1e-3, by=1.81)(tampered(run, place=place)).verdict == "pass"
 
 
+def test_those_left_are_localized_when_one_dies_and_stays_dead():
+    dead = timeline({"verb": "kill", "at": 1.7, "agents": [4]})
+    run = flown(dead, "network.availability=0.8", "time.duration=2")
+    assert np.isnan(run.arrays["place"][-1, 3]).all()
+    # What was lost has their centroid drift.
+    assert np.linalg.norm(centroid(run.arrays["place"][169], weights(known(run)))) > 0.01
+    found = localized(1e-3, by=1.5)(run)
+    assert (found.verdict, found.tick) == ("pass", None)
+    # One of those left is off.
+    place = changed(run.arrays["place"], (180, 2), run.arrays["place"][180, 2] + 1.0)
+    found = localized(1e-3, by=1.5)(tampered(run, place=place))
+    assert (found.verdict, found.tick) == ("fail", 180)
+
+
 def test_where_nobody_localizes_or_the_run_is_over_localized_is_vacuous():
     assert localized(1.0)(elsewhere()).verdict == "vacuous"
     assert localized(1.0, by=99.0)(flown("time.duration=2")).verdict == "vacuous"
@@ -759,12 +875,7 @@ def test_localized_is_vacuous_when_nothing_was_measured():
 
 
 def test_estimates_that_ring_are_not_smooth():
-    chain_of = (
-        "formation.nodes=[[0,0],[1,0],[2,0],[3,0],[4,0],[5,0]]",
-        'formation.edges=["1-2","2-3","3-4","4-5","5-6"]',
-        "time.duration=0.6",
-    )
-    calm, rough = (flown(*chain_of, f"agents.parameters.jor={{h={h}}}") for h in (0.49, 0.99))
+    calm, rough = (flown(*ROW, "time.duration=0.6", f"agents.parameters.jor={{h={h}}}") for h in (0.49, 0.99))
     assert smooth(0.05)(calm).verdict == "pass"
     found = smooth(0.05)(rough)
     assert found.verdict == "fail"

@@ -27,13 +27,15 @@ from agents.estimators.none import NoEstimator
 from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
 from agents.pursuit import Pursuit
-from analysis import jets
+from analysis import jets, localization
 from analysis.information import numbers, packed, position, unpacked
 from analysis.pursuit import Sighting, Target, diffusion, transition
 from netem.channels import INPUT, TARGET
 from netem.fate import Fate
 from world import pursued
 from world.history import History
+from world.localized import FirstMeasurements
+from world.recorded_target import _over_agents
 
 ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
 
@@ -359,6 +361,70 @@ def test_after_a_pause_an_estimate_is_as_unsure_as_it_is_old():
     gain = P[:, :1] / (P[0, 0] + target.variances[sighting.by[0]])
     A, W = van_loan(2, target.intensity, (after - began) * dt)
     np.testing.assert_allclose(state.last.covariance[0], A @ (P - gain @ P[:1]) @ A.T + W, rtol=1e-9)
+
+
+@pytest.mark.parametrize("output", ["smooth", "optimal"])
+@ORDERS
+def test_what_a_fresh_agent_knows_late_in_a_run_is_what_was_known_in_tick_0_and_has_spread_since(order, output):
+    target, dt, nothing = target_of(order), 0.05, np.zeros((1, 2))
+    estimator = TargetEstimator(output, fusion="none", prior_position=0.5, prior_derivatives=2.0)
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=dt, target=target)
+    idle = Sighting(nothing, np.zeros(1, dtype=bool), *np.zeros((2, 1), dtype=np.int64))
+    prior = np.diag([0.25] + [4.0] * (order - 1))
+    for tick in (0, 1, 200):
+        state, _ = estimator.sense(alone, estimator.init(alone, (1,)), alone.relative, alone.present)
+        _, estimate = estimator.fuse(alone, state, {}, Own(nothing, nothing, tick, sighting=idle))
+        A, W = van_loan(order, target.intensity, tick * dt)
+        Q, y = unpacked(estimate.reports["information"][0, 0], 2, order)
+        np.testing.assert_allclose(np.linalg.inv(Q), A @ prior @ A.T + W, rtol=1e-6)
+        np.testing.assert_array_equal(y, np.zeros((order, 2)))
+    assert estimate.reports["variance"][0] > 10.0
+
+
+def test_who_is_restarted_late_in_a_run_and_remembers_nothing_is_as_unsure_as_the_target_is_free():
+    again = timeline({"verb": "kill", "at": 0.5, "agents": [5]}, {"verb": "restart", "at": 1.0, "agents": [5]})
+    arrays = rehearse(
+        plan_of(NAME, "time.dt=0.01", "time.duration=1.2", "target.latencies=[0.2,0.1]", again, ALONE)
+    ).arrays
+    A, W = van_loan(2, 1.0, 1.0)
+    Q, _ = unpacked(arrays["information"][100, 4, 0], 2, 2)
+    np.testing.assert_allclose(np.linalg.inv(Q), A @ A.T + W, rtol=1e-9)
+    assert arrays["variance"][100, 4] > 10 * arrays["variance"][100, 3]
+
+
+BACK = (1, 5, 12, 30)
+
+
+def test_a_clock_that_goes_back_leaves_information_that_is_sound():
+    target, nothing = target_of(), np.zeros((1, 2))
+    alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target)
+    taken = [one for one in watch(SMOOTH, target, ticks=100) if one.sighting.done[0]][1:]
+    assert len(taken) > 3
+    for one in taken:
+        now = int(one.state.now[0])
+        idle = one.sighting._replace(done=np.array([False]))
+        for back in BACK:
+            own = Own(nothing, nothing, now - back, sighting=idle)
+            state, estimate = SMOOTH.fuse(alone, one.state, {}, own)
+            Q, _ = unpacked(estimate.reports["information"][0, 0], 2, 2)
+            assert np.linalg.eigvalsh(Q).min() > 0.0
+            # The newer prediction does not count yet, and the older one is as of then, or of when it was made.
+            before = one.state.before
+            A, W = van_loan(2, target.intensity, max(now - back - before.made[0], 0) * 0.05)
+            np.testing.assert_allclose(np.linalg.inv(Q), A @ before.covariance[0] @ A.T + W, rtol=1e-8)
+            assert (state.now[0], state.last.made[0]) == (now - back, now)
+
+
+def test_in_a_flight_a_clock_that_is_set_right_leaves_information_that_is_sound():
+    # It falls back just after the first detections, which are far surer than what was known before.
+    fast = timeline({"verb": "clock", "at": 0.0, "until": 0.22, "agents": [4, 7], "rate": 5.0})
+    short = ("time.dt=0.01", "time.duration=1.0", "target.latencies=[0.2,0.1]", ALONE)
+    arrays, right = (rehearse(plan_of(NAME, *short, *air)).arrays for air in ((fast,), ()))
+    Q, _ = unpacked(arrays["information"][:, :, 0], 2, 2)
+    assert np.linalg.eigvalsh(Q).min() > 0.0
+    assert (arrays["variance"] > 0.0).all()
+    wrong = (arrays["information"] != right["information"]).any(axis=(0, 2, 3))
+    assert np.flatnonzero(wrong).tolist() == [3, 6]
 
 
 def test_the_optimal_output_jumps_at_a_detection():
@@ -694,6 +760,41 @@ def test_what_was_lost_counts_in_redcho_as_what_was_said_last_and_before_that_fo
     assert np.abs(held.internal - once.internal).max() > 1e-3
 
 
+@pytest.mark.parametrize("hold", [0, 1, 3])
+def test_what_was_said_last_counts_in_redcho_for_as_many_ticks_as_it_is_held_and_then_as_ones_own(hold):
+    redcho, nobody = TargetEstimator(theta=2.0, hold=hold), np.zeros((3, 2), dtype=bool)
+    agents = replace(brief(np.ones((3, 2, 2))), target=target_of())
+    shares = [[2.0, 5.0], [3.0, 0.5], [3.0, 4.0]]
+    state, _, mine = hearing(redcho, None, shares, PARTLY)
+    said, heard = np.multiply.outer(np.array(shares), np.ones(7)) * mine[:, None], np.array(PARTLY)[..., None]
+    for silent in range(1, 6):
+        before = state
+        state, _, mine = hearing(redcho, state, np.full((3, 2), np.nan), nobody, tick=silent)
+        counted = np.where(heard & (silent <= hold), said, mine[:, None])
+        expected = redcho._consensus(agents).step(before.internal, mine, counted, agents.dt)
+        np.testing.assert_allclose(state.internal, expected, rtol=1e-12, atol=1e-12)
+        # Of those whom it has never heard, an agent holds nothing.
+        pulled = np.abs(counted - mine[:, None]).max(axis=(1, 2)) > 1e-3
+        assert pulled.tolist() == [silent <= hold, False, silent <= hold]
+    # Who is heard again counts again, and is held again.
+    again, *_ = hearing(redcho, state, shares, PARTLY, tick=6)
+    after, _, mine = hearing(redcho, again, np.full((3, 2), np.nan), nobody, tick=7)
+    alone = redcho._consensus(agents).step(again.internal, mine, mine[:, None], agents.dt)
+    assert (np.abs(after.internal - alone).max(axis=(1, 2)) > 1e-3).tolist() == [hold > 0, False, hold > 0]
+
+
+def test_when_nothing_is_held_only_who_is_heard_in_the_tick_counts():
+    fresh_only, held = (TargetEstimator(theta=2.0, hold=hold) for hold in (0, 10))
+    for estimator in (fresh_only, held):
+        once, *_ = hearing(estimator, None, [[2.0, 3.0]] * 3, np.ones((3, 2), dtype=bool))
+        by_itself, *_ = hearing(estimator, None, [[1.0, 1.0]] * 3, np.ones((3, 2), dtype=bool))
+        # Those who are heard in the tick pull, however long they would be held.
+        assert np.abs(once.internal - by_itself.internal).max() > 1e-3
+        later, *_ = hearing(estimator, once, np.full((3, 2), np.nan), np.zeros((3, 2), dtype=bool), tick=1)
+        alone, *_ = hearing(estimator, once, [[1.0, 1.0]] * 3, np.ones((3, 2), dtype=bool), tick=1)
+        assert np.array_equal(later.internal, alone.internal) == (estimator is fresh_only)
+
+
 def test_an_agent_goes_by_its_own_information_where_what_is_agreed_on_is_next_to_none():
     # In the mean a hundredth of its own is left, and a little more or less.
     shares = np.array([-0.984, -0.976, -1.5])
@@ -748,15 +849,16 @@ def test_the_law_by_hand():
 @ORDERS
 def test_the_law_of_any_order_is_that_of_the_paper(order, batch):
     rng = np.random.default_rng(order)
-    p, x, k = rng.normal(size=(5, *batch, 2)), rng.normal(size=(4, *batch, 2)), rng.uniform(0.5, 3.0, 4)
+    p, x = rng.normal(size=(5, *batch, 2)), rng.normal(size=(4, *batch, 2))
+    k = np.poly(-rng.uniform(0.5, 3.0, order))[:0:-1]
     place = k[0] * (x[0] - p[0] - PLACED.nominal)
     written_out = {  # (11)
-        1: p[1] - place,
-        2: p[2] - place - k[1] * (x[1] - p[1]),
-        3: p[3] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]),
-        4: p[4] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]) - k[3] * (x[3] - p[3]),
+        1: lambda: p[1] - place,
+        2: lambda: p[2] - place - k[1] * (x[1] - p[1]),
+        3: lambda: p[3] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]),
+        4: lambda: p[4] - place - k[1] * (x[1] - p[1]) - k[2] * (x[2] - p[2]) - k[3] * (x[3] - p[3]),
     }
-    law, flying = Pursuit(kappa=k[:order].tolist()), np.full((*batch, 2), 77.0)
+    law, flying = Pursuit(kappa=k.tolist()), np.full((*batch, 2), 77.0)
     assert law.order == order
     own = Own(flying, flying, 0, x[0])
     if order > 1:
@@ -765,14 +867,27 @@ def test_the_law_of_any_order_is_that_of_the_paper(order, batch):
     for known in range(order + 1, 6):
         reference = knows(*np.zeros((known, 2)))._replace(reports={"reference": np.moveaxis(p[:known], 0, -2)})
         _, u = law.command(PLACED, law.init(PLACED, batch), 0, own, reference, None)
-        np.testing.assert_allclose(u, written_out[order], rtol=1e-12, atol=1e-12)
-    with pytest.raises(ValueError, match=f"derivatives up to {order}; choose an estimator"):
+        np.testing.assert_allclose(u, written_out[order](), rtol=1e-12, atol=1e-12)
+    with pytest.raises(ValueError, match=f"derivatives up to {order}: the estimator has to report them"):
         law.command(PLACED, law.init(PLACED, batch), 0, own, knows(*np.zeros((order, 2))), None)
 
 
-def test_a_law_without_a_gain_is_none():
-    with pytest.raises(ValueError, match=r"kappa needs a gain .* give \[1.0, 2.0\]"):
-        Pursuit(kappa=())
+@pytest.mark.parametrize("kappa", [(), (1.0, 5.0, 10.0, 10.0, 5.0)], ids=["none", "five"])
+def test_a_law_has_a_gain_for_each_of_one_to_four_times(kappa):
+    with pytest.raises(ValueError, match=r"kappa needs a gain for each of 1 to 4 times .* like \[1.0, 2.0\]") as told:
+        Pursuit(kappa=kappa)
+    assert str(told.value).endswith(f"got {list(kappa)}")
+
+
+@pytest.mark.parametrize(
+    "kappa",
+    [(0.0,), (-1.0,), (1.0, 0.0), (1.0, -2.0), (2.0, 1.0, 2.0), (2.1, 1.0, 2.0), (1.0, 1.0, 1.0, 1.0)],
+    ids=str,
+)
+def test_gains_with_which_agents_would_leave_the_reference_are_refused(kappa):
+    with pytest.raises(ValueError, match="not Hurwitz"):
+        Pursuit(kappa=kappa)
+    assert Pursuit(kappa=(1.9, 1.0, 2.0)).order == 3  # by Routh and Hurwitz, kappa_0 < kappa_1 kappa_2
 
 
 def test_the_law_wants_a_position():
@@ -809,19 +924,23 @@ def refusal(*overrides, name=NAME):
 @pytest.mark.parametrize(
     ("overrides", "says"),
     [
-        (('agents.estimator="none"',), "choose an estimator that reports them"),
+        (('agents.estimator="none"',), "the estimator has to report them"),
         (("target.order=1", ALONE), "derivatives up to 2"),
         (('agents.estimator="none"', *SINGLE), "derivatives up to 1"),
         (("target.order=1",), "a target of order 1 needs 2 gains k and gamma"),
         (('agents.parameters.target={output="optimal"}',), "fusion = 'redcho' wants output = 'smooth'"),
         (('agents.parameters.target={output="optimal",fusion="mean"}',), "fusion = 'mean' wants output = 'smooth'"),
         (('agents.parameters.target={fusion="median"}',), "'redcho', 'mean' or 'none', got 'median'"),
-        ((*bodies(3, 1, 3, 3), ALONE), "derivatives up to 3; choose an estimator that reports them"),
+        (
+            (*bodies(3, 1, 3, 3), ALONE),
+            "up to 3: the estimator has to report them, and the target to be of order 3 at least",
+        ),
         (bodies(2, 1), "bodies are double-integrators; set it to 'single-integrator'"),
         (bodies(2, 1, 3, 3), "pursuit steers jerks, and bodies are double-integrators; set it to 'triple-integrator'"),
         (bodies(3, 1, 4, 6, 4), "pursuit steers snaps, and bodies are triple-integrators; set it to 'quadruple-i"),
         (bodies(4, 1, 2), "pursuit steers accelerations, and bodies are quadruple-integrators; set it to 'double-i"),
-        (bodies(2), "agents.parameters.pursuit: kappa needs a gain for each time that bodies integrate"),
+        (bodies(2), "agents.parameters.pursuit: kappa needs a gain for each of 1 to 4 times that bodies integrate"),
+        (bodies(2, 1, -1), "agents.parameters.pursuit: with kappa [1.0, -1.0] agents leave the reference"),
         ((*TRIPLE, ALONE, "formation.leaders=[1,2,3]"), "formation.leaders: who leads is steered by velocities or acc"),
         (("agents.parameters.target.alpha=0.0",), "alpha must be above 0"),
         (("target.latencies=[0.5,0.0031]",), "target.latencies"),
@@ -846,7 +965,7 @@ def test_an_estimator_of_a_target_needs_one():
 def test_gains_of_the_laws_are_read_from_the_scenario():
     assert plan_of(NAME, "agents.parameters.pursuit={kappa=[4.0,5.0]}").law.build() == Pursuit([4.0, 5.0])
     for order in (1, 2, 3, 4):
-        kappa = [1.0, 5.0, 2.0, 7.0][:order]
+        kappa = [[1.0], [1.0, 5.0], [1.0, 5.0, 2.0], [1.0, 5.0, 8.0, 7.0]][order - 1]
         made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
         assert (made.law.build(), made.world.order, made.agents.law.order) == (Pursuit(kappa), order, order)
 
@@ -861,7 +980,7 @@ def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
 
 @ORDERS
 def test_agents_say_how_they_move_up_to_their_input_and_steer_by_it(order):
-    kappa, rng = [2.0, 3.0, 5.0, 7.0][:order], np.random.default_rng(order)
+    kappa, rng = [[2.0], [2.0, 3.0], [2.0, 3.0, 5.0], [2.0, 5.0, 9.0, 7.0]][order - 1], np.random.default_rng(order)
     made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
     agent, nobody = made.agents, np.zeros_like(made.brief.present)
     place, *moves = rng.normal(size=(order, 10, 2))
@@ -1250,11 +1369,14 @@ def test_a_recording_of_a_pursuit_shows_the_target_and_what_agents_know_of_it(pu
     np.testing.assert_allclose(points["found"][..., :2], kept["found"], atol=1e-5)
     np.testing.assert_allclose(points["agreed"][..., :2], kept["reference"][:, :, 0], atol=1e-5)
     told = np.array(column(chunks, "/metrics/target", "Scalars:scalars"))
+    # Agent 5 dies, and those left count.
+    assert np.isnan(kept["found"]).any(axis=(1, 2)).tolist() == [False] * 5 + [True] * 3
     expected = [
-        np.sqrt(((each - target) ** 2).sum(axis=-1).mean(axis=-1))
+        np.sqrt(np.nanmean(((each - target) ** 2).sum(axis=-1), axis=-1))
         for each in (kept["found"], kept["reference"][:, :, 0])
     ]
-    np.testing.assert_allclose(told[:5], np.stack(expected, axis=-1)[:5], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(told, np.stack(expected, axis=-1), rtol=1e-6, atol=1e-9)
+    assert np.isfinite(told).all()
     strips = column(chunks, "/swarm/agreed/spread", "LineStrips3D:strips")
     assert [len(moment) for moment in strips] == [10] * 8
     away = np.linalg.norm(np.array(strips[4])[..., :2] - kept["reference"][4, :, None, 0], axis=-1)
@@ -1292,6 +1414,31 @@ def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(t
     strips = column(chunks, "/swarm/measured", "LineStrips3D:strips")
     assert [len(moment) for moment in strips] == [28]
     assert {len(line) for line in strips[0]} == {25}
+
+
+def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
+    dead = timeline({"verb": "kill", "at": 0.2, "agents": [4]})
+    plan, out = plan_of("localization", "time.duration=0.4", dead), tmp_path / "run"
+    fly(plan, "inprocess", out, lambda *_: None)
+    chunks, arrays = recorded(out), dict(np.load(out / "arrays.npz"))
+    told = np.array(column(chunks, "/metrics/localization", "Scalars:scalars"), dtype=float)[:, 0]
+    kept = arrays["place"][:40:5]
+    assert np.isnan(kept).any(axis=(1, 2)).tolist() == [False] * 4 + [True] * 4
+    known = FirstMeasurements.of(plan.world, plan.timeline, arrays["measured"], arrays["fates"][:, 0])
+    np.testing.assert_allclose(told, localization.distance(kept, known.edges()), rtol=1e-6)
+    assert np.isfinite(told).all()
+    place, best = (
+        np.array(column(chunks, f"/swarm/{path}", "Points3D:positions"), dtype=float) for path in ("place", "optimal")
+    )
+    assert np.isfinite(best).all()
+    assert np.isfinite(np.delete(place, 3, axis=1)).all()
+    off = np.delete(place - best, 3, axis=1)[4:]
+    np.testing.assert_allclose(np.sqrt((off**2).sum(axis=-1).mean(axis=-1)), told[4:], rtol=1e-4, atol=1e-5)
+
+
+def test_a_distance_over_agents_is_that_of_those_who_say_anything():
+    off = np.array([[[3.0, 4.0], [0.0, 0.0]], [[3.0, 4.0], [np.nan] * 2], [[np.nan] * 2] * 2])
+    np.testing.assert_allclose(_over_agents(off), [np.sqrt(12.5), 5.0, np.nan])
 
 
 # Over processes

@@ -96,13 +96,13 @@ def test_every_case_of_a_shipped_study_can_fly(name, quick):
     [
         ('check = "lower"', 'check = "higher"', "claims.1.check"),
         ("runs = 3", "rnus = 3", "full.rnus"),
-        ('"ga-rkf" }\nlevel', '"nobody" }\nlevel', "no case has the labels"),
+        ('"ga-rkf" }\nlevel', '"nobody" }\nlevel', "no axis 'estimator' has the label 'nobody'"),
     ],
 )
 def test_what_is_wrong_in_a_study_is_said(old, new, says, tiny):
     tiny.write_text(TINY.replace(old, new, 1))
     with pytest.raises(ScenarioError, match=says):
-        judging.judge(loaded := study.load(str(tiny)), study.run(loaded, quick=True, watch=lambda _: None))
+        study.load(str(tiny))
 
 
 def test_an_unknown_study_is_named_with_those_there_are():
@@ -314,10 +314,94 @@ def test_a_claim_with_levels_says_nothing_of_other_labels(tmp_path):
 
 
 def test_a_level_of_a_label_that_there_is_not_is_named(tmp_path):
-    printed = claiming(tmp_path, PRINTED.replace("RKF = 0.25", "KF = 0.25"))
-    results = [made_up(case.labels, agreed=0.5) for case in study.cases(printed, quick=True)]
-    with pytest.raises(ScenarioError, match=r"claim 'KF: the error.*no case has the labels \{'estimator': 'KF'\}"):
-        judging.judge(printed, results)
+    with pytest.raises(ScenarioError, match=r"no axis 'estimator' has the label 'KF'; there are .*'MLE', 'RKF'"):
+        claiming(tmp_path, PRINTED.replace("RKF = 0.25", "KF = 0.25"))
+
+
+def claim(check, *says):
+    return "\n".join(["[[claims]]", 'says = "something"', f'check = "{check}"', *says])
+
+
+TO, LEVEL, BETWEEN = 'to = { estimator = "MLE" }', "level = 1.0", "between = [0.5, 1.5]"
+COMPARED = {
+    "flat": {LEVEL},
+    "approaches": {TO, LEVEL},
+    "stays_below": {LEVEL},
+    "leaves": {LEVEL},
+    "indicator_below_error": set(),
+    "lower": {TO},
+    "ratio": {TO, BETWEEN},
+    "exponential": set(),
+    "slower_with_anchor": set(),
+    "value": {LEVEL, BETWEEN},
+}
+
+
+@pytest.mark.parametrize("check", COMPARED)
+def test_checks_want_what_they_compare_with_and_no_more(check, tmp_path):
+    wanted = COMPARED[check]
+    (read,) = claiming(tmp_path, claim(check, *wanted)).claims
+    assert read.check == check
+    for one in (TO, LEVEL, BETWEEN):
+        what = one.partition(" ")[0]
+        if one in wanted:
+            says, given = rf"claims\.0: .*the check '{check}' needs {what}$", wanted - {one}
+        else:
+            says, given = rf"claims\.0: .*the check '{check}' has no use for {what}$", wanted | {one}
+        with pytest.raises(ScenarioError, match=says):
+            claiming(tmp_path, claim(check, *given))
+
+
+def test_all_that_a_check_wants_is_named_and_levels_are_one_of_them(tmp_path):
+    for check, says in (("ratio", "needs between and to"), ("approaches", "needs level and to")):
+        with pytest.raises(ScenarioError, match=f"the check '{check}' {says}$"):
+            claiming(tmp_path, claim(check))
+    levels = 'each = ["estimator"]\nlevels = { MLE = 0.5 }'
+    for check in ("lower", "exponential"):
+        with pytest.raises(ScenarioError, match=f"the check '{check}' has no use for level$"):
+            claiming(tmp_path, claim(check, levels, *COMPARED[check]))
+    (read,) = claiming(tmp_path, claim("stays_below", levels)).claims
+    assert read.levels == {"MLE": 0.5}
+
+
+def test_a_quantity_to_compare_with_wants_something_to_compare_with(tmp_path):
+    with pytest.raises(ScenarioError, match=r"claims\.0: .*to_quantity is that of what is compared with: give to"):
+        claiming(tmp_path, claim("stays_below", LEVEL, 'to_quantity = "nees"'))
+    (read,) = claiming(tmp_path, claim("lower", TO, 'to_quantity = "nees"')).claims
+    assert read.to_quantity == "nees"
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ('of = { filter = "MLE" }', "no axis 'filter' has the label 'MLE'; there are .*'estimator': "),
+        ('of = { estimator = "KF" }', "no axis 'estimator' has the label 'KF'; there are .*'MLE', 'RKF'"),
+        ('to = { filter = "MLE" }', "no axis 'filter' has the label 'MLE'"),
+        ('to = { estimator = "KF" }', "no axis 'estimator' has the label 'KF'"),
+        ('each = ["graph", "filter"]', "no axis is called 'filter'; there are graph, disturbance, estimator"),
+        ('each = ["estimator"]\nlevels = { KF = 1.0 }', "no axis 'estimator' has the label 'KF'"),
+        ('each = ["filter"]\nlevels = { MLE = 1.0 }', "no axis 'filter' has the label 'MLE'"),
+    ],
+)
+def test_an_axis_or_a_label_of_a_claim_that_there_is_not_is_named(given, named, tmp_path):
+    check = "lower" if given.startswith("to =") else "stays_below"
+    compared = [] if check == "lower" or "levels" in given else [LEVEL]
+    with pytest.raises(ScenarioError, match=named):
+        claiming(tmp_path, claim(check, given, *compared))
+
+
+@pytest.mark.parametrize(
+    ("skip", "named"),
+    [
+        ('law = "statc", estimator = "rkf"', "no axis 'law' has the label 'statc'; there are"),
+        ('laws = "static"', "no axis 'laws' has the label 'static'"),
+    ],
+)
+def test_an_axis_or_a_label_to_skip_that_there_is_not_is_named(skip, named, tmp_path):
+    path = tmp_path / "map.toml"
+    path.write_text(MAP.replace('law = "static", estimator = "rkf"', skip))
+    with pytest.raises(ScenarioError, match=named):
+        study.load(str(path))
 
 
 @pytest.mark.parametrize("each", ["[]", '["estimator", "graph"]'])
