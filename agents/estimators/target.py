@@ -15,6 +15,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
+from agents.estimators.prediction import Prediction, carried, predicted
 from agents.estimators.redcho import Consensus
 from analysis import jets
 from analysis.information import numbers, packed, position_jet, unpacked
@@ -23,14 +24,6 @@ from netem.channels import TARGET
 from netem.links import Integers
 
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
-
-
-class Prediction(NamedTuple):
-    """An optimal estimate (5): mean (..., m, D), covariance (..., m, m), and the tick of which it is, (...)."""
-
-    mean: Array
-    covariance: Array
-    made: Integers
 
 
 class Track(NamedTuple):
@@ -212,7 +205,7 @@ class TargetEstimator:
         R = target.variances[sighting.by]
         # As a rule the last estimate is of the tick in which this detection began; after a pause it is older.
         lag = np.maximum(state.now - state.last.made - latency, 0)
-        mean, P = _carried(target, state.last, lag * brief.dt)
+        mean, P = carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
         L = (A @ P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
         corrected = A @ mean + L @ (sighting.position[..., None, :] - mean[..., :1, :])
@@ -232,13 +225,13 @@ class TargetEstimator:
         """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D) (7)."""
         target = _target(brief)
         if self.output == "optimal":
-            return _predicted(target, state.last, state.now, brief.dt)
+            return predicted(target, state.last, state.now, brief.dt)
         both = Prediction(*(np.stack(pair) for pair in zip(state.before, state.last, strict=True)))
         share = self._share(target, state, brief.dt)
         rest = np.concatenate([1.0 - share[:1], -share[1:]])
         Q, y = (
             jets.scaled(rest, of_both[:, 0]) + jets.scaled(share, of_both[:, 1])
-            for of_both in _predicted(target, both, state.now, brief.dt)
+            for of_both in predicted(target, both, state.now, brief.dt)
         )
         return Q, y
 
@@ -266,26 +259,3 @@ def _target(brief: Brief) -> Target:
 def _seconds(target: Target, state: Track, dt: float) -> Array:
     """How long the detection at work takes, shape (...)."""
     return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
-
-
-def _carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Array, Array]:
-    """Mean and covariance after some time (6)."""
-    A = transition(target.order, seconds)
-    spread = A @ prediction.covariance @ np.swapaxes(A, -1, -2) + diffusion(target.order, seconds, target.intensity)
-    return A @ prediction.mean, spread
-
-
-def _predicted(target: Target, prediction: Prediction, now: Integers, dt: float) -> tuple[Array, Array]:
-    """Jets of the information of an optimal estimate carried on (6), by the differential equations that it follows."""
-    order = target.order
-    elapsed = np.maximum(now - prediction.made, 0)  # a clock that is set right goes back
-    first, spread = _carried(target, prediction, elapsed * dt)
-    shift, driven = np.eye(order, k=1), np.zeros((order, order))
-    driven[-1, -1] = target.intensity
-    mean, covariance = [first], [spread]
-    for derivative in range(order):
-        mean.append(shift @ mean[-1])
-        moved = shift @ covariance[-1]
-        covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
-    Q = jets.inverse(np.stack(covariance))
-    return Q, jets.times(Q, np.stack(mean))
