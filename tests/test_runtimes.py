@@ -14,9 +14,10 @@ pytestmark = PROCESSES
 
 # A coarse tick flies each scenario to its end, through every fault, in seconds.
 COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
-# There is no fault in these, and they are flown below, or are the same all along.
+# There is no fault in these, and they are flown below, or are the same all along; the last two need other ticks, or gains.
 SHORTENED = {
     **dict.fromkeys(("ravine", "corridor", "hexa", "rigid"), ("time.duration=15",)),
+    "switching": ("time.dt=0.1",),
     "target": ("time.duration=4", "agents.parameters.target.theta=2"),
 }
 
