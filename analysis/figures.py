@@ -151,7 +151,9 @@ def sweep(
             runs = np.array([_finite(one.overall) for one in chosen])
             if chosen:
                 mean, spread = runs.mean(axis=1), runs.std(axis=1)
-                panel.errorbar(where, mean, yerr=spread, label=label, color=colours[label], marker="o", ms=3, capsize=2)
+                low = np.minimum(spread, (1.0 - _LOWEST) * mean)
+                bars = {"yerr": (low, spread), "marker": "o", "ms": 3, "capsize": 2}
+                panel.errorbar(where, mean, label=label, color=colours[label], **bars)
         panel.set_title(column)
     labels = [float(label) for label in _labels(cases, along)]
     for panel in panels[0]:
