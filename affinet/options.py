@@ -85,6 +85,12 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _scenario_file(text: str) -> Path:
+    if not text.endswith(".toml"):
+        raise argparse.ArgumentTypeError(f"a scenario is a TOML file: call it {text}.toml")
+    return Path(text)
+
+
 def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     hunt = commands.add_parser(
         "hunt",
@@ -108,7 +114,7 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
     )
     hunt.add_argument(
-        "--out", type=Path, metavar="FILE", help="the smallest, as a scenario (default: hunted-SCENARIO.toml)"
+        "--out", type=_scenario_file, metavar="FILE", help="the smallest, as a scenario (default: hunted-SCENARIO.toml)"
     )
 
 

@@ -250,3 +250,9 @@ def test_what_is_written_flies_the_same_bits(tmp_path):
     overrides = ("time.dt=0.05", "time.duration=1", "network.coupled=false", *WILD[2:5], WILD[-1])
     (tmp_path / "again.toml").write_text(scenario.to_toml(scenario.load("corridor", overrides)), encoding="utf-8")
     assert digest_of(str(tmp_path / "again.toml")) == digest_of("corridor", *overrides)
+
+
+def test_the_smallest_is_written_into_a_toml_file_or_not_at_all(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["hunt", "corridor", "--invariant", "bounded(5)", "--out", "found"])
+    assert "call it found.toml" in capsys.readouterr().err
