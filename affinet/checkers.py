@@ -1,17 +1,12 @@
-"""Checkers: what should hold of a run, each with a verdict and the first tick that offends.
-
-A checker is a pure function of the evidence. It passes, fails, or is vacuous when the run never put it to the test, and
-checkers compose: `both & of_these`, `either | of_these`, `~refuted`.
-"""
+"""Checkers: what should hold of a run. How they are made and compose is in `affinet.checking`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from affinet.checking import Checker, Finding, every, span_of
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
 from analysis import consistency, localization
@@ -23,72 +18,6 @@ from world.formation import Array
 from world.localized import FirstMeasurements
 
 _STANDARD_ERRORS = 3.0
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What a checker found.
-
-    Parameters
-    ----------
-    checker
-        Its name, with its parameters.
-    verdict
-        Pass, fail or vacuous.
-    tick
-        The first tick that offends, when it fails.
-    says
-        Why, for people.
-    """
-
-    checker: str
-    verdict: Verdict
-    tick: int | None
-    says: str
-
-    def __str__(self) -> str:
-        return f"{self.checker}: {self.verdict}: {self.says}"
-
-
-@dataclass(frozen=True)
-class Checker:
-    """What should hold of a run.
-
-    Parameters
-    ----------
-    name
-        With its parameters, as one writes it.
-    check
-        Finds out.
-    """
-
-    name: str
-    check: Callable[[Evidence], Finding]
-
-    def __call__(self, evidence: Evidence) -> Finding:
-        """What it finds in a run."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a run may have diverged
-            return self.check(evidence)
-
-    def __and__(self, other: Checker) -> Checker:
-        """Both hold: the first failure counts, else what is vacuous."""
-        return _joined("&", self, other, worst=("fail", "vacuous", "pass"))
-
-    def __or__(self, other: Checker) -> Checker:
-        """Either holds."""
-        return _joined("|", self, other, worst=("pass", "vacuous", "fail"))
-
-    def __invert__(self) -> Checker:
-        """It does not hold."""
-        name = f"~{self.name}"
-
-        def check(evidence: Evidence) -> Finding:
-            found = self(evidence)
-            turned: dict[Verdict, Verdict] = {"pass": "fail", "fail": "pass", "vacuous": "vacuous"}
-            verdict = turned[found.verdict]
-            return Finding(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
-
-        return Checker(name, check)
 
 
 Signal = Callable[[Evidence], Mask]
@@ -103,9 +32,9 @@ def always(signal: Signal, *, since: float = 0.0, until: float | None = None, na
     """A signal (T,) holds in every tick from `since` to `until`, in seconds."""
 
     def check(evidence: Evidence) -> Finding:
-        span = _span(evidence, since, until)
+        span = span_of(evidence, since, until)
         holds = signal(evidence)[span.start : span.stop]
-        return _every(
+        return every(
             name, evidence, span, holds, lambda tick: f"it does not hold; the error is {evidence.error[tick]:.4g} m²"
         )
 
@@ -116,7 +45,7 @@ def eventually(signal: Signal, *, since: float = 0.0, within: float | None = Non
     """A signal (T,) holds in some tick from `since` on, `within` so many seconds."""
 
     def check(evidence: Evidence) -> Finding:
-        span = _span(evidence, since, None if within is None else since + within)
+        span = span_of(evidence, since, None if within is None else since + within)
         holds = signal(evidence)[span.start : span.stop]
         if not len(holds):
             return Finding(name, "vacuous", None, "the run ended before")
@@ -205,7 +134,7 @@ def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
         raise ValueError(f"{name}: level is a share of the ticks between 0 and 1")
 
     def check(evidence: Evidence) -> Finding:
-        span = _span(evidence, since, None)
+        span = span_of(evidence, since, None)
         mean, number = _mean_nees(evidence, span)
         tested = number > 0
         if not tested.any():
@@ -233,7 +162,7 @@ def collision_free(distance: float) -> Checker:
         one, other = np.triu_indices(agents, 1)
         apart = np.linalg.norm(position[:, one] - position[:, other], axis=-1)
         apart = np.where(evidence.embodied[:, one] & evidence.embodied[:, other], apart, np.inf)
-        return _every(
+        return every(
             name,
             evidence,
             range(evidence.ticks),
@@ -252,12 +181,12 @@ def agreement(level: float, by: float = 0.0) -> Checker:
     name = f"agreement({level:g}, by={by:g})"
 
     def check(evidence: Evidence) -> Finding:
-        psi, span = evidence.arrays["psi"], _span(evidence, by, None)
+        psi, span = evidence.arrays["psi"], span_of(evidence, by, None)
         told = psi[span.start : span.stop]
         if not len(told) or np.isnan(told).all():
             return Finding(name, "vacuous", None, "nobody perceived a map and heard another")
         agreed = np.isnan(told) | (told < level)
-        return _every(
+        return every(
             name,
             evidence,
             span,
@@ -275,7 +204,7 @@ def energy(level: float) -> Checker:
     def check(evidence: Evidence) -> Finding:
         power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
         spent = np.cumsum(power) * evidence.dt
-        return _every(name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} are spent")
+        return every(name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} are spent")
 
     return Checker(name, check)
 
@@ -290,14 +219,14 @@ def localized(level: float, by: float = 0.0) -> Checker:
     def check(evidence: Evidence) -> Finding:
         if channels.PLACE not in evidence.arrays:
             return Finding(name, "vacuous", None, "nobody said where it is")
-        span = _span(evidence, by, None)
+        span = span_of(evidence, by, None)
         known = FirstMeasurements.of(
             evidence.plan.world, evidence.timeline, evidence.arrays["measured"], evidence.arrays["fates"][:, 0]
         )
         off = localization.distance(evidence.arrays[channels.PLACE][span.start : span.stop], known.edges())
         if np.isnan(off).all():
             return Finding(name, "vacuous", None, "what was measured does not join all agents")
-        return _every(name, evidence, span, off < level, lambda tick: f"they are {off[tick - span.start]:.4g} m off")
+        return every(name, evidence, span, off < level, lambda tick: f"they are {off[tick - span.start]:.4g} m off")
 
     return Checker(name, check)
 
@@ -328,31 +257,6 @@ def summed_up(evidence: Evidence, findings: Sequence[Finding]) -> Verdict:
 
 def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:
     return any(other is not fault and other.start < tick and other.active(tick) for other in faults)
-
-
-def _joined(sign: str, one: Checker, other: Checker, worst: tuple[Verdict, ...]) -> Checker:
-    name = f"({one.name} {sign} {other.name})"
-
-    def check(evidence: Evidence) -> Finding:
-        found = [one(evidence), other(evidence)]
-        chosen = min(found, key=lambda finding: (worst.index(finding.verdict), finding.tick or 0))
-        return Finding(name, chosen.verdict, chosen.tick, f"{chosen.checker}: {chosen.says}")
-
-    return Checker(name, check)
-
-
-def _span(evidence: Evidence, since: float, until: float | None) -> range:
-    stop = evidence.ticks if until is None else min(evidence.ticks, evidence.tick(until) + 1)
-    return range(evidence.tick(since), stop)
-
-
-def _every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[[int], str]) -> Finding:
-    if not len(holds):
-        return Finding(name, "vacuous", None, "the run ended before")
-    if holds.all():
-        return Finding(name, "pass", None, f"in all of {len(holds)} ticks")
-    tick = span.start + int(np.argmin(holds))
-    return Finding(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {why(tick)}")
 
 
 def _closest(apart: Array, one: Integers, other: Integers) -> str:

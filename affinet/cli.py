@@ -29,7 +29,7 @@ from affinet.sections import ScenarioError
 from world import history
 
 if TYPE_CHECKING:
-    from affinet.checkers import Checker
+    from affinet.checking import Checker
     from affinet.hunt import Quarry
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130

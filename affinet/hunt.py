@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, Phase, find, reject, settings
 from hypothesis.errors import NoSuchExample
 
 from affinet import plan as planning
-from affinet.checkers import Checker, Finding
+from affinet.checking import Checker, Finding
 from affinet.evidence import Evidence
 from affinet.plan import PlanError
 from affinet.run import rehearse

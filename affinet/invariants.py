@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 
 from affinet import checkers
-from affinet.checkers import Checker
+from affinet.checking import Checker
 from affinet.sections import ScenarioError
 
 NAMED: dict[str, Callable[..., Checker]] = {

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from scripted import timeline
 
 from affinet import checkers
-from affinet.checkers import Checker, Finding
+from affinet.checking import Checker, Finding
 
 TICKS = 80
 CUT = {"verb": "cut", "at": 1.0, "until": 2.0, "links": ["2->4"]}  # ticks 20 to 39

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from scripted import timeline
 
 from affinet import checkers, cli, hunt, scenario
-from affinet.checkers import Checker, Finding
+from affinet.checking import Checker, Finding
 from affinet.evidence import Evidence
 from affinet.sections import ScenarioError
 from affinet.testing import strategies

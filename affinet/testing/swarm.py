@@ -12,7 +12,7 @@ from typing import Any
 
 from affinet import plan as planning
 from affinet import scenario as scenarios
-from affinet.checkers import Checker
+from affinet.checking import Checker
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
 from affinet.plan import Plan

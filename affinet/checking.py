@@ -1,0 +1,109 @@
+"""What a checker is: a pure function of the evidence, with a verdict and the first tick that offends.
+
+It passes, fails, or is vacuous when the run never put it to the test, and checkers compose: `both & of_these`,
+`either | of_these`, `~refuted`. `affinet.checkers` has those there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from affinet.evidence import Evidence
+from affinet.outcome import Verdict
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a checker found.
+
+    Parameters
+    ----------
+    checker
+        Its name, with its parameters.
+    verdict
+        Pass, fail or vacuous.
+    tick
+        The first tick that offends, when it fails.
+    says
+        Why, for people.
+    """
+
+    checker: str
+    verdict: Verdict
+    tick: int | None
+    says: str
+
+    def __str__(self) -> str:
+        return f"{self.checker}: {self.verdict}: {self.says}"
+
+
+@dataclass(frozen=True)
+class Checker:
+    """What should hold of a run.
+
+    Parameters
+    ----------
+    name
+        With its parameters, as one writes it.
+    check
+        Finds out.
+    """
+
+    name: str
+    check: Callable[[Evidence], Finding]
+
+    def __call__(self, evidence: Evidence) -> Finding:
+        """What it finds in a run."""
+        with np.errstate(over="ignore", invalid="ignore"):  # a run may have diverged
+            return self.check(evidence)
+
+    def __and__(self, other: Checker) -> Checker:
+        """Both hold: the first failure counts, else what is vacuous."""
+        return _joined("&", self, other, worst=("fail", "vacuous", "pass"))
+
+    def __or__(self, other: Checker) -> Checker:
+        """Either holds."""
+        return _joined("|", self, other, worst=("pass", "vacuous", "fail"))
+
+    def __invert__(self) -> Checker:
+        """It does not hold."""
+        name = f"~{self.name}"
+
+        def check(evidence: Evidence) -> Finding:
+            found = self(evidence)
+            turned: dict[Verdict, Verdict] = {"pass": "fail", "fail": "pass", "vacuous": "vacuous"}
+            verdict = turned[found.verdict]
+            return Finding(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
+
+        return Checker(name, check)
+
+
+def span_of(evidence: Evidence, since: float, until: float | None) -> range:
+    """The ticks of a run from `since` to `until`, in seconds, or to its end."""
+    stop = evidence.ticks if until is None else min(evidence.ticks, evidence.tick(until) + 1)
+    return range(evidence.tick(since), stop)
+
+
+def every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[[int], str]) -> Finding:
+    """Whether what should hold (T,) does in every tick of a span; `why` says what offends in one."""
+    if not len(holds):
+        return Finding(name, "vacuous", None, "the run ended before")
+    if holds.all():
+        return Finding(name, "pass", None, f"in all of {len(holds)} ticks")
+    tick = span.start + int(np.argmin(holds))
+    return Finding(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {why(tick)}")
+
+
+def _joined(sign: str, one: Checker, other: Checker, worst: tuple[Verdict, ...]) -> Checker:
+    name = f"({one.name} {sign} {other.name})"
+
+    def check(evidence: Evidence) -> Finding:
+        found = [one(evidence), other(evidence)]
+        chosen = min(found, key=lambda finding: (worst.index(finding.verdict), finding.tick or 0))
+        return Finding(name, chosen.verdict, chosen.tick, f"{chosen.checker}: {chosen.says}")
+
+    return Checker(name, check)
