@@ -165,8 +165,8 @@ class _Places:
     def measure(self, instant: Instant, timeline: Timeline) -> None:
         """Take in the measurements of a tick; all runs have the faults of one."""
         if self._wanted:
-            measured = instant.measured.reshape(self._runs, -1, instant.measured.shape[-1])
-            self._first.tick(timeline, instant.tick, measured, instant.verdicts.fate[0].reshape(self._runs, -1))
+            measured, fates = self._of_runs(instant.measured), self._of_runs(instant.verdicts.fate[0])
+            self._first.tick(timeline, instant.tick, measured, fates)
             self._recent.append(self._of_runs(instant.action.estimate.reports[channels.PLACE]))
             self._since += 1
 
@@ -191,8 +191,8 @@ class _Places:
             "ringing": np.stack(self._rang, axis=1),
         }
 
-    def _of_runs(self, place: Array) -> Array:
-        return place.reshape(self._runs, -1, place.shape[-1])
+    def _of_runs(self, array: Any) -> Any:
+        return array.reshape(self._runs, -1, *array.shape[1:])
 
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
@@ -239,9 +239,4 @@ def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], A
     mean = np.where(awake[..., None], information, 0.0).sum(axis=1) / number[:, None]
     ideal = position(mean, target.shape[-1], pursuit.target.order)[:, None]
     off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))
-
-    def over_agents(each: Array) -> Array:
-        squares = np.where(awake[..., None], each, 0.0) ** 2
-        return np.asarray(np.sqrt(squares.sum(axis=(-2, -1)) / number), dtype=np.float64)
-
-    return {name: over_agents(each) for name, each in zip(names, off, strict=True)}
+    return {name: metrics.root_mean_square(each, awake) for name, each in zip(names, off, strict=True)}

@@ -14,7 +14,12 @@ from analysis import claims, random_graphs
 from analysis.claims import Verdict
 from world.formation import Array
 
-GRAPHS = 1000  # random ones, for claims on all graphs
+_GRAPHS = 1000  # random ones, for claims on all graphs
+
+
+def graph_rates() -> Array:
+    """Convergence rates on random graphs of ten agents, with the weighted centroid and with an anchor, shape (n, 2)."""
+    return random_graphs.rates(_GRAPHS, 10, 0.49)
 
 
 def judge(study: Study, results: list[Result]) -> list[Verdict]:
@@ -83,7 +88,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> Verdict:
             (one,) = means(chosen)
             return claims.ratio(claim.says, one, np.full_like(one, level), between)
         case "slower_with_anchor":
-            return claims.never_above(claim.says, *random_graphs.rates(GRAPHS, 10, 0.49).T)
+            return claims.never_above(claim.says, *graph_rates().T)
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
@@ -154,7 +154,8 @@ class Kernel(Section):
     positions: Literal["nominal", "true"] = "nominal"
 
 
-INTEGRATORS = ("single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator")
+Integrator = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"]
+INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
 
 
 class Dynamics(Section):
@@ -163,9 +164,7 @@ class Dynamics(Section):
     `kernel` correlates agents, `persistence` successive ticks.
     """
 
-    model: Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"] = (
-        "single-integrator"
-    )
+    model: Integrator = "single-integrator"
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
     kernel: Kernel | None = None

@@ -14,13 +14,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from affinet.judging import GRAPHS
+from affinet.judging import graph_rates
 from affinet.quantities import NAMES, Quantity, over_time
 from affinet.study import Result, Study
-from analysis import figures, random_graphs, target_figures
+from analysis import figures, target_figures
 from analysis.claims import Verdict
 from analysis.figures import Curve
-from analysis.information import reported
+from analysis.information import Array, reported, unpacked
 from analysis.target_figures import Flight
 from netem.channels import PLACE
 
@@ -34,7 +34,7 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
-        figures.rates(out / "rates.png", study.title, random_graphs.rates(GRAPHS, 10, 0.49))
+        figures.rates(out / "rates.png", study.title, graph_rates())
     if all(reported(one.runs.first) for one in results):
         _draw_pursuit(out, study, results)
     if all(PLACE in one.runs.first for one in results):
@@ -67,11 +67,14 @@ def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:
     if len(results) <= _MOST_FLIGHTS:
         target_figures.pursued(out / "target.png", study.title, [_flight(one) for one in results])
     one, *_ = results
-    order = one.runs.first["fused"].shape[-2] - 1
-    first = order * (order + 1) // 2  # behind the information matrix
-    fused, known = (one.runs.first[name][..., first] for name in ("fused", "information"))
+    fused, known = (_first_of_vector(one, one.runs.first[name]) for name in ("fused", "information"))
     if (fused != known).any():
         target_figures.agreement(out / "agreement.png", study.title, one.runs.seconds, fused, known)
+
+
+def _first_of_vector(one: Result, information: Array) -> Array:
+    _, vectors = unpacked(information, one.plan.world.formation.dimension, information.shape[-2] - 1)
+    return vectors[..., 0, 0]
 
 
 def _flight(one: Result) -> Flight:

@@ -9,15 +9,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from agents import second_order
-from agents.brief import Array, Brief, Mask, Own, Reading
+from agents.brief import DERIVATIVES, Array, Brief, Mask, Own, Reading
 from agents.controllers import Law, hold_distances, pilot, saturated
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
 from analysis.affine import Manoeuvre
 from analysis.pursuit import Sighting
 from netem.channels import INPUT
-
-# What an input is, by the order of the bodies that fly it; lower ones are motion.
-_DERIVATIVES = ("velocity", "acceleration", "jerk", "snap")
 
 
 class AgentState(NamedTuple):
@@ -62,7 +59,7 @@ class Agent:
 
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
-        moves = _DERIVATIVES[: self.law.order]
+        moves = DERIVATIVES[: self.law.order]
         return {INPUT: {name: Field((self.brief.dimension,)) for name in moves}, **self.estimator.channels(self.brief)}
 
     def init(self, batch: tuple[int, ...]) -> AgentState:
@@ -83,7 +80,7 @@ class Agent:
         """
         estimator, said = self.estimator.sense(self.brief, state.estimator, measured, seen)
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
-        return state._replace(estimator=estimator), {INPUT: dict(zip(_DERIVATIVES, moves, strict=False)), **said}
+        return state._replace(estimator=estimator), {INPUT: dict(zip(DERIVATIVES, moves, strict=False)), **said}
 
     def act(
         self,
@@ -100,9 +97,8 @@ class Agent:
         above 1 a `motion` (..., m - 1, D); only who pursues a target a `sighting`.
         """
         brief = self.brief
-        own = Own(state.input, state.input, tick, position, sighting)
-        if motion is not None:
-            own = own._replace(velocity=motion[..., 0, :], higher=motion[..., 1:, :])
+        velocity, higher = (state.input, None) if motion is None else (motion[..., 0, :], motion[..., 1:, :])
+        own = Own(velocity, state.input, tick, position, sighting, higher)
         estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
         law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
         if self.leaders == "distances":

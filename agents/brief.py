@@ -15,6 +15,8 @@ from analysis.sensor import Sensor
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# What an input is, by the order of the bodies that fly it, up to quadruple integrators; lower derivatives are motion.
+DERIVATIVES = ("velocity", "acceleration", "jerk", "snap")
 Reading = int | NDArray[np.int64]  # of a clock, in ticks; one for all, or each its own
 
 

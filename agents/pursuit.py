@@ -9,11 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from agents.brief import Array, Brief, Own, Reading
+from agents.brief import DERIVATIVES, Array, Brief, Own, Reading
 from agents.controllers import Nothing
 from agents.estimators.base import Estimate, Heard
-
-_MOST = 4  # times: quadruple integrators
 
 
 @dataclass(frozen=True)
@@ -34,10 +32,10 @@ class Pursuit:
     kappa: Sequence[float] = (1.0, 2.0)
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.kappa) <= _MOST:
+        if not 1 <= len(self.kappa) <= len(DERIVATIVES):
             raise ValueError(
-                f"kappa needs a gain for each of 1 to {_MOST} times that bodies integrate their input, like [1.0, 2.0]; "
-                f"got {list(self.kappa)}"
+                f"kappa needs a gain for each of 1 to {len(DERIVATIVES)} times that bodies integrate their input, "
+                f"like [1.0, 2.0]; got {list(self.kappa)}"
             )
         if np.roots([1.0, *reversed(self.kappa)]).real.max() >= 0.0:
             raise ValueError(

@@ -10,6 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.metrics import root_mean_square
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -130,11 +132,8 @@ def distance(place: Array, edges: Edges) -> Array:
     edges
         What could be known.
     """
-    off = ((beside(place, edges) - optimal(edges)) ** 2).sum(axis=-1)
-    told = ~np.isnan(off)
-    number = np.where(told.any(axis=-1), told.sum(axis=-1), np.nan)
-    root: Array = np.sqrt(np.where(told, off, 0.0).sum(axis=-1) / number)
-    return root
+    off = beside(place, edges) - optimal(edges)
+    return root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
 
 
 def rates(edges: Edges, h: float, anchor: int) -> Rates:

@@ -29,6 +29,11 @@ def tracking_error(position: Array, target: Array, present: NDArray[np.bool_]) -
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
+def root_mean_square(vectors: Array, present: NDArray[np.bool_]) -> Array:
+    """Of vectors (..., N, D) over the agents present (..., N), shape (...), in their unit; NaN where nobody is present."""
+    return np.sqrt(tracking_error(vectors, np.zeros_like(vectors), present))
+
+
 def procrustes_error(position: Array, nominal: Array, present: NDArray[np.bool_]) -> Array:
     """How far a swarm is from its nominal shape, turned, mirrored and moved at will (paper 004, definition 2.9).
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from analysis.metrics import root_mean_square
 from netem.timeline import Timeline
 from world.formation import Array
 from world.history import Moments
@@ -57,6 +58,4 @@ class Pursued:
 
 def _over_agents(off: Array) -> Array:
     """Root mean squares (T,) of vectors (T, N, D), over the agents that say anything."""
-    told = np.asarray(~np.isnan(off).any(axis=-1))
-    number = np.where(told.any(axis=-1), told.sum(axis=-1), np.nan)
-    return np.asarray(np.sqrt((np.where(told[..., None], off, 0.0) ** 2).sum(axis=(-2, -1)) / number))
+    return root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))

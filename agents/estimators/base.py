@@ -96,6 +96,13 @@ class Estimator(Protocol[State]):
         """Take in what the neighbours broadcast, and estimate; `own` is what the agent itself flew from the tick before."""
 
 
+def no_edges(slots: Mask, dimension: int, reports: Mapping[str, Array]) -> Estimate:
+    """What an agent has to say that estimates no relative position in any of its slots, (..., n)."""
+    relative = np.zeros((*slots.shape, dimension))
+    covariance = np.zeros((*slots.shape, dimension, dimension))
+    return Estimate(relative, np.zeros_like(slots), covariance, no_indicator(slots), reports=reports)
+
+
 def no_indicator(known: Mask) -> Array:
     """The psi of an estimator that has none: NaN, shape (...)."""
     return np.full(known.shape[:-1], np.nan)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
 from netem.channels import PLACE
@@ -102,10 +102,7 @@ class JacobiOverRelaxation:
         place = self._moved(
             brief, state.place, theirs, np.where(counts[..., None, None], information, 0.0), pull, counts
         )
-        nothing, none = np.zeros(theirs.shape), np.zeros_like(counts)
-        covariance = nothing[..., None] * nothing[..., None, :]
-        estimate = Estimate(nothing, none, covariance, no_indicator(none), reports={PLACE: place})
-        return Belief(place, theirs, told, state.own, other), estimate
+        return Belief(place, theirs, told, state.own, other), no_edges(counts, brief.dimension, {PLACE: place})
 
     def _moved(self, brief: Brief, place: Array, theirs: Array, information: Array, pull: Array, counts: Mask) -> Array:
         own = information.sum(axis=-3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Consensus:
 
     def outputs(self, local: Array, internal: Array) -> Array:
         """s_mu, shape (m + 1, ..., C), of jets of own signals (m + 1, ..., C) and internal variables (..., m + 1, C)."""
-        mixed = self._mixing @ internal
+        mixed = _mixing(self.order, self.gamma) @ internal
         agreed: Array = local - np.moveaxis(mixed, -2, 0)
         return agreed
 
@@ -58,11 +58,12 @@ class Consensus:
         stepped: Array = internal + dt * np.stack(rates, axis=-2)
         return stepped
 
-    @cached_property
-    def _mixing(self) -> Array:
-        """G, shape (m + 1, m + 1): row mu is C_0 Gamma^mu, with Gamma = A_0 - diag(gamma) (errata)."""
-        Gamma = np.eye(self.order + 1, k=1) - np.diag(self.gamma)
-        rows = [np.eye(self.order + 1)[0]]
-        for _ in range(self.order):
-            rows.append(rows[-1] @ Gamma)
-        return np.stack(rows)
+
+@cache
+def _mixing(order: int, gamma: tuple[float, ...]) -> Array:
+    """G, shape (m + 1, m + 1): row mu is C_0 Gamma^mu, with Gamma = A_0 - diag(gamma) (errata)."""
+    Gamma = np.eye(order + 1, k=1) - np.diag(gamma)
+    rows = [np.eye(order + 1)[0]]
+    for _ in range(order):
+        rows.append(rows[-1] @ Gamma)
+    return np.stack(rows)

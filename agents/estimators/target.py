@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_edges
 from agents.estimators.prediction import Prediction, carried, predicted
 from agents.estimators.redcho import Consensus
 from analysis import jets
@@ -174,11 +174,7 @@ class TargetEstimator:
             "information": np.moveaxis(alone, 0, -2),
             "fused": np.moveaxis(fused, 0, -2),
         }
-        nothing = np.zeros(brief.relative.shape)
-        known = np.zeros_like(brief.present)
-        return state, Estimate(
-            nothing, known, nothing[..., None] * nothing[..., None, :], no_indicator(known), reports=reports
-        )
+        return state, no_edges(brief.present, brief.dimension, reports)
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
         """The information found together, jets (m + 1, ..., C) like the agent's own."""
