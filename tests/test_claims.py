@@ -42,6 +42,15 @@ def test_lower_needs_three_standard_errors(mean, holds):
     assert claims.lower("says", runs(mean, noise=0.1), runs(1.0, noise=0.12), "m²").holds is holds
 
 
+def test_the_standard_error_is_that_of_a_sample():
+    # Differences of 0.6 and 1.4 deviate by 0.566 as a sample, and by 0.4 as if they were all there is.
+    verdict = claims.lower("says", np.zeros((1, 2)), np.array([[0.6, 1.4]]), "m²")
+    assert verdict.found == "lower by 1 m² (one s.e. 0.4)"
+    assert not verdict.holds
+    excess = np.array([0.6, 1.4])[:, None, None]
+    assert claims.below_in_mean("says", np.zeros(1), excess, np.zeros((2, 1, 1))).holds
+
+
 @pytest.mark.parametrize("check", [claims.leaves, claims.stays_below])
 def test_a_span_without_a_moment_decides_nothing(check):
     with pytest.raises(ValueError, match=r"no moment lies in its span from 30 s on: the runs end at 9 s"):

@@ -114,6 +114,13 @@ def test_healing_leaves_what_is_scripted():
     assert done.answer.holds == ("cut 1->2",)
 
 
+def test_healing_leaves_what_was_over_before():
+    over = obey(order(Verb.CUT, pairs=((1, 2),), end=2), 5, SCRIPTED, (), LINKS).injected
+    lasting = obey(order(Verb.CUT, pairs=((2, 3),)), 6, SCRIPTED, over, LINKS).injected
+    healed = obey(Order(Action.HEAL, None), 9, SCRIPTED, lasting, LINKS).injected
+    assert [(fault.start, fault.end) for fault in healed] == [(5, 7), (6, 9)]
+
+
 @pytest.mark.parametrize(
     ("asked", "why"),
     [

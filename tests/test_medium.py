@@ -429,6 +429,14 @@ def test_the_queue_of_a_degraded_link_empties_while_another_profile_rules_it():
     assert wait[:, LINKS.index[2, 1]].tolist() == [2, 3, 4, 5, 6, 7, 8, 9, 10]
 
 
+def test_the_queue_of_a_profile_empties_while_it_rules_no_link():
+    queued = Rate(np.full(SIZE, BITS / DT), np.zeros(SIZE), np.full(SIZE, 9e9))  # a tick for a message, two are sent
+    faults = [Fault(Verb.DEGRADE, *span, pairs=((1, 2),), profile=1) for span in ((0, 4), (7, 9))]
+    flown = fly(medium(profile(), faults, degraded=[profile(rate=queued)]), always(9))
+    wait = np.array([tick.verdicts.due[2] - k for k, tick in enumerate(flown)])
+    assert wait[:, ROW].tolist() == [2, 3, 4, 5, 0, 0, 0, 3, 4]  # 5 owed in tick 3, 4 ticks later 1
+
+
 def test_the_profile_of_the_higher_number_rules_a_link_that_is_degraded_twice():
     degraded = [profile(delay_ticks=wait) for wait in (2, 4)]
     faults = [Fault(Verb.DEGRADE, 0, None, pairs=((1, 2),), profile=number) for number in (2, 1)]

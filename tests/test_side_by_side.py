@@ -54,6 +54,11 @@ FLIGHTS = [
 ]
 
 
+def thin(impairment):
+    """The overrides that give all links this impairment."""
+    return f"network.profiles.thin={{{impairment}}}", 'network.profile="thin"'
+
+
 @pytest.mark.parametrize(("name", "air"), FLIGHTS, ids=[*AIRS, "double-integrators", *RIGID])
 def test_every_run_of_a_batch_is_the_run_alone(name, air):
     plan = plan_of(name, *SHORT, *air)
@@ -163,11 +168,23 @@ def test_where_nothing_is_filtered_no_innovation_is_known():
 @pytest.mark.parametrize(
     ("over", "says"),
     [
-        ("network.zones=[{centre=[0,0],radius=1}]", "jammed zone"),
-        ("network.profiles.thin={rate={rate=1e5,queue=4000}}", "rate limit"),
-        ('timeline=[{verb="cut",links=["all"],when={tracking_error_below=0.1}}]', "condition"),
+        (("network.zones=[{centre=[0,0],radius=1}]",), "a jammed zone"),
+        (thin("rate={rate=1e5,queue=4000}"), "a rate limit"),
+        (thin('loss=[{model="list",messages=[3]}]'), "a list of messages"),
+        (thin('loss=[{model="disk",range=20}]'), "loss by distance"),
+        (thin('loss=[{model="round-robin"}]'), "a schedule"),
+        (('timeline=[{verb="cut",links=["all"],when={tracking_error_below=0.1}}]',), "a condition"),
     ],
 )
 def test_what_differs_between_runs_is_refused(over, says):
     with pytest.raises(NotABatch, match=says):
-        side_by_side(plan_of("corridor", *SHORT, over, 'network.profile="thin"' if "thin" in over else over), SEEDS)
+        side_by_side(plan_of("corridor", *SHORT, *over), SEEDS)
+
+
+def test_a_trace_is_refused(tmp_path):
+    plan = plan_of("corridor", *SHORT)
+    rows = [f"0,{src},{dst},0.5" for src, dst in plan.world.links.index]
+    trace = tmp_path / "trace.csv"
+    trace.write_text("\n".join(["time,src,dst,availability", *rows]))
+    with pytest.raises(NotABatch, match="a trace"):
+        side_by_side(plan_of("corridor", *SHORT, *thin(f'loss=[{{model="trace",file="{trace}"}}]')), SEEDS)
