@@ -18,7 +18,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, fit, options, scenario, show
+from affinet import compare, fit, options, scenario, show, terminal
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
@@ -33,6 +33,12 @@ if TYPE_CHECKING:
     from affinet.hunt import Quarry
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def command() -> None:
+    """What the shell starts: the process ends here, with the command's exit status."""
+    terminal.settle()
+    sys.exit(main())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -155,7 +161,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
         )
     if quarry is not None:
-        file.write_text(scenario.to_toml(quarry.scenario))
+        file.write_text(scenario.to_toml(quarry.scenario), encoding="utf-8")
     show.hunted(quarry, coverage)
     status = PASS if quarry is None else _confirm(quarry, invariant, file)
     if parsed.json:
@@ -223,4 +229,4 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
 }
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

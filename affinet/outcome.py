@@ -130,7 +130,9 @@ def prepare(plan: Plan, out: Path) -> None:
     if (out / scenario.FILE).exists():
         raise FileExistsError(f"{out} holds a run already; name another directory with --out")
     out.mkdir(parents=True, exist_ok=True)
-    (out / scenario.FILE).write_text(plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n")
+    (out / scenario.FILE).write_text(
+        plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n", encoding="utf-8"
+    )
 
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from rich.table import Table
 from affinet.checks import Finding
 from affinet.outcome import Outcome
 from affinet.plan import Plan
+from affinet.progress import Bar
 from netem.control import Answer
 
 if TYPE_CHECKING:
@@ -22,34 +23,29 @@ if TYPE_CHECKING:
     from affinet.testing.strategies import Entries
     from analysis.claims import Verdict
 
+_SAYS = "{task.fields[says]}"
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
 
 
 class Progress:
-    """A progress bar with the real-time factor, on standard error."""
+    """How a run goes, with the real-time factor, on standard error."""
 
     def __init__(self, plan: Plan, name: str, out: Path) -> None:
         self._name, self._out = name, out
         self._dt = plan.world.dt
         self._first: tuple[int, float] | None = None
-        self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
-            bar.BarColumn(),
-            bar.TextColumn("{task.fields[says]}"),
-            bar.TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
+        self._bar = Bar(
+            name, plan.world.ticks, bar.BarColumn(), bar.TextColumn(_SAYS), bar.TimeRemainingColumn(), says="starting"
         )
-        self._task = self._bar.add_task(name, total=plan.world.ticks, says="starting")
 
     def __enter__(self) -> Progress:
-        self._bar.console.print(f"{self._name} flies in {self._out}", highlight=False)
-        self._bar.start()
+        self._bar.tell(f"{self._name} flies in {self._out}")
+        self._bar.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
 
     def see(self, tick: int, error: float) -> None:
         """Show how far it is."""
@@ -57,7 +53,7 @@ class Progress:
         self._first = self._first or (tick, now)
         elapsed = now - self._first[1]
         factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
-        self._bar.update(self._task, completed=tick, says=f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
+        self._bar.see(tick, f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
 
 
 class Chase:
@@ -66,57 +62,42 @@ class Chase:
     def __init__(self, budget: int) -> None:
         self._budget = budget
         self._broken = 0
-        self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
-            bar.BarColumn(),
-            bar.TextColumn("{task.fields[says]}"),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self._task = self._bar.add_task("hunting", total=budget, says="")
+        self._bar = Bar("hunting", budget, bar.BarColumn(), bar.TextColumn(_SAYS))
 
     def __enter__(self) -> Chase:
-        self._bar.start()
+        self._bar.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
 
     def see(self, coverage: Coverage, broken: Entries | None) -> None:
         """Show how far it is, and every schedule that breaks the invariant."""
         if broken is not None:
             self._broken += 1
-            verbs = ", ".join(entry["verb"] for entry in broken)
-            self._bar.console.print(f"breaks: {verbs}", highlight=False)
+            self._bar.tell(f"breaks: {', '.join(entry['verb'] for entry in broken)}")
         says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
-        self._bar.update(self._task, completed=min(coverage.schedules, self._budget), says=says)
+        self._bar.see(min(coverage.schedules, self._budget), says)
 
 
 class Grid:
     """How far a study is, on standard error."""
 
     def __init__(self, title: str, cases: int) -> None:
-        self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
-            bar.BarColumn(),
-            bar.MofNCompleteColumn(),
-            bar.TextColumn("{task.fields[says]}"),
-            bar.TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self._task = self._bar.add_task(title, total=cases, says="")
+        self._cases, self._done = cases, 0
+        self._bar = Bar(title, cases, bar.BarColumn(), bar.TextColumn(_SAYS), bar.TimeRemainingColumn())
 
     def __enter__(self) -> Grid:
-        self._bar.start()
+        self._bar.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
 
     def see(self, result: Result) -> None:
         """Show that a case is done."""
-        self._bar.update(self._task, advance=1, says=", ".join(result.labels.values()))
+        self._done += 1
+        self._bar.see(self._done, f"{self._done}/{self._cases} cases  {', '.join(result.labels.values())}")
 
 
 def claims(study: Study, verdicts: Sequence[Verdict], out: Path) -> None:

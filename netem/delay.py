@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from netem.draws import Array
-from netem.links import Integers
+from netem.links import Integers, Mask
 
 # A delay of exactly three ticks must not become four by rounding.
 _SLACK = 1e-9
@@ -54,7 +54,7 @@ class Delay:
     """
 
     law: Law
-    rows: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    rows: Mask
     mean: float
     jitter: float
     table: Array

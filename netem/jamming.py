@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from netem.draws import Array
 from netem.links import Integers, Mask
 
@@ -31,7 +29,7 @@ class Zone:
     centre: Array
     radius: float
     share: float
-    rows: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    rows: Mask
     sensing: bool
     comms: bool
 

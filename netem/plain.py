@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import msgpack
 import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 Reader = Callable[[Any], Any]
@@ -74,8 +75,6 @@ def _reader(hint: Any) -> Reader:
         return lambda value: value
     if origin in (Union, types.UnionType):
         return _optional(hint)
-    if origin is np.ndarray:
-        return _array(hint)
     if origin is tuple:
         return _tuple(hint)
     if origin is Literal:
@@ -88,7 +87,10 @@ def _reader(hint: Any) -> Reader:
         return _record(hint)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _enum(hint)
-    return {int: _int, float: _float, str: _str, bool: _bool}[hint]
+    if hint not in _LEAVES:
+        leaves = ", ".join(leaf.__name__ if isinstance(leaf, type) else str(leaf) for leaf in _LEAVES)
+        raise TypeError(f"{hint} has no plain form: records are made of {leaves}, and of tuples and records of them")
+    return _LEAVES[hint]
 
 
 def _refuse(what: str, value: Any) -> PlainError:
@@ -159,9 +161,7 @@ def _optional(hint: Any) -> Reader:
     return read
 
 
-def _array(hint: Any) -> Reader:
-    scalar = get_args(get_args(hint)[1])[0]
-    dtype = np.dtype(scalar)
+def _array(dtype: np.dtype[Any]) -> Reader:
     accepted = {"b": "b", "i": "i", "u": "i", "f": "if"}[dtype.kind]
 
     def read(value: Any) -> Any:
@@ -226,3 +226,17 @@ def _record(kind: Any) -> Reader:
         return kind(*built)
 
     return read
+
+
+# Array types are told by being equal to these: what NumPy makes of `NDArray` inside differs between its releases.
+_LEAVES: Mapping[Any, Reader] = {
+    int: _int,
+    float: _float,
+    str: _str,
+    bool: _bool,
+    NDArray[np.float64]: _array(np.dtype(np.float64)),
+    NDArray[np.int64]: _array(np.dtype(np.int64)),
+    NDArray[np.uint8]: _array(np.dtype(np.uint8)),
+    NDArray[np.uint64]: _array(np.dtype(np.uint64)),
+    NDArray[np.bool_]: _array(np.dtype(np.bool_)),
+}

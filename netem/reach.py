@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from netem.draws import Array
-from netem.links import Integers
+from netem.links import Integers, Mask
 
 
 class Law(StrEnum):
@@ -42,7 +42,7 @@ class Reach:
     """
 
     law: Law
-    rows: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    rows: Mask
     inner: float
     outer: float
     exponent: float

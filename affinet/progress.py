@@ -1,0 +1,65 @@
+"""How far something is, on standard error: a bar at a terminal, a line every few seconds elsewhere."""
+
+from __future__ import annotations
+
+import threading
+
+from rich import progress
+from rich.console import Console
+
+EVERY_S = 5.0
+
+
+class Bar:
+    """A bar that is gone when it is done, or lines that stay.
+
+    Parameters
+    ----------
+    title
+        What goes on.
+    total
+        Of the steps there are.
+    columns
+        What the bar shows behind its title; `{task.fields[says]}` is the text that `see` is given.
+    says
+        That text at first.
+    every_s
+        Seconds from line to line.
+    """
+
+    def __init__(
+        self, title: str, total: int, *columns: progress.ProgressColumn, says: str = "", every_s: float = EVERY_S
+    ) -> None:
+        self._title, self._total, self._done, self._says = title, total, 0, says
+        self._console = Console(stderr=True)
+        self._bar = progress.Progress(
+            progress.TextColumn("{task.description}"), *columns, console=self._console, transient=True
+        )
+        self._task = self._bar.add_task(title, total=total, says=says)
+        self._every_s, self._over = every_s, threading.Event()
+        self._lines = threading.Thread(target=self._say, daemon=True)
+
+    def __enter__(self) -> Bar:
+        (self._bar if self._console.is_terminal else self._lines).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._console.is_terminal:
+            self._bar.stop()
+        else:
+            self._over.set()
+            self._lines.join()
+
+    def tell(self, line: str) -> None:
+        """A line that stays, whatever the bar shows."""
+        self._console.print(line, markup=False, highlight=False)
+
+    def see(self, done: int, says: str) -> None:
+        """Show how far it is."""
+        self._done, self._says = done, says
+        self._bar.update(self._task, completed=done, says=says)
+
+    def _say(self) -> None:
+        while not self._over.wait(self._every_s):
+            share = f"{100 * self._done // max(self._total, 1)} %"
+            self._console.print(f"{self._title}: {share}  {self._says}", markup=False, highlight=False, soft_wrap=True)
