@@ -26,6 +26,7 @@ from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import ScenarioError
+from affinet.words import among, one_line
 from world import history
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status = _COMMANDS[parsed.command](parsed)
     except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
-        print(error, file=sys.stderr)  # noqa: T201
+        print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
@@ -65,6 +66,7 @@ def _check(parsed: argparse.Namespace) -> int:
         findings: Sequence[Finding] = planning.make(scenario.load(parsed.scenario, _overrides(parsed))).findings
     except PlanError as error:
         findings = error.findings
+        print(one_line(f"{parsed.scenario}: cannot fly: {error}"), file=sys.stderr)  # noqa: T201
     flies = not any(finding.fatal for finding in findings)
     if parsed.json:
         report = [{"check": f.check, "level": f.level, "says": f.says} for f in findings]
@@ -146,7 +148,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
     invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
-        raise ScenarioError(f"--verbs {','.join(strangers)}: there are {', '.join(strategies.VERBS)}")
+        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
     file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
     if not file.parent.is_dir():
         raise ScenarioError(f"--out {file}: there is no directory {file.parent}")
