@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
@@ -32,6 +33,7 @@ from world import history
 if TYPE_CHECKING:
     from affinet.checking import Checker
     from affinet.hunt import Quarry
+    from affinet.study import Result
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -125,12 +127,31 @@ def _study(parsed: argparse.Namespace) -> int:
 
     study = studies.load(parsed.study)
     out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
-    total = len(list(studies.cases(study, quick=parsed.quick)))
-    with show.Grid(study.title, total) as grid:
-        results = studies.run(study, quick=parsed.quick, watch=grid.see)
-    verdicts = judging.judge(study, results)
-    study_report.save(out, study, results, verdicts)
-    show.claims(study, verdicts, out)
+    planned = studies.plans(
+        study, quick=parsed.quick
+    )  # what cannot fly, be drawn or be judged is found before any has flown
+    out.mkdir(parents=True, exist_ok=True)
+    results: list[Result] = []
+    try:
+        with show.Grid(study.title, len(planned)) as grid:
+            for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
+                results.append(result)
+                grid.see(result)
+    except BrokenProcessPool:
+        print(f"a process that flew cases is gone, for want of memory perhaps; {out} has those done", file=sys.stderr)  # noqa: T201
+        return FAIL
+    finally:
+        if results:  # whatever happened meanwhile, what was flown is kept
+            study_report.save(out, study, results)
+    try:
+        verdicts = judging.judge(study, results)
+        study_report.tell(out, verdicts)
+        show.claims(study, verdicts, out)
+        study_report.draw(out, study, results)
+    except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
+        log = study_report.failed(out)
+        print(one_line(f"{out} has the data, but not all of the report: {error!r}; {log} says where"), file=sys.stderr)  # noqa: T201
+        return FAIL
     return PASS
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -69,11 +69,22 @@ def explained(error: ValidationError, model: type[BaseModel], source: Source) ->
     if again := len(others) - len(more):
         says += f" ({again} more like it in {first.alike[0]})"
     apart = list({other.alike: other for other in reversed(more)}.values())[::-1]
-    if not apart:
-        return says
-    named = ", ".join(f"{one_line(one.key)} ({source.place(one.key)})" for one in apart[:_MOST_NAMED])
-    etc = ", ..." if len(apart) > _MOST_NAMED else ""
-    return f"{says}; {len(apart)} more mistake{'s' * (len(apart) > 1)}: {named}{etc}"
+    return says + _also(source, [one.key for one in apart])
+
+
+def named_in(source: Source, wrong: Sequence[tuple[str, str]]) -> str:
+    """What is wrong, by key, in one line: the first in full, and the keys of the others."""
+    key, says = wrong[0]
+    others = dict.fromkeys(other for other, _ in wrong if other != key)
+    return f"{source.place(key)}: {key}: {says}{_also(source, list(others))}"
+
+
+def _also(source: Source, keys: Sequence[str]) -> str:
+    if not keys:
+        return ""
+    named = ", ".join(f"{one_line(key) or 'the file'} ({source.place(key)})" for key in keys[:_MOST_NAMED])
+    etc = ", ..." if len(keys) > _MOST_NAMED else ""
+    return f"; {len(keys)} more mistake{'s' * (len(keys) > 1)}: {named}{etc}"
 
 
 def mistakes(error: ValidationError, model: type[BaseModel]) -> list[Mistake]:

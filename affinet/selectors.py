@@ -110,7 +110,8 @@ def groups_or_word(given: object) -> list[list[int]] | str:
         return given
     near = f"; {hint(given, _SPLITS)}".rstrip("; ") if isinstance(given, str) else ""
     raise ValueError(
-        f"give at least two lists of agents, like [[1, 2], [3, 4]], or {', '.join(map(repr, _SPLITS))}, got {shown(given)}{near}"
+        f"give at least two lists of agents, like [[1, 2], [3, 4]], or {', '.join(map(repr, _SPLITS))}, "
+        f"got {shown(given)}{near}"
     )
 
 
