@@ -73,6 +73,7 @@ EXAMPLES: Mapping[str, Any] = {
     "axes": [{"name": "law", "values": {"static": ['agents.law="static"'], "as it is": []}}],
     "axes.name": "law",
     "axes.values": {"static": ['agents.law="static"'], "as it is": []},
+    "axes.values.*": ['agents.law="static"'],
     "skip": [{"law": "static"}],
     "claims": [{"says": "losses cost little", "check": "flat", "level": 2.0}],
     "claims.says": "losses cost nothing",

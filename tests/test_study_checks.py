@@ -81,7 +81,7 @@ NOT_FLOWN = [
         id="along words",
     ),
     pytest.param(
-        [('figure = "curves"', 'figure = "sweep"\nalong = "loss"'), ('"0" ', '"nan" '), ('loss = "0" ', 'loss = "nan" ')],
+        [('figure = "curves"', 'figure = "sweep"\nalong = "loss"'), ('"0" =', '"nan" ='), ('loss = "0" }', 'loss = "nan" }')],
         "a sweep runs along numbers, and the label 'nan' is none",
         id="along nan",
     ),
@@ -150,15 +150,29 @@ NOT_FLOWN = [
         "scenario: case graph=zhao7, law=static, loss=0: an air with a jammed zone is not flown side by side",
         id="no batch",
     ),
-    pytest.param([("zhao7 = []", 'zhao7 = ["time.dt"]')], "small.toml: case graph=zhao7, law=static, loss=0: --set time.dt: "
-                 "write it as key=value", id="no override"),
-    pytest.param([("zhao7 = []", "zhao7 = 3")], 'small.toml:11: axes.1.values.zhao7: should be a list, like ["agents.law', id="3"),
-    pytest.param([('quick = { runs = 2 }', "")], "quick: is missing; it has no default: give a table, like { runs = 5 }", id="quick"),
-    pytest.param([('scenario = "corridor"', 'scenario = "coridor"')], "no such scenario; did you mean 'corridor'?", id="scenario"),
+    pytest.param(
+        [("zhao7 = []", 'zhao7 = ["time.dt"]')],
+        "small.toml: case graph=zhao7, law=static, loss=0: --set time.dt: write it as key=value",
+        id="no override",
+    ),
+    pytest.param(
+        [("zhao7 = []", "zhao7 = 3")],
+        'small.toml:11: axes.1.values.zhao7: should be a list, like ["agents.law=',
+        id="no list of overrides",
+    ),
+    pytest.param(
+        [("quick = { runs = 2 }", "")], "quick: is missing; it has no default: give a table, like { runs = 5 }", id="quick"
+    ),
+    pytest.param(
+        [('scenario = "corridor"', 'scenario = "coridor"')], "no such scenario; did you mean 'corridor'?", id="scenario"
+    ),
     pytest.param([('figure = "curves"', 'figure = "curve"')], "got \"curve\"; did you mean 'curves'?", id="figure"),
     pytest.param([("set =", 'quantity = "eror"\nset =')], "got \"eror\"; did you mean 'error'?", id="quantity"),
-    pytest.param([('law = "static", loss = "0.5"', 'lwa = "static"')],
-                 "small.toml:26: claims.1.to: no axis 'lwa' has the label 'static'; no axis is called so: did you mean 'law'?", id="axis"),
+    pytest.param(
+        [('law = "static", loss = "0.5"', 'lwa = "static"')],
+        "small.toml:25: claims.1.to: no axis 'lwa' has the label 'static'; no axis is called so: did you mean 'law'?",
+        id="axis",
+    ),
 ]  # fmt: skip
 
 
