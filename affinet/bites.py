@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from affinet import vacuous
 from affinet.plan import Plan
 from netem import lie
 from netem.fate import FATE_OF, Fate, Fates
@@ -30,20 +31,31 @@ class Bite:
         When it began, in seconds; None if what it waited for never came.
     touched, what
         How many, of what: messages, measurements, or ticks of agents.
+    why
+        Why it touched nothing, if it did not.
     """
 
     fault: Fault
     at: float | None
     touched: int
     what: str
+    why: str | None
 
     def __str__(self) -> str:
         when = "never" if self.at is None else f"{self.at:g} s"
-        return f"{when}: {self.fault.describe()} touched {self.touched} {self.what}"
+        return (
+            f"{when}: {self.fault.describe()} touched {self.touched} {self.what}{f': {self.why}' if self.why else ''}"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
-        return {"fault": self.fault.describe(), "at": self.at, "touched": self.touched, "what": self.what}
+        return {
+            "fault": self.fault.describe(),
+            "at": self.at,
+            "touched": self.touched,
+            "what": self.what,
+            "why": self.why,
+        }
 
 
 def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
@@ -59,9 +71,12 @@ def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
         What happened.
     """
     flown = _Flown(plan, timeline, arrays)
-    return [
-        Bite(fault, _at(fault, plan.world.dt), *_touched(flown, number)) for number, fault in enumerate(timeline.faults)
-    ]
+    found = []
+    for number, fault in enumerate(timeline.faults):
+        touched, what = _touched(flown, number)
+        why = None if touched else vacuous.why(plan, timeline, arrays, number)
+        found.append(Bite(fault, _at(fault, plan.world.dt), touched, what, why))
+    return found
 
 
 @dataclass(frozen=True)
@@ -101,7 +116,7 @@ def _touched(flown: _Flown, number: int) -> tuple[int, str]:
     plan, timeline, arrays = flown.plan, flown.timeline, flown.arrays
     fault = timeline.faults[number]
     if fault.trigger is not None:
-        return 0, "messages: its condition never came"
+        return 0, "messages"
     ticks = len(arrays["error"])
     span = range(fault.start, ticks if fault.end is None else min(ticks, fault.end))
     fates = arrays["fates"][fault.start : fault.end]

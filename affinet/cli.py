@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
@@ -26,11 +27,13 @@ from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import ScenarioError
+from affinet.words import among, one_line
 from world import history
 
 if TYPE_CHECKING:
     from affinet.checking import Checker
     from affinet.hunt import Quarry
+    from affinet.study import Result
 
 PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -48,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status = _COMMANDS[parsed.command](parsed)
     except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
-        print(error, file=sys.stderr)  # noqa: T201
+        print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
@@ -71,6 +74,7 @@ def _check(parsed: argparse.Namespace) -> int:
         findings: Sequence[Finding] = planning.make(scenario.load(parsed.scenario, _overrides(parsed))).findings
     except PlanError as error:
         findings = error.findings
+        print(one_line(f"{parsed.scenario}: cannot fly: {error}"), file=sys.stderr)  # noqa: T201
     flies = not any(finding.fatal for finding in findings)
     if parsed.json:
         report = [{"check": f.check, "level": f.level, "says": f.says} for f in findings]
@@ -129,12 +133,31 @@ def _study(parsed: argparse.Namespace) -> int:
 
     study = studies.load(parsed.study)
     out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
-    total = len(list(studies.cases(study, quick=parsed.quick)))
-    with show.Grid(study.title, total) as grid:
-        results = studies.run(study, quick=parsed.quick, watch=grid.see)
-    verdicts = judging.judge(study, results)
-    study_report.save(out, study, results, verdicts)
-    show.claims(study, verdicts, out)
+    planned = studies.plans(
+        study, quick=parsed.quick
+    )  # what cannot fly, be drawn or be judged is found before any has flown
+    out.mkdir(parents=True, exist_ok=True)
+    results: list[Result] = []
+    try:
+        with show.Grid(study.title, len(planned)) as grid:
+            for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
+                results.append(result)
+                grid.see(result)
+    except BrokenProcessPool:
+        print(f"a process that flew cases is gone, for want of memory perhaps; {out} has those done", file=sys.stderr)  # noqa: T201
+        return FAIL
+    finally:
+        if results:  # whatever happened meanwhile, what was flown is kept
+            study_report.save(out, study, results)
+    try:
+        verdicts = judging.judge(study, results)
+        study_report.tell(out, verdicts)
+        show.claims(study, verdicts, out)
+        study_report.draw(out, study, results)
+    except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
+        log = study_report.failed(out)
+        print(one_line(f"{out} has the data, but not all of the report: {error!r}; {log} says where"), file=sys.stderr)  # noqa: T201
+        return FAIL
     return PASS
 
 
@@ -152,7 +175,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
     invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
-        raise ScenarioError(f"--verbs {','.join(strangers)}: there are {', '.join(strategies.VERBS)}")
+        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
     file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
     if not file.parent.is_dir():
         raise ScenarioError(f"--out {file}: there is no directory {file.parent}")

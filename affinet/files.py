@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from affinet.sections import ScenarioError
+from affinet.words import hint, one_line
 
 
 class Read(NamedTuple):
@@ -42,8 +43,9 @@ def read(name: str, folder: str, what: str) -> Read:
         path = Path(f"{name}.toml")
         text = (resources.files("affinet") / folder / path.name).read_text(encoding="utf-8")
     else:
-        raise ScenarioError(f"{name}: no such file, and no such {what}; shipped are {', '.join(shipped(folder))}")
+        near = hint(path.stem, shipped(folder))
+        raise ScenarioError(f"{name}: no such file, and no such {what}; {near}shipped are {', '.join(shipped(folder))}")
     try:
         return Read(path.name, text, tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{path.name}: not TOML: {error}") from error
+    except (ValueError, RecursionError) as error:  # of nests and numbers that are too large, beside what is no TOML
+        raise ScenarioError(f"{path.name}: not TOML: {one_line(str(error))}") from error

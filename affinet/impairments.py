@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from affinet.words import among
 from netem import text
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -288,8 +289,7 @@ def resolve(name: str, own: dict[str, LinkProfile]) -> LinkProfile:
         chain.append(name)
         here = own.get(name) or presets().get(name)
         if here is None:
-            known = ", ".join(sorted({*own, *presets()}))
-            raise ValueError(f"no profile {name!r}; there are {known}")
+            raise ValueError(f"no profile {name!r}; {among(name, sorted({*own, *presets()}))}")
         found = found.over(here)
         if here.like is None:
             return found

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from affinet import checkers
 from affinet.checking import Checker
 from affinet.sections import ScenarioError
+from affinet.words import hint, one_line
 
 NAMED: dict[str, Callable[..., Checker]] = {
     made.__name__: made
@@ -39,7 +40,9 @@ def parse(text: str) -> Checker:
         return _built(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, TypeError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         known = ", ".join(f"{name}{_parameters(made)}" for name, made in NAMED.items())
-        raise ScenarioError(f"invariant {text!r}: {error}; there are {known}, and & | ~ between them") from error
+        raise ScenarioError(
+            f"invariant {text!r}: {one_line(str(error))}; there are {known}, and & | ~ between them"
+        ) from error
 
 
 def _built(node: ast.expr) -> Checker:
@@ -52,6 +55,10 @@ def _built(node: ast.expr) -> Checker:
             return ~_built(operand)
         case ast.Call(ast.Name(name), given, named) if name in NAMED:
             return NAMED[name](*map(_number, given), **{str(one.arg): _number(one.value) for one in named})
+        case ast.Call(ast.Name(name)) | ast.Name(name) if name not in NAMED:
+            raise ValueError(f"{name} is no checker; {hint(name, NAMED)}".rstrip("; "))
+        case ast.Name(name):
+            raise ValueError(f"{name} is written with what it wants: {name}{_parameters(NAMED[name])}")
     raise ValueError(f"{ast.unparse(node)} is no checker")
 
 

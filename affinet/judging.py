@@ -41,11 +41,8 @@ def judge(study: Study, results: list[Result]) -> list[Verdict]:
 
 def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
     """A claim for each label of the axes it is for."""
-    values = {axis.name: list(axis.values) for axis in study.axes}
-    if claim.levels is not None:
-        values[claim.each[0]] = list(claim.levels)
-    for labels in itertools.product(*(values[name] for name in claim.each)):
-        where = dict(zip(claim.each, labels, strict=True))
+    for where in claim.settings(study.axes):
+        labels = list(where.values())
         other = None if claim.to is None else claim.to | where
         says, level = ", ".join(labels) + ": " * bool(labels) + claim.says, claim.level
         if claim.levels is not None:

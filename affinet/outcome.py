@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import platform
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from affinet import scenario
+from affinet import measures, scenario
 from affinet.bites import Bite, bites
+from affinet.measures import Figures
 from affinet.plan import Plan
 from netem.fate import Ledger
 from netem.timeline import Timeline
@@ -23,16 +26,20 @@ Verdict = Literal["pass", "fail", "vacuous"]
 class Outcome:
     """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds.
 
-    `timeline` has its faults where they came to lie, `faults` what each took hold of.
+    `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
+    where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
+    they came to lie, `faults` what each took hold of.
     """
 
     verdict: Verdict
     reasons: tuple[str, ...]
     digest: str | None
+    flown: dict[str, Any]
     ticks: int
     wall_s: float
     simulated_s: float
-    tracking_error: dict[str, float | None]
+    tracking_error: Figures
+    errors: dict[str, Figures]
     messages: dict[str, Any]
     faults: tuple[Bite, ...]
     timeline: Timeline
@@ -42,6 +49,9 @@ class Outcome:
     def to_json(self) -> dict[str, Any]:
         """Plain values; a figure that does not exist is null."""
         plain = {name: value for name, value in vars(self).items() if name not in ("simulated_s", "timeline")}
+        if plain.pop("errors"):
+            del plain["tracking_error"]
+        plain |= self.errors
         plain["faults"] = [bite.to_json() for bite in self.faults]
         plain["wall_s"] = round(self.wall_s, 3)
         plain["ticks_per_s"] = round(self.ticks_per_s, 1)
@@ -102,15 +112,19 @@ def judge(
         wrong += _what_is_wrong(arrays, messages)
     idle = [bite for bite in faults if not bite.touched]
     verdict: Verdict = "fail" if wrong else "vacuous" if idle else "pass"
-    reasons = wrong or [f"'{bite.fault.describe()}' touched no {bite.what}: it proved nothing" for bite in idle]
+    reasons = wrong or [
+        f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle
+    ]
     return Outcome(
         verdict=verdict,
         reasons=tuple(reasons),
         digest=None if arrays is None else digest(arrays),
+        flown=_flown(plan),
         ticks=ticks,
         wall_s=wall_s,
         simulated_s=ticks * plan.world.dt,
         tracking_error=_tracking(arrays),
+        errors={} if arrays is None else measures.errors(plan, timeline, arrays),
         messages=messages,
         faults=tuple(faults),
         timeline=timeline,
@@ -171,9 +185,12 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
     return wrong
 
 
-def _tracking(arrays: Arrays | None) -> dict[str, float | None]:
-    if arrays is None or not len(arrays["error"]):
-        return {"mean": None, "final": None, "max": None}
-    error = arrays["error"]
-    figures = {"mean": error.mean(), "final": error[-1], "max": error.max()}
-    return {name: float(value) if np.isfinite(value) else None for name, value in figures.items()}
+def _tracking(arrays: Arrays | None) -> Figures:
+    return measures.figures(np.empty(0) if arrays is None else arrays["error"])
+
+
+def _flown(plan: Plan) -> dict[str, Any]:
+    agents = plan.scenario.agents
+    packages = {"affinet": "affinet", "numpy": "numpy", "zenoh": "eclipse-zenoh"}
+    versions = {name: version(package) for name, package in packages.items()} | {"python": platform.python_version()}
+    return {"estimator": agents.estimator, "law": agents.law, "seed": plan.scenario.seed, "versions": versions}

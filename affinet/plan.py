@@ -41,7 +41,7 @@ class PlanError(ValueError):
     """The scenario is well formed, but cannot fly: why, in plain words."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:
-        super().__init__("\n".join(f"{finding.check}: {finding.says}" for finding in findings if finding.fatal))
+        super().__init__("; ".join(f"{finding.check}: {finding.says}" for finding in findings if finding.fatal))
         self.findings = tuple(findings)
 
 

@@ -10,7 +10,9 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
+from affinet import explain
 from affinet.sections import ScenarioError
+from affinet.words import among, hint
 from agents.process import Choice
 
 ESTIMATORS = "affinet.estimators"
@@ -53,7 +55,9 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
     except ValidationError as error:
         (first, *_) = error.errors()
         where = f"agents.parameters.{name}.{'.'.join(map(str, first['loc']))}"
-        wrong = "unknown" if first["type"] == "extra_forbidden" else f"{first['msg']}, got {first['input']!r}"
+        wrong = explain.wrong(first, model)
+        if first["type"] == "extra_forbidden":
+            wrong = f"unknown; {hint(first['loc'][0], known)}".rstrip("; ")
         raise ScenarioError(f"{where}: {wrong}; {name} has {', '.join(known) or 'no parameters'}") from error
     return Choice(path, checked.model_dump())
 
@@ -69,7 +73,7 @@ def check_names(key: str, given: Iterable[str]) -> None:
     known = [*names(ESTIMATORS), *names(LAWS)]
     for name in given:
         if name not in known and ":" not in name:
-            raise ScenarioError(f"{key}.{name}: no such estimator or law; there are {', '.join(known)}")
+            raise ScenarioError(f"{key}.{name}: no such estimator or law; {among(name, known)}")
 
 
 def _path(group: str, key: str, name: str) -> str:
@@ -77,7 +81,7 @@ def _path(group: str, key: str, name: str) -> str:
         return name
     offered = {point.name: point.value for point in entry_points(group=group)}
     if name not in offered:
-        raise ScenarioError(f"{key}: no {name!r}; there are {', '.join(sorted(offered))}, or give 'module:Class'")
+        raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(offered))}, or give 'module:Class'")
     return offered[name]
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,8 +11,8 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from affinet import events, files, impairments, sections
-from affinet.impairments import Section
+from affinet import files
+from affinet.explain import explained
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
 
@@ -88,7 +86,7 @@ def _validated(raw: dict[str, Any], source: Source) -> Scenario:
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError("\n".join(_explain(source, problem) for problem in error.errors())) from error
+        raise ScenarioError(explained(error, Scenario, source)) from error
     scenario._source = source
     return scenario
 
@@ -100,7 +98,7 @@ def _override(raw: dict[str, Any], override: str) -> None:
         raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = text.strip()
     table: Any = raw
     for step in tables:
@@ -108,63 +106,3 @@ def _override(raw: dict[str, Any], override: str) -> None:
         if not isinstance(table, dict):
             raise ScenarioError(f"--set {override}: {step} is not a table")
     table[name] = value
-
-
-def _explain(source: Source, problem: Mapping[str, Any]) -> str:
-    loc = problem["loc"]
-    steps = [step for n, step in enumerate(loc) if not _is_tag(loc, n)]
-    key = ".".join(str(step + 1) if isinstance(step, int) else step for step in steps) or "scenario"
-    return f"{source.place(key)}: {key}: {_what_would_be_right(loc, problem)}"
-
-
-def _is_tag(loc: Sequence[str | int], place: int) -> bool:
-    """Whether a step is the tag of a timeline entry or loss: it stands in pydantic's path, but in no key of the file."""
-    return place >= 2 and loc[place - 2] in ("timeline", "loss") and isinstance(loc[place - 1], int)
-
-
-def _tagged(loc: Sequence[str | int]) -> tuple[str, Mapping[str, type[Section]]]:
-    """The key that says which entry of the timeline, or which loss, it is; and all there are."""
-    return ("verb", events.VERBS) if loc[0] == "timeline" else ("model", impairments.LOSSES)
-
-
-def _what_would_be_right(loc: Sequence[str | int], problem: Mapping[str, Any]) -> str:
-    message: str = problem["msg"].removeprefix("Value error, ").replace("Input should", "should")
-    given = problem.get("input")
-    match problem["type"]:
-        case "extra_forbidden":
-            known = _known_keys(loc[:-1])
-            close = difflib.get_close_matches(str(loc[-1]), known, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
-            return f"unknown key; {hint}known here: {', '.join(known)}"
-        case "missing":
-            return "is missing; it has no default"
-        case "union_tag_not_found" | "union_tag_invalid":
-            tag, among = _tagged(loc)
-            return f"needs a {tag} among {', '.join(among)}"
-        case "value_error":
-            return message
-    return message if isinstance(given, dict | list) else f"{message}, got {given!r}"
-
-
-def _known_keys(loc: Sequence[str | int]) -> list[str]:
-    if loc and _is_tag(loc, len(loc) - 1):
-        return sorted(_tagged(loc)[1][str(loc[-1])].model_fields)
-    models: list[Any] = [sections.Scenario]
-    for step in loc:
-        if isinstance(step, int):
-            continue
-        annotations = [str(model.model_fields[step].annotation) for model in models if step in model.model_fields]
-        if annotations:  # else it is a name that the user gave
-            models = [
-                model for model in _every_section() if any(re.search(rf"\b{model.__name__}\b", a) for a in annotations)
-            ]
-    return sorted({field for model in models for field in model.model_fields})
-
-
-def _every_section() -> list[type[Section]]:
-    found, queue = [], [Section]
-    while queue:
-        for model in queue.pop().__subclasses__():
-            found.append(model)
-            queue.append(model)
-    return found

@@ -13,6 +13,7 @@ from affinet import events, selectors
 from affinet.events import Event, Lasting
 from affinet.sections import Scenario, ScenarioError, said_at
 from affinet.selectors import Lot
+from affinet.words import among
 from netem.fault import Body, Fault, Pairs, UnderWay, Verb
 from netem.links import Links
 from netem.timeline import Timeline
@@ -112,12 +113,18 @@ def _begin(draft: _Draft, number: int, asking: tuple[int, ...]) -> Moment:
     named = [n for n, other in enumerate(draft.entries) if other.name == name]
     if len(named) != 1 or (dot and end != "end"):
         raise ValueError(
-            f"after {entry.after!r}: name one entry, or its end as {name!r}.end; {len(named)} are called {name!r}"
+            f"after {entry.after!r}: name one entry, or its end as '{name}.end'; {len(named)} are called {name!r}"
+            f"{'' if named else _called(draft, name)}"
         )
     moment = _begin(draft, named[0], (*asking, number))
     draft.begins.setdefault(named[0], moment)
     lasts = _length(draft.entries[named[0]], moment) if dot else 0.0
     return Moment(moment.frame, moment.seconds + lasts + (entry.at or 0.0))
+
+
+def _called(draft: _Draft, name: str) -> str:
+    names = list(dict.fromkeys(entry.name for entry in draft.entries if entry.name is not None))
+    return f"; {among(name, names)}" if names else '; no entry has a name: give one its name = "..."'
 
 
 def _trigger(draft: _Draft, when: events.When) -> Trigger:
@@ -261,7 +268,7 @@ def _whose(draft: _Draft, number: int, entry: Any, verb: Verb, frame: int | None
 def _heal(draft: _Draft, entry: events.Heal, moment: Moment, tick: int) -> None:
     known = {other.name for other in draft.entries}
     if missing := [name for name in entry.names or [] if name not in known]:
-        raise ValueError(f"names: no entry is called {', '.join(missing)}")
+        raise ValueError(f"names: no entry is called {', '.join(map(repr, missing))}{_called(draft, missing[0])}")
     begun = [
         place
         for place, (number, fault) in enumerate(draft.faults)

@@ -14,6 +14,7 @@ from affinet.events import AnyEvent, Finite, Links
 from affinet.impairments import LinkProfile, NotNegative, Positive, Probability, Section
 from affinet.selectors import edge
 from affinet.source import Source
+from affinet.words import among
 from analysis.sensor import Sensor
 from world.formation import PRESETS
 
@@ -22,7 +23,7 @@ Matrix = list[list[Finite]]
 
 
 class ScenarioError(ValueError):
-    """What is wrong in a scenario, a line for each problem: file, key, and what would be right."""
+    """What is wrong in a scenario, in one line: file, key, and what would be right."""
 
 
 def _edge(text: str) -> str:
@@ -59,7 +60,7 @@ class Formation(Section):
     def _whole(self) -> Formation:
         if self.preset is not None:
             if self.preset not in PRESETS:
-                raise ValueError(f"no preset {self.preset!r}; there are {', '.join(PRESETS)}")
+                raise ValueError(f"no preset {self.preset!r}; {among(self.preset, PRESETS)}")
             if self.nodes is not None or self.edges is not None:
                 raise ValueError("give a preset, or nodes and edges, not both")
         elif self.nodes is None or self.edges is None or self.leaders is None:

@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from affinet.words import hint, shown
 from analysis import cuts
 from netem.draws import Purpose, uniform
 from netem.links import Integers, Links
@@ -23,7 +24,8 @@ from world.formation import Formation
 
 T = TypeVar("T")
 
-_ROLE = r"leaders|followers|all"
+_ROLES = ("leaders", "followers", "all")
+_ROLE = "|".join(_ROLES)
 _AGENT = rf"\d+|{_ROLE}"
 _PAIR = re.compile(rf"({_AGENT})(->|-)({_AGENT})")
 _RANDOM = re.compile(r"random (\d+)")
@@ -60,7 +62,7 @@ def check(selector: str) -> str:
         or _RANDOM.fullmatch(selector)
         or selector in _OF_GRAPH
     ):
-        raise ValueError(f"{selector!r} selects no links; {_SAY}")
+        raise ValueError(f"{selector!r} selects no links; {hint(selector, (*_ROLES, *_OF_GRAPH))}{_SAY}")
     return selector
 
 
@@ -73,7 +75,7 @@ def check_agents(selector: str) -> str:
         When it is not.
     """
     if not (re.fullmatch(_ROLE, selector) or _RANDOM_AGENTS.fullmatch(selector) or selector in _AGENTS_OF_GRAPH):
-        raise ValueError(f"{selector!r} selects no agents; {_SAY_AGENTS}")
+        raise ValueError(f"{selector!r} selects no agents; {hint(selector, (*_ROLES, *_AGENTS_OF_GRAPH))}{_SAY_AGENTS}")
     return selector
 
 
@@ -87,7 +89,9 @@ def agent_or_word(given: object) -> int | str:
     """
     if isinstance(given, int) and not isinstance(given, bool):
         return given
-    return check_agents(str(given))
+    if not isinstance(given, str):
+        raise ValueError(f"{shown(given)} selects no agents; {_SAY_AGENTS}")
+    return check_agents(given)
 
 
 def groups_or_word(given: object) -> list[list[int]] | str:
@@ -102,9 +106,13 @@ def groups_or_word(given: object) -> list[list[int]] | str:
         return given
     if isinstance(given, list) and len(given) > 1 and all(isinstance(group, list) for group in given):
         if strangers := [agent for group in given for agent in group if type(agent) is not int]:
-            raise ValueError(f"groups hold numbers of agents, got {strangers[0]!r}")
+            raise ValueError(f"groups hold numbers of agents, like [[1, 2], [3, 4]], got {shown(strangers[0])}")
         return given
-    raise ValueError(f"give at least two lists of agents, or {', '.join(map(repr, _SPLITS))}, got {given!r}")
+    near = f"; {hint(given, _SPLITS)}".rstrip("; ") if isinstance(given, str) else ""
+    raise ValueError(
+        f"give at least two lists of agents, like [[1, 2], [3, 4]], or {', '.join(map(repr, _SPLITS))}, "
+        f"got {shown(given)}{near}"
+    )
 
 
 def edge(text: str) -> tuple[int, int]:

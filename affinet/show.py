@@ -131,11 +131,19 @@ def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
 def outcome(outcome: Outcome, plan: Plan) -> None:
     """What came of a run."""
     table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
-    error, messages = outcome.tracking_error, outcome.messages
+    flown, messages = outcome.flown, outcome.messages
+    errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
+    errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
     rows = [
+        ("estimator, law", f"{flown['estimator']}, {flown['law']}"),
+        ("seed", f"{flown['seed']}"),
+        ("versions", ", ".join(f"{name} {version}" for name, version in flown["versions"].items())),
         ("flown", f"{outcome.ticks} ticks, {outcome.ticks * plan.world.dt:g} s in {outcome.wall_s:.1f} s"),
         ("speed", f"{outcome.ticks_per_s:.0f} ticks/s, {outcome.real_time_factor:.2f} x real time"),
-        ("tracking error", "  ".join(f"{name} {_figure(value)} m²" for name, value in error.items())),
+        *(
+            (what, "  ".join(f"{name} {_figure(value)} {unit}" for name, value in of.items()))
+            for what, (of, unit) in errors.items()
+        ),
         (
             "messages",
             f"{messages['offered']} offered, {messages['copies']} doubled, "

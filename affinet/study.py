@@ -7,23 +7,26 @@ that decides it (`affinet/judging.py`, `analysis/claims.py`); `affinet/study_rep
 from __future__ import annotations
 
 import itertools
-import multiprocessing
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from affinet import files
+from affinet import files, study_checks
 from affinet import plan as planning
 from affinet import scenario as scenarios
 from affinet.batch import Runs, fly_all
+from affinet.explain import explained, named_in
 from affinet.impairments import Section
 from affinet.plan import Plan, PlanError
+from affinet.pool import in_processes
 from affinet.quantities import Quantity
 from affinet.sections import ScenarioError
+from affinet.source import Source
+from affinet.study_checks import Wrong
 from analysis.graph import adjacency
 from analysis.indicator import Bounds, bounds
 from netem.links import Mask
@@ -99,6 +102,14 @@ class Claim(Section):
             raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
         return self
 
+    def settings(self, axes: Iterable[Axis]) -> Iterator[Labels]:
+        """Every setting that it speaks of: a label of each of the axes it is for."""
+        values = {axis.name: list(axis.values) for axis in axes}
+        if self.levels is not None:
+            values[self.each[0]] = list(self.levels)
+        for labels in itertools.product(*(values[name] for name in self.each)):
+            yield dict(zip(self.each, labels, strict=True))
+
 
 class Bound(Section):
     """A line in the figure that no curve should cross, and what it says."""
@@ -131,6 +142,7 @@ class Study(Section):
     since: float = 0.0
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
+    _source: Source | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _drawn(self) -> Study:
@@ -138,20 +150,20 @@ class Study(Section):
             raise ValueError(f"a map shows the mean tracking error, and no {self.quantity}")
         return self
 
-    @model_validator(mode="after")
-    def _labelled(self) -> Study:
-        known = {axis.name: axis.values for axis in self.axes}
-        named = [*self.skip, *(labels for claim in self.claims for labels in (claim.of, claim.to or {}))]
-        named += [{claim.each[0]: label} for claim in self.claims for label in claim.levels or {}]
-        for axis, label in (item for labels in named for item in labels.items()):
-            if label not in known.get(axis, {}):
-                raise ValueError(
-                    f"no axis {axis!r} has the label {label!r}; there are { ({n: [*v] for n, v in known.items()}) }"
-                )
-        for axis in (axis for claim in self.claims for axis in claim.each):
-            if axis not in known:
-                raise ValueError(f"no axis is called {axis!r}; there are {', '.join(known)}")
-        return self
+    def size(self, *, quick: bool) -> Size:
+        """How large it is."""
+        return self.quick if quick else self.full
+
+    def refuse(self, found: Iterable[Wrong]) -> None:
+        """Say what was found to be wrong, if anything was.
+
+        Raises
+        ------
+        ScenarioError
+            With the place in the file, and the keys of all that is wrong.
+        """
+        if wrong := list(found):
+            raise ScenarioError(named_in(self._source or Source("in code", "", ()), wrong))
 
 
 @dataclass(frozen=True)
@@ -197,16 +209,19 @@ def load(name: str) -> Study:
         When there is none, or something in it is wrong.
     """
     file = files.read(name, _FOLDER, "study")
+    source = Source(file.name, file.text, ())
     try:
-        return Study.model_validate(file.says)
+        study = Study.model_validate(file.says)
     except ValidationError as error:
-        wrong = [f"{file.name}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
-        raise ScenarioError("\n".join(wrong)) from error
+        raise ScenarioError(explained(error, Study, source)) from error
+    study._source = source
+    study.refuse(study_checks.of_file(study))
+    return study
 
 
 def cases(study: Study, *, quick: bool) -> Iterator[Case]:
     """Every setting of its grid."""
-    size = study.quick if quick else study.full
+    size = study.size(quick=quick)
     for labels in itertools.product(*(axis.values for axis in study.axes)):
         chosen = [axis.values[label] for axis, label in zip(study.axes, labels, strict=True)]
         overrides = (*study.set, *size.set, *itertools.chain.from_iterable(chosen))
@@ -215,37 +230,44 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
             yield case
 
 
-def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[Result]:
-    """All its cases, two at a time; `watch` sees each as it is done.
+def fly(planned: Sequence[tuple[Case, Plan]], runs: int) -> Iterator[Result]:
+    """So many runs of each case, as many cases at a time as there are processors; each as it is done."""
+    with closing(in_processes(_fly, [(plan, runs) for _, plan in planned])) as flown:
+        for (case, plan), done in zip(planned, flown, strict=True):
+            yield Result(case.labels, plan, done)
+
+
+def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
+    """All its cases with what flies in them: whatever cannot fly, be drawn or be judged is found before any has flown.
 
     Raises
     ------
     ScenarioError
-        When a case cannot fly.
+        When something cannot.
     """
-    size = study.quick if quick else study.full
     todo = list(cases(study, quick=quick))
-    plans = [_planned(study.scenario, case) for case in todo]  # what cannot fly is found before any has flown
-    context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
-    with ProcessPoolExecutor(mp_context=context) as pool:
-        waiting = [pool.submit(_fly, plan, size.runs) for plan in plans]
-        results = []
-        for case, plan, runs in zip(todo, plans, waiting, strict=True):
-            results.append(Result(case.labels, plan, runs.result()))
-            watch(results[-1])
-    return results
+    study.refuse(study_checks.of_cases(study, todo, study.size(quick=quick).runs))
+    planned = [(case, _planned(study, case)) for case in todo]
+    study.refuse(study_checks.of_plans(study, planned, [_every(plan) for _, plan in planned]))
+    return planned
 
 
-def _planned(name: str, case: Case) -> Plan:
+def _planned(study: Study, case: Case) -> Plan:
     try:
-        return planning.make(scenarios.load(name, case.overrides))
+        return planning.make(scenarios.load(study.scenario, case.overrides))
     except (ScenarioError, PlanError) as error:
-        raise ScenarioError(f"case {case.labels}: {error}") from error
+        where = f"{study._source.file}: " if study._source else ""
+        raise ScenarioError(f"{where}case {study_checks.named(case.labels)}: {error}") from error
 
 
-def _fly(plan: Plan, runs: int) -> Runs:
+def _every(plan: Plan) -> int:
+    return max(1, plan.world.ticks // _KEPT)
+
+
+def _fly(given: tuple[Plan, int]) -> Runs:
+    plan, runs = given
     first = plan.scenario.seed
-    return fly_all(plan, range(first, first + runs), max(1, plan.world.ticks // _KEPT))
+    return fly_all(plan, range(first, first + runs), _every(plan))
 
 
 def selected(one: Case | Result, labels: Mapping[str, str]) -> bool:

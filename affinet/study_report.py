@@ -7,6 +7,7 @@ row for each run, with what stands for each quantity over its time.
 from __future__ import annotations
 
 import json
+import traceback
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,12 +28,26 @@ from netem.channels import PLACE
 _MOST_FLIGHTS = 8  # in one picture
 
 
-def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
-    """Write data, figure and verdicts into a directory."""
-    out.mkdir(parents=True, exist_ok=True)
+def save(out: Path, study: Study, results: list[Result]) -> None:
+    """Write the data into a directory."""
     pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
     pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
+
+
+def tell(out: Path, verdicts: list[Verdict]) -> None:
+    """Write the verdicts into a directory."""
     (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+
+
+def failed(out: Path) -> Path:
+    """Write down of what a report has just failed; the file that says so."""
+    log = out / "report.log"
+    log.write_text(traceback.format_exc(), encoding="utf-8")
+    return log
+
+
+def draw(out: Path, study: Study, results: list[Result]) -> None:
+    """Draw the figures into a directory."""
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, graph_rates())
     if all(reported(one.runs.first) for one in results):

@@ -115,17 +115,17 @@ class Fault:
             case Verb.PARTITION:
                 return "partition " + " | ".join(",".join(map(str, group)) for group in self.groups)
             case Verb.CUT | Verb.FREEZE:
-                return f"{self.verb} {self._links()}"
+                return f"{self.verb} {self.links()}"
             case Verb.LOSE | Verb.DROPOUT:
-                return f"{self.verb} {self.probability:g} on {self._links()}"
+                return f"{self.verb} {self.probability:g} on {self.links()}"
             case Verb.OUTLIER:
-                return f"outlier {self.probability:g} of {self.deviation:g} m on {self._links()}"
+                return f"outlier {self.probability:g} of {self.deviation:g} m on {self.links()}"
             case Verb.DELAY:
-                return f"delay {self.seconds:g} s on {self._links()}"
+                return f"delay {self.seconds:g} s on {self.links()}"
             case Verb.DEGRADE:
-                return f"degrade to {self.profile_name!r} on {self._links()}"
+                return f"degrade to {self.profile_name!r} on {self.links()}"
             case Verb.BIAS:
-                return f"bias {_numbers(self.vector)} m on {self._links()}"
+                return f"bias {_numbers(self.vector)} m on {self.links()}"
             case Verb.GUST:
                 return f"gust {_numbers(self.vector)} m/s on {who}"
             case Verb.CLOCK:
@@ -141,7 +141,8 @@ class Fault:
             return f"{_ENDS[self.verb]} {','.join(map(str, self.agents))}{' warm' if self.warm else ''}"
         return f"heal: {self.describe()}"
 
-    def _links(self) -> str:
+    def links(self) -> str:
+        """The links that it names, for people."""
         shown = ", ".join(f"{src}->{dst}" for src, dst in self.pairs[:12])
         return f"{shown} and {len(self.pairs) - 12} more" if len(self.pairs) > 12 else shown
 

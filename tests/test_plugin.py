@@ -212,6 +212,47 @@ def test_a_runtime_that_is_none_is_refused(tested):
     result.stderr.fnmatch_lines(["*--affinet-runtime: invalid choice: 'thread'*"])
 
 
+@pytest.mark.parametrize(
+    ("mark", "says"),
+    [
+        # flew over processes, and passed
+        (
+            'runtime("in-process")',
+            "affinet_runtime('in-process'): write affinet_runtime('inprocess') or affinet_runtime('proc",
+        ),
+        ("runtime(None)", "affinet_runtime(None): write affinet_runtime('inprocess')"),
+        ('runtime("inprocess", "processes")', "affinet_runtime('inprocess', 'processes'): write"),
+        # an IndexError in the fixture, or the runtime of the command line
+        ("runtime()", "affinet_runtime(): write affinet_runtime('inprocess')"),
+        ('runtime(name="inprocess")', "affinet_runtime has no keyword 'name': write"),
+        # a test that was skipped for want of seeds
+        ("seeds()", "affinet_seeds has no seed: write affinet_seeds(1, 2, 3), different whole numbers"),
+        # errors of the scenario, or nothing
+        ('seeds(1, "2")', "affinet_seeds: '2' is no seed: write"),
+        ("seeds(1.0)", "affinet_seeds: 1.0 is no seed"),
+        ("seeds(True)", "affinet_seeds: True is no seed"),
+        ("seeds([1, 2])", "affinet_seeds: [1, 2] is no seed"),
+        ("seeds(1, -1)", "affinet_seeds: -1 is no seed"),
+        (f"seeds({2**64})", "affinet_seeds: 18446744073709551616 is no seed"),
+        ("seeds(3, 1, 3)", "affinet_seeds: 3 is given twice: write"),
+        ("seeds(1, scope=2)", "affinet_seeds has no keyword 'scope': write"),
+    ],
+    ids=lambda given: given if "write" not in given else "",
+)
+def test_a_mark_that_says_what_cannot_be_is_refused_when_tests_are_collected(tested, mark, says):
+    text = f"""
+@pytest.mark.affinet_{mark}
+def test_marked(swarm):
+    assert False, "it ran"
+"""
+    result = tested(text)
+    assert outcomes(result) == {"errors": 1}
+    output = result.stdout.str()
+    assert f"::test_marked: {says}" in output
+    assert "it ran" not in output
+    assert "Traceback" not in output
+
+
 @pytest.mark.slow
 def test_workers_fly_swarms_and_report_what_failed(pytester):
     pytester.makepyfile(f"""

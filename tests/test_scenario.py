@@ -209,7 +209,8 @@ def test_links_that_are_selected_twice_are_selected_once():
 @pytest.mark.parametrize("selector", ["2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", "", "2->4->5", "leader"])
 def test_what_selects_no_links_is_refused_with_the_ways_to_write_it(selector):
     with pytest.raises(
-        ValueError, match=f"{selector!r} selects no links; write '2->4' .*, '2-4' .*'leaders->followers'"
+        ValueError,
+        match=rf"{selector!r} selects no links; (did you mean 'leaders'\? )?write '2->4' .*, '2-4' .*'leaders->followers'",
     ):
         selectors.check(selector)
 
@@ -268,9 +269,9 @@ WRONG_OVERRIDES = [
     ("network.availability=1.3", "network.availability", "less than or equal to 1, got 1.3"),
     ("network.availabilty=0.5", "network.availabilty", "did you mean 'availability'?"),
     ("netwrk.availability=0.5", "netwrk", "did you mean 'network'?"),
-    ("time.dt=fast", "time.dt", "valid number"),
-    ('time.dt="0.01"', "time.dt", "valid number"),
-    ("seed=", "seed", "valid integer"),
+    ("time.dt=fast", "time.dt", "should be a number, like "),
+    ('time.dt="0.01"', "time.dt", "should be a number, like "),
+    ("seed=", "seed", "should be a whole number, like 1, got "),
     ("time.dt=0.007", "time", "duration 1 s is not a whole number of ticks of 0.007 s"),
     ("formation.preset=zhao8", "formation", "there are zhao7, hexa10, octa10"),
     ("agents.estimator=kalman", "agents.estimator", ESTIMATORS),
@@ -318,14 +319,14 @@ WRONG = [
     ),
     ("dt = 0.01\n", "", "time.dt", "is missing; it has no default"),
     # types
-    ("dt = 0.01", 'dt = "fast"', "time.dt", "valid number"),
-    ("dt = 0.01", 'dt = "0.01"', "time.dt", "valid number"),
-    ("duration = 1.0", "duration = true", "time.duration", "valid number"),
-    ("seed = 1", "seed = 1.5", "seed", "valid integer"),
-    ("seed = 1", "seed = true", "seed", "valid integer"),
-    ("coupled = true", 'coupled = "yes"', "network.coupled", "valid boolean"),
-    ("description = ", "description = 3 #", "description", "valid string, got 3"),
-    ("agents = [5]\n\n[", "agents = 5\n\n[", "timeline.2.agents", "valid list"),
+    ("dt = 0.01", 'dt = "fast"', "time.dt", "should be a number, like "),
+    ("dt = 0.01", 'dt = "0.01"', "time.dt", "should be a number, like "),
+    ("duration = 1.0", "duration = true", "time.duration", "should be a number, like "),
+    ("seed = 1", "seed = 1.5", "seed", "should be a whole number, like 1, got "),
+    ("seed = 1", "seed = true", "seed", "should be a whole number, like 1, got "),
+    ("coupled = true", 'coupled = "yes"', "network.coupled", "should be true or false"),
+    ("description = ", "description = 3 #", "description", 'should be text in quotes, like "what it is about", got 3'),
+    ("agents = [5]\n\n[", "agents = 5\n\n[", "timeline.2.agents", 'should be a list, like [4, "leaders"], got 5'),
     # values
     ("availability = 0.7", "availability = 1.3", "network.availability", "less than or equal to 1, got 1.3"),
     ("availability = 0.7", "availability = -0.1", "network.availability", "greater than or equal to 0, got -0.1"),
@@ -337,7 +338,12 @@ WRONG = [
     ("dt = 0.01", "dt = inf", "time.dt", "finite number, got inf"),
     ("duration = 1.0", "duration = 1.005", "time", "1.005 s is not a whole number of ticks of 0.01 s"),
     # formation
-    ('preset = "zhao7"', 'preset = "zhao8"', "formation", "no preset 'zhao8'; there are zhao7, hexa10, octa10"),
+    (
+        'preset = "zhao7"',
+        'preset = "zhao8"',
+        "formation",
+        "no preset 'zhao8'; did you mean 'zhao7'? there are zhao7, hexa10, octa10",
+    ),
     ('preset = "zhao7"', f'preset = "zhao7"\n{OWN}', "formation", "give a preset, or nodes and edges, not both"),
     ('preset = "zhao7"', "scale = 2.0", "formation", "give a preset, or nodes, edges and leaders"),
     ('preset = "zhao7"', OWN.replace("[1.0, 1.0]]", "[nan, 1.0]]"), "formation.nodes.4.1", "finite number"),
@@ -421,11 +427,11 @@ WRONG = [
         '"static"',
         '"statik"',
         "agents.law",
-        "no 'statik'; there are constant-velocity, double-constant-velocity, double-varying-velocity, "
+        "no 'statik'; did you mean 'static'? there are constant-velocity, double-constant-velocity, double-varying-velocity, "
         "pursuit, rest, static, varying-velocity",
     ),
     ("sigma_w = 0.5", "sigma = 0.5", "agents.parameters.rkf.sigma", "rkf has sigma_w, prior_position"),
-    ("sigma_w = 0.5", 'sigma_w = "much"', "agents.parameters.rkf.sigma_w", "valid number"),
+    ("sigma_w = 0.5", 'sigma_w = "much"', "agents.parameters.rkf.sigma_w", "should be a number, like "),
     ("[agents.parameters.rkf]", "[agents.parameters.rfk]", "agents.parameters.rfk", "rkf"),
     # network and timeline
     ('links = "1->2"', 'links = "1=2"', "network.links.1.links", "'1=2' selects no links; write '2->4'"),
@@ -434,7 +440,12 @@ WRONG = [
     ('links = "1->2"', 'links = "1->2"\nchannels = "comms"', "network", "coupled = true gives sensing and comms one"),
     ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' selects no links; write '2->4'"),
     ('"1-2"]', '"1-7"]', "timeline.1.links", "'1-7' matches no link of the formation"),
-    ('"1-2"]', '"1-2"]\nin_flight = "keep"', "timeline.1.in_flight", "'drop', 'deliver' or 'hold', got 'keep'"),
+    (
+        '"1-2"]',
+        '"1-2"]\nin_flight = "keep"',
+        "timeline.1.in_flight",
+        "should be 'drop', 'deliver' or 'hold', got \"keep\"",
+    ),
     ('verb = "cut"', 'verb = "lose"', "timeline.1.loss", "is missing; it has no default"),
     ('verb = "cut"', 'verb = "lose"\nloss = 1.5', "timeline.1.loss", "less than or equal to 1, got 1.5"),
     (
@@ -501,14 +512,13 @@ def test_what_is_wrong_is_named_by_its_line(file, good, bad, number):
         scenario.load(str(file))
 
 
-def test_each_problem_has_its_line(file):
+def test_of_several_mistakes_the_first_is_told_and_the_others_are_named_with_their_lines(file):
     file.write_text(GOOD.replace("seed = 1", "seed = -1").replace("dt = 0.01", "dt = 0"))
     with pytest.raises(ScenarioError) as error:
         scenario.load(str(file))
-    assert [line.split(":")[:3] for line in str(error.value).splitlines()] == [
-        ["bad.toml", "2", " seed"],
-        ["bad.toml", "14", " time.dt"],
-    ]
+    assert str(error.value) == (
+        "bad.toml:2: seed: should be greater than or equal to 0, got -1; 1 more mistake: time.dt (bad.toml:14)"
+    )
 
 
 def test_a_file_that_is_no_toml_is_named_with_the_place(file):
@@ -526,6 +536,7 @@ def test_a_file_that_is_no_text_is_named(file):
 @pytest.mark.parametrize("name", ["nowhere.toml", "coridor"])
 def test_a_scenario_that_does_not_exist_is_refused_with_those_that_are_shipped(name):
     with pytest.raises(
-        ScenarioError, match=f"^{name}: no such file, and no such scenario; shipped are corridor, hexa, "
+        ScenarioError,
+        match=rf"^{name}: no such file, and no such scenario; (did you mean 'corridor'\? )?shipped are corridor, hexa, ",
     ):
         scenario.load(name)

@@ -228,7 +228,7 @@ REFUSED_TIMES = [
     (CUT + "at = 0.5\nuntil = 0.5", "ends at 0.5 s, but begins at 0.5 s; until must be later"),
     (CUT + "at = 0.5\nevery = 0.5", "what comes back every so many seconds lasts no longer than that: give lasts"),
     (CUT + "at = 0.5\nevery = 0.5\nlasts = 0.6", "lasts no longer than that"),
-    (CUT + "after = 'b'", "after 'b': name one entry, or its end as 'b'.end; 0 are called 'b'"),
+    (CUT + "after = 'b'", "after 'b': name one entry, or its end as 'b.end'; 0 are called 'b'"),
     (CUT + "after = 'a.start'", "after 'a.start': name one entry"),
     (CUT + "after = ''", "0 are called ''"),
     (CUT + "after = 'a.end'", "'a' says itself neither until when nor how long it lasts"),
@@ -250,7 +250,7 @@ REFUSED_KEYS = [
     ("at = 0.1\nlasts = 0", "lasts", "greater than 0"),
     ("at = 0.1\nlasts = 0.1\nevery = 0", "every", "greater than 0"),
     ("at = 0.1\nlasts = 0.1\nevery = 1\ntimes = 0", "times", "greater than or equal to 1"),
-    ("at = 0.1\nlasts = 0.1\nevery = 1\ntimes = 1.5", "times", "valid integer"),
+    ("at = 0.1\nlasts = 0.1\nevery = 1\ntimes = 1.5", "times", "should be a whole number, like 1, got 1.5"),
     ("when = { tracking_error_below = 0 }", "when.tracking_error_below", "greater than 0"),
     ("when = { tracking_error_above = -1 }", "when.tracking_error_above", "greater than or equal to 0"),
     ("when = { tracking_error_below = 1, lasting = -1 }", "when.lasting", "greater than or equal to 0"),
@@ -278,7 +278,7 @@ def test_a_name_that_two_entries_have_is_no_time(refused):
     twice = CUT + "name = 'a'\nat = 0.1"
     assert refused(twice, twice, GUST + "after = 'a'")[1:] == (
         "timeline.3",
-        "after 'a': name one entry, or its end as 'a'.end; 2 are called 'a'",
+        "after 'a': name one entry, or its end as 'a.end'; 2 are called 'a'",
     )
 
 
@@ -354,7 +354,11 @@ REFUSED_ENDS = [
     (CUT + WHEN, HEAL + "at = 0.75", NO_LINKS),
     (KILL + "at = 0.5", HEAL + "at = 1.0", NO_LINKS),
     (GUST + "at = 0.5\nname = 'a'", HEAL + "at = 1.0\nnames = ['a']", NO_LINKS),
-    (CUT + "at = 0.5\nname = 'a'", HEAL + "at = 1.0\nnames = ['a', 'b', 'c']", "names: no entry is called b, c"),
+    (
+        CUT + "at = 0.5\nname = 'a'",
+        HEAL + "at = 1.0\nnames = ['a', 'b', 'c']",
+        "names: no entry is called 'b', 'c'; there are a",
+    ),
 ]
 
 
@@ -426,7 +430,12 @@ REFUSED = [
     ("verb = 'kill'\nagents = ['cut-vertices']\nat = 1", "agents", 3, "no agent's loss disconnects the others"),
     ("verb = 'kill'\nagents = ['random 8']\nat = 1", "agents", 3, "cannot choose 8 of 7 agents"),
     ("verb = 'kill'\nagents = []\nat = 1", "agents", 3, "at least 1 item"),
-    ("verb = 'degrade'\nlinks = ['1-2']\nprofile = 'wifi'\nat = 1", "profile", 4, "no profile 'wifi'; there are "),
+    (
+        "verb = 'degrade'\nlinks = ['1-2']\nprofile = 'wifi'\nat = 1",
+        "profile",
+        4,
+        "no profile 'wifi'; did you mean 'wifi_busy'? there are ",
+    ),
     ("verb = 'gust'\nagents = [5]\nvelocity = [1.0, 0.0, 0.0]\nat = 1", "velocity", 4, "needs 2 numbers"),
     ("verb = 'gust'\nagents = [5]\nvelocity = [1.0]\nat = 1", "velocity", 4, "at least 2 items"),
     ("verb = 'bias'\nlinks = ['1-2']\nby = [1.0, 0.0, 0.0]\nat = 1", "by", 4, "needs 2 numbers"),
@@ -475,7 +484,11 @@ def test_an_entry_that_says_nothing_is_refused_as_a_whole(entry, says, refused):
     ("entry", "key", "says"),
     [
         ("verb = 'partition'\ngroups = 'thirds'\nat = 1", "groups", "'halves', 'leaders', 'min-cut'"),
-        ("verb = 'kill'\nagents = [4, 'leader']\nat = 1", "agents.2", "'leader' selects no agents; write a number"),
+        (
+            "verb = 'kill'\nagents = [4, 'leader']\nat = 1",
+            "agents.2",
+            "'leader' selects no agents; did you mean 'leaders'? write a number",
+        ),
     ],
 )
 def test_a_word_that_is_none_is_one_problem_of_one_key(entry, key, says, refused):

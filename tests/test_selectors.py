@@ -67,7 +67,8 @@ def test_agents_are_selected_by_number_and_role_each_once(words, chosen):
 )
 def test_what_selects_no_agents_is_refused_with_the_ways_to_write_it(word):
     with pytest.raises(
-        ValueError, match=rf"{word!r} selects no agents; write a number, 'leaders', .*'random 2 leaders'"
+        ValueError,
+        match=rf"{word!r} selects no agents; (did you mean 'leaders'\? )?write a number, 'leaders', .*'random 2 leaders'",
     ):
         agents(word)
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from affinet.testing.swarm import Hangar
 
 _SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
+_RUNTIMES = ("inprocess", "processes")
+_MOST = 2**64  # seeds are below
 _HANGAR: pytest.StashKey[Hangar] = pytest.StashKey()
 
 
@@ -21,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Where the swarms of tests fly."""
     parser.getgroup("affinet").addoption(
         "--affinet-runtime",
-        choices=["inprocess", "processes"],
+        choices=_RUNTIMES,
         default="inprocess",
         help="where the swarms of tests fly: in the test's process, or each agent as a process (default: %(default)s)",
     )
@@ -34,10 +36,36 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """One test for each seed asked for."""
+    """One test for each seed asked for; marks that say what cannot be fail when tests are collected."""
+    for mark in metafunc.definition.iter_markers():
+        if (wrong := _wrong(mark)) is not None:
+            pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     mark = metafunc.definition.get_closest_marker(_SEEDS)
     if mark and "swarm" in metafunc.fixturenames:
         metafunc.parametrize("swarm", mark.args, indirect=True, ids=[f"seed{seed}" for seed in mark.args])
+
+
+def _wrong(mark: pytest.Mark) -> str | None:
+    """What is wrong with a mark of ours, and how to write it."""
+    if mark.name not in (_SEEDS, _RUNTIME):
+        return None
+    if mark.kwargs:
+        return f"{mark.name} has no keyword {next(iter(mark.kwargs))!r}: {_right(mark.name)}"
+    if mark.name == _RUNTIME:
+        return None if mark.args in [(one,) for one in _RUNTIMES] else f"{_RUNTIME}({', '.join(map(repr, mark.args))}): {_right(_RUNTIME)}"
+    if not mark.args:
+        return f"{_SEEDS} has no seed: {_right(_SEEDS)}"
+    if odd := [seed for seed in mark.args if type(seed) is not int or not 0 <= seed < _MOST]:
+        return f"{_SEEDS}: {odd[0]!r} is no seed: {_right(_SEEDS)}"
+    if twice := [seed for place, seed in enumerate(mark.args) if seed in mark.args[:place]]:
+        return f"{_SEEDS}: {twice[0]} is given twice: {_right(_SEEDS)}"
+    return None
+
+
+def _right(name: str) -> str:
+    if name == _RUNTIME:
+        return f"write {' or '.join(f'{_RUNTIME}({one!r})' for one in _RUNTIMES)}"
+    return f"write {_SEEDS}(1, 2, 3), different whole numbers from 0 to 2**64 - 1"
 
 
 @pytest.fixture
