@@ -20,6 +20,7 @@ from affinet.scenario import extended
 from affinet.sections import Scenario, ScenarioError
 from affinet.testing import strategies
 from affinet.testing.strategies import Entries
+from netem.user_code import UserCodeError
 
 
 @dataclass
@@ -97,6 +98,8 @@ def hunt(
     ------
     ScenarioError
         When the invariant fails with no fault added.
+    UserCodeError
+        When a user's own estimator or law does something wrong, under the smallest schedule found that makes it do so.
     """
     undisturbed = invariant(_flown(given))
     if undisturbed.verdict == "fail":
@@ -120,6 +123,7 @@ def hunt(
         database=None,
         deadline=None,
         suppress_health_check=list(HealthCheck),
+        report_multiple_bugs=False,
         phases=[Phase.generate, Phase.shrink],
     )
     try:
@@ -147,6 +151,9 @@ def _breaks(given: Scenario, invariant: Checker, entries: Entries, coverage: Cov
         evidence = _flown(extended(given, entries))
     except (ScenarioError, PlanError):
         return None
+    except UserCodeError as error:
+        error.during = f"with the timeline {json.dumps(entries)}"
+        raise
     coverage.add(entries)
     found = invariant(evidence).verdict
     untold = evidence.outcome.verdict == "vacuous" or found == "vacuous"

@@ -23,11 +23,13 @@ Verdict = Literal["pass", "fail", "vacuous"]
 class Outcome:
     """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds.
 
-    `timeline` has its faults where they came to lie, `faults` what each took hold of.
+    `timeline` has its faults where they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a
+    law is why the run ended early.
     """
 
     verdict: Verdict
     reasons: tuple[str, ...]
+    user_code: bool
     digest: str | None
     ticks: int
     wall_s: float
@@ -71,6 +73,7 @@ def judge(
     in_flight: int | None,
     uninstructed: int | None,
     failure: str | None,
+    user_code: bool,
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
@@ -87,8 +90,8 @@ def judge(
         What happened; None when the run left nothing.
     in_flight, uninstructed
         Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
-    failure
-        Why the run ended early, if it did.
+    failure, user_code
+        Why the run ended early, if it did, and whether a user's own code is why.
     wall_s
         From the first tick to the last, in seconds.
     processes, out
@@ -106,6 +109,7 @@ def judge(
     return Outcome(
         verdict=verdict,
         reasons=tuple(reasons),
+        user_code=user_code,
         digest=None if arrays is None else digest(arrays),
         ticks=ticks,
         wall_s=wall_s,

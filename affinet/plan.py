@@ -137,11 +137,14 @@ class Plan:
         """All agents, as one batch."""
         return _agents(self.scenario, self.brief, self.estimator, self.law, self.reports)
 
+    def brief_of(self, row: int) -> Brief:
+        """All that one agent is told, in a process of its own."""
+        told = bool(self.told_mission[row])
+        return replace(self.brief.of(row), mission=self.brief.mission if told else None)
+
     def alone(self, row: int) -> Agent:
         """One of the agents, as it flies in a process of its own."""
-        told = bool(self.told_mission[row])
-        brief = replace(self.brief.of(row), mission=self.brief.mission if told else None)
-        return _agents(self.scenario, brief, self.estimator, self.law, self.reports)
+        return _agents(self.scenario, self.brief_of(row), self.estimator, self.law, self.reports)
 
 
 def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | None = None) -> Plan:

@@ -68,11 +68,15 @@ def check_parameters(given: Mapping[str, Mapping[str, Any]]) -> None:
     UserCodeError
         When its module cannot be imported.
     """
-    offered = {point.name: f"{point.module}:{point.attr}" for group in _PROTOCOLS for point in entry_points(group=group)}
+    offered = {
+        point.name: f"{point.module}:{point.attr}" for group in _PROTOCOLS for point in entry_points(group=group)
+    }
     for name, table in given.items():
         key = f"agents.parameters.{name}"
         if name not in offered and ":" not in name:
-            raise ScenarioError(f"{key}: no such estimator or law; there are {', '.join(offered)}{_hint(name, offered)}")
+            raise ScenarioError(
+                f"{key}: no such estimator or law; there are {', '.join(offered)}{_hint(name, offered)}"
+            )
         path = offered.get(name, name)
         _made(name, path, _load(key, path), table)
 
@@ -140,5 +144,5 @@ def _refuse_another_kind(group: str, algorithm: type) -> None:
 
 def _has(algorithm: type, method: str, protocol: type) -> bool:
     written = getattr(algorithm, method, None)
-    unwritten = getattr(algorithm, "__abstractmethods__", frozenset())
+    unwritten: frozenset[str] = getattr(algorithm, "__abstractmethods__", frozenset())
     return callable(written) and written is not getattr(protocol, method) and method not in unwritten

@@ -13,7 +13,7 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from affinet import events, files, impairments, sections
+from affinet import events, files, impairments, sections, source
 from affinet.impairments import Section
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
@@ -82,20 +82,20 @@ def _verbs(given: Scenario) -> dict[str, Any]:
     return {"timeline": entries} if entries else {}
 
 
-def _validated(raw: dict[str, Any], source: Source) -> Scenario:
-    for override in source.overrides:
+def _validated(raw: dict[str, Any], origin: Source) -> Scenario:
+    for override in origin.overrides:
         _override(raw, override)
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError("\n".join(_explain(source, problem) for problem in error.errors())) from error
-    scenario._source = source
+        raise ScenarioError("\n".join(_explain(origin, problem) for problem in error.errors())) from error
+    scenario._source = origin
     return scenario
 
 
 def _override(raw: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
-    *tables, name = key.strip().split(".")
+    *tables, name = source.steps(key)
     if not equals or not name:
         raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
     try:

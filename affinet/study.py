@@ -10,6 +10,7 @@ import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -27,6 +28,7 @@ from affinet.sections import ScenarioError
 from analysis.graph import adjacency
 from analysis.indicator import Bounds, bounds
 from netem.links import Mask
+from netem.user_code import UserCodeError
 
 Labels = dict[str, str]
 _FOLDER = "studies"
@@ -222,6 +224,8 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     ------
     ScenarioError
         When a case cannot fly.
+    UserCodeError
+        When a user's own estimator or law does something wrong.
     """
     size = study.quick if quick else study.full
     todo = list(cases(study, quick=quick))
@@ -231,16 +235,28 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
         waiting = [pool.submit(_fly, plan, size.runs) for plan in plans]
         results = []
         for case, plan, runs in zip(todo, plans, waiting, strict=True):
-            results.append(Result(case.labels, plan, runs.result()))
+            with _in_case(case):
+                results.append(Result(case.labels, plan, runs.result()))
             watch(results[-1])
     return results
 
 
 def _planned(name: str, case: Case) -> Plan:
     try:
-        return planning.make(scenarios.load(name, case.overrides))
+        with _in_case(case):
+            return planning.make(scenarios.load(name, case.overrides))
     except (ScenarioError, PlanError) as error:
         raise ScenarioError(f"case {case.labels}: {error}") from error
+
+
+@contextmanager
+def _in_case(case: Case) -> Iterator[None]:
+    """What a user's own code does wrong in the block, it does in this case."""
+    try:
+        yield
+    except UserCodeError as error:
+        error.during = f"case {case.labels}"
+        raise
 
 
 def _fly(plan: Plan, runs: int) -> Runs:

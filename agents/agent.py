@@ -133,12 +133,12 @@ class Agent:
         return AgentState(estimator, law, steered), Action(steered, estimate)
 
     def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
-        batch, edges = state.input.shape[:-1], self.brief.relative.shape[-2:]
+        batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
         with Calling(self.estimator, "fuse"):
             told = self.estimator.fuse(self.brief, state.estimator, heard, own)
             estimator, estimate = returned.pair(told, "the state, and an Estimate")
             returned.state(state.estimator, estimator, batch)
-            return estimator, returned.estimate(estimate, *edges, batch, self.reports)
+            return estimator, returned.estimate(estimate, slots, dimension, batch, self.reports)
 
     def _commanded(
         self, state: AgentState, tick: Reading, own: Own, estimate: Estimate, inputs: Heard

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import inspect
 import re
 import sys
 from contextlib import redirect_stdout
-from types import ModuleType, TracebackType
+from types import FunctionType, ModuleType, TracebackType
 from typing import Any
 
 from agents.returned import WrongReturn
@@ -21,7 +22,14 @@ class NoSuchAlgorithm(ValueError):
 
 
 class Calling:
-    """Whatever is raised inside the block is said as the doing of a method of an algorithm, a class or an instance of it.
+    """Whatever is raised inside the block is said as the doing of a method of an algorithm, or of a class or a function.
+
+    Parameters
+    ----------
+    called
+        An algorithm, its class, or a function.
+    name
+        Of the method, or for a function of what it is for.
 
     Raises
     ------
@@ -29,11 +37,11 @@ class Calling:
         When anything is raised, or the code wants to leave the process.
     """
 
-    __slots__ = ("_algorithm", "_method")
+    __slots__ = ("_called", "_name")
 
-    def __init__(self, algorithm: Any, method: str) -> None:
-        self._algorithm = algorithm
-        self._method = method
+    def __init__(self, called: Any, name: str) -> None:
+        self._called = called
+        self._name = name
 
     def __enter__(self) -> None:
         pass
@@ -41,17 +49,22 @@ class Calling:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if not isinstance(error, Exception | SystemExit) or is_of_a_signal(error):
+        if not isinstance(error, Exception | SystemExit) or isinstance(error, UserCodeError) or is_of_a_signal(error):
             return
-        described = self._algorithm if isinstance(self._algorithm, type) else type(self._algorithm)
-        method = getattr(described, self._method, described)
-        written = hasattr(method, "__code__") and not method.__code__.co_filename.startswith("<")
-        here = definition(method if written else described)
-        if isinstance(error, WrongReturn):
-            what, place = str(error), here
-        else:
-            what, place = worded(error), place_of(error, described.__module__.partition(".")[0]) or here
-        raise UserCodeError(f"{name_of(described)}.{self._method}", what, place) from error
+        where, written = self._name, self._called
+        if not isinstance(written, FunctionType):
+            described = written if isinstance(written, type) else type(written)
+            where, written = f"{name_of(described)}.{self._name}", _written(described, self._name)
+        what, place = str(error), definition(written)
+        if not isinstance(error, WrongReturn):
+            what, place = worded(error), place_of(error, written.__module__.partition(".")[0]) or place
+        raise UserCodeError(where, what, place) from error
+
+
+def _written(algorithm: type, name: str) -> Any:
+    """The method of this name, as far as it is written anywhere; else the class."""
+    method = inspect.unwrap(getattr(algorithm, name, algorithm))
+    return method if isinstance(method, FunctionType) and not method.__code__.co_filename.startswith("<") else algorithm
 
 
 def name_of(algorithm: type) -> str:
@@ -88,7 +101,9 @@ def _imported(name: str) -> ModuleType:
             return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{name}.".startswith(f"{error.name}."):
-            raise NoSuchAlgorithm(f"{error}; it is looked for beside the scenario and among installed packages") from error
+            raise NoSuchAlgorithm(
+                f"{error}; it is looked for beside the scenario and among installed packages"
+            ) from error
         raise _not_imported(name, error) from error
     except (Exception, SystemExit) as error:  # a module of the user's own may do anything
         if is_of_a_signal(error):
@@ -97,7 +112,9 @@ def _imported(name: str) -> ModuleType:
 
 
 def _not_imported(name: str, error: BaseException) -> UserCodeError:
-    return UserCodeError(f"importing {name}", worded(error), place_of(error, name.partition(".")[0]) or f"module {name}")
+    return UserCodeError(
+        f"importing {name}", worded(error), place_of(error, name.partition(".")[0]) or f"module {name}"
+    )
 
 
 def _instead(found: Any, wanted: str) -> str:

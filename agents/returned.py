@@ -27,7 +27,7 @@ class WrongReturn(TypeError):
 def pair(given: Any, what: str) -> tuple[Any, Any]:
     """The two things that a method has to return."""
     if type(given) is not tuple or len(given) != 2:
-        raise WrongReturn(f"must return {what}, got {_kind(given)}")
+        raise WrongReturn(f"must return {what}, got {kind(given)}")
     return given
 
 
@@ -37,13 +37,13 @@ def array(name: str, value: Any, axes: str, shape: Shape, batch: Shape, dtype: n
         return
     symbols = _written(axes.split(", ") if axes else [])
     meant = "" if _written(shape) == symbols else f" = {_written(shape)}"
-    raise WrongReturn(f"{name} must be {dtype} {symbols}{meant}, got {_shown(value, batch)}")
+    raise WrongReturn(f"{name} must be {dtype} {symbols}{meant}, got {shown(value, batch)}")
 
 
 def declared(given: Any) -> Channels:
     """The channels that an estimator declares, if they can be flown."""
     if not isinstance(given, Mapping):
-        raise WrongReturn(f"must return a map from channels to their fields, got {_kind(given)}")
+        raise WrongReturn(f"must return a map from channels to their fields, got {kind(given)}")
     for channel, fields in given.items():
         if not isinstance(channel, str):
             raise WrongReturn(f"a channel is called by a text, not {channel!r}")
@@ -54,7 +54,7 @@ def declared(given: Any) -> Channels:
         if channel in _RESERVED:
             raise WrongReturn(f"channel {channel!r} is the swarm's own: give it another name")
         if not isinstance(fields, Mapping) or not fields:
-            raise WrongReturn(f"channel {channel!r} must be a map from names to Field(shape), got {_kind(fields)}")
+            raise WrongReturn(f"channel {channel!r} must be a map from names to Field(shape), got {kind(fields)}")
         for name, field in fields.items():
             _declared(f"{channel}.{name}", field)
     return given
@@ -62,7 +62,7 @@ def declared(given: Any) -> Channels:
 
 def _declared(name: str, field: Any) -> None:
     if not isinstance(field, Field):
-        raise WrongReturn(f"{name} must be a Field(shape), or Field(shape, bool), got {_kind(field)}")
+        raise WrongReturn(f"{name} must be a Field(shape), or Field(shape, bool), got {kind(field)}")
     if not isinstance(field.shape, tuple) or not all(isinstance(size, int) and size >= 0 for size in field.shape):
         raise WrongReturn(f"{name} must have a shape like (2, 2), a tuple of whole numbers, got {field.shape!r}")
     if field.dtype not in (float, np.float64, bool, np.bool_):
@@ -76,25 +76,25 @@ def fresh(given: Any, batch: Shape, name: str = "the state") -> None:
             fresh(part, batch, f"{name}.{field}")
     elif not isinstance(given, _ARRAYS) or given.dtype.kind not in _NUMBERS or given.shape[: len(batch)] != batch:
         what = "a NamedTuple of arrays" if name == "the state" else "an array of numbers or truths"
-        raise WrongReturn(f"{name} must be {what} that begins with the batch axes, got {_shown(given, batch)}")
+        raise WrongReturn(f"{name} must be {what} that begins with the batch axes, got {shown(given, batch)}")
 
 
 def state(before: Any, given: Any, batch: Shape, name: str = "the state") -> None:
     """Refuse a state that has not the form of the state before it."""
     if isinstance(before, tuple):
         if type(given) is not type(before):
-            raise WrongReturn(f"{name} must be a {type(before).__name__}, as before, got {_shown(given, batch)}")
+            raise WrongReturn(f"{name} must be a {type(before).__name__}, as before, got {shown(given, batch)}")
         for field, old, new in zip(before._fields, before, given, strict=True):  # type: ignore[attr-defined]
             if new is not old:
                 state(old, new, batch, field if name == "the state" else f"{name}.{field}")
     elif not isinstance(given, _ARRAYS) or given.shape != before.shape or given.dtype != before.dtype:
-        raise WrongReturn(f"{name} must stay what it was, {_shown(before, batch)}, got {_shown(given, batch)}")
+        raise WrongReturn(f"{name} must stay what it was, {shown(before, batch)}, got {shown(given, batch)}")
 
 
 def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
     """What is to be broadcast, if it is what was declared."""
     if not isinstance(given, Mapping):
-        raise WrongReturn(f"what to broadcast must be a map from channels to their fields, got {_kind(given)}")
+        raise WrongReturn(f"what to broadcast must be a map from channels to their fields, got {kind(given)}")
     if given.keys() != wanted.keys():
         _differ("what to broadcast", "channels", wanted, given)
     for channel, fields in wanted.items():
@@ -108,9 +108,9 @@ def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
 
 
 def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapping[str, Shape] | None) -> Estimate:
-    """An estimate of n slots in D dimensions, if it is one; with the `reports` (..., *) of these shapes, where they are known."""
+    """An estimate of n slots in D dimensions, if it is one, and its reports have these shapes (..., *), where they are known."""
     if not isinstance(given, Estimate):
-        raise WrongReturn(f"must return an Estimate, got {_kind(given)}")
+        raise WrongReturn(f"must return an Estimate, got {kind(given)}")
     edges = (slots, dimension)
     array("relative", given.relative, "n, D", edges, batch)
     array("known", given.known, "n", (slots,), batch, _BOOL)
@@ -126,7 +126,7 @@ def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapp
 
 def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> None:
     if not isinstance(given, Mapping):
-        raise WrongReturn(f"reports must be a map from names to arrays, got {_kind(given)}")
+        raise WrongReturn(f"reports must be a map from names to arrays, got {kind(given)}")
     if wanted is not None and given.keys() != wanted.keys():
         _differ("reports", "names", wanted, given)
     for name, value in given.items():
@@ -134,10 +134,10 @@ def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> No
             raise WrongReturn(f"a report is called by a name like 'place', not {name!r}")
         numbers = isinstance(value, _ARRAYS) and value.dtype.kind in _NUMBERS
         if not numbers or value.shape[: len(batch)] != batch:
-            raise WrongReturn(f"report {name!r} must be an array of numbers (..., *), got {_shown(value, batch)}")
+            raise WrongReturn(f"report {name!r} must be an array of numbers (..., *), got {shown(value, batch)}")
         if wanted is not None and value.shape[len(batch) :] != wanted[name]:
             was = _written(wanted[name])
-            raise WrongReturn(f"report {name!r} must stay what it was, {was}, got {_shown(value, batch)}")
+            raise WrongReturn(f"report {name!r} must stay what it was, {was}, got {shown(value, batch)}")
 
 
 def _is_truth(field: Field) -> bool:
@@ -146,7 +146,7 @@ def _is_truth(field: Field) -> bool:
 
 def _differ(what: str, of: str, wanted: Mapping[str, Any], given: Any) -> NoReturn:
     if not isinstance(given, Mapping):
-        raise WrongReturn(f"{what} must be a map, got {_kind(given)}")
+        raise WrongReturn(f"{what} must be a map, got {kind(given)}")
     raise WrongReturn(f"{what} must have the {of} {sorted(wanted)}, got {sorted(map(str, given))}")
 
 
@@ -154,14 +154,17 @@ def _written(sizes: Sequence[Any]) -> str:
     return f"({', '.join(['...', *map(str, sizes)])})"
 
 
-def _shown(value: Any, batch: Shape) -> str:
+def shown(value: Any, batch: Shape | None = None) -> str:
+    """Dtype and shape of an array, without the batch axes where it has them, or what else a value is."""
     if not isinstance(value, _ARRAYS):
-        return _kind(value)
-    of_each = value.shape[: len(batch)] == batch
-    return f"{value.dtype} {_written(value.shape[len(batch) :]) if of_each else value.shape}"
+        return kind(value)
+    if batch is None or value.shape[: len(batch)] != batch:
+        return f"{value.dtype} {value.shape}"
+    return f"{value.dtype} {_written(value.shape[len(batch) :])}"
 
 
-def _kind(value: Any) -> str:
+def kind(value: Any) -> str:
+    """What a value is, for people."""
     if value is None:
         return "None"
     if isinstance(value, tuple) and not hasattr(value, "_fields"):
