@@ -95,7 +95,7 @@ def _validated(raw: dict[str, Any], origin: Source) -> Scenario:
 
 def _override(raw: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
-    *tables, name = source.steps(key)
+    *tables, name = source.parts(key)
     if not equals or not name:
         raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
     try:

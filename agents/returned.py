@@ -108,7 +108,7 @@ def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
 
 
 def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapping[str, Shape] | None) -> Estimate:
-    """An estimate of n slots in D dimensions, if it is one, and its reports have these shapes (..., *), where they are known."""
+    """An estimate of n slots in D dimensions, if it is one, and its reports have the shapes (..., *) that are known of them."""
     if not isinstance(given, Estimate):
         raise WrongReturn(f"must return an Estimate, got {kind(given)}")
     edges = (slots, dimension)
