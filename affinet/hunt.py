@@ -123,7 +123,6 @@ def hunt(
         database=None,
         deadline=None,
         suppress_health_check=list(HealthCheck),
-        report_multiple_bugs=False,
         phases=[Phase.generate, Phase.shrink],
     )
     try:
@@ -131,8 +130,13 @@ def hunt(
     except NoSuchExample:
         return None, coverage
     smallest = _without_the_needless(found, breaks)
-    broken = extended(given, [entry for fault in smallest for entry in fault])
-    evidence = _flown(broken)
+    entries = [entry for fault in smallest for entry in fault]
+    broken = extended(given, entries)
+    try:
+        evidence = _flown(broken)
+    except UserCodeError as error:
+        error.during = f"with the timeline {json.dumps(entries)}"
+        raise
     return Quarry(broken, invariant(evidence), str(evidence.outcome.digest)), coverage
 
 
@@ -151,9 +155,9 @@ def _breaks(given: Scenario, invariant: Checker, entries: Entries, coverage: Cov
         evidence = _flown(extended(given, entries))
     except (ScenarioError, PlanError):
         return None
-    except UserCodeError as error:
-        error.during = f"with the timeline {json.dumps(entries)}"
-        raise
+    except UserCodeError:
+        coverage.add(entries)
+        return True
     coverage.add(entries)
     found = invariant(evidence).verdict
     untold = evidence.outcome.verdict == "vacuous" or found == "vacuous"

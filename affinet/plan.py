@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -169,7 +171,8 @@ def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | Non
         When the user's own estimator or law does something wrong.
     """
     try:
-        return replace(_make(given), journal=journal).facing(injected)
+        with redirect_stdout(sys.stderr):  # what estimators and laws print is not between what the command says
+            return replace(_make(given), journal=journal).facing(injected)
     except ScenarioError as error:
         raise given.locate(error) from error
 

@@ -6,8 +6,6 @@ import difflib
 import importlib
 import inspect
 import re
-import sys
-from contextlib import redirect_stdout
 from types import FunctionType, ModuleType, TracebackType
 from typing import Any
 
@@ -97,8 +95,7 @@ def load(path: str) -> type:
 
 def _imported(name: str) -> ModuleType:
     try:
-        with redirect_stdout(sys.stderr):
-            return importlib.import_module(name)
+        return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{name}.".startswith(f"{error.name}."):
             raise NoSuchAlgorithm(
