@@ -9,6 +9,8 @@ import numpy as np
 from affinet.checking import Checker, Finding, every, span_of
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
+from agents.calling import Calling
+from agents.returned import WrongReturn, shown
 from analysis import consistency, localization
 from netem import channels
 from netem.fault import Fault, Verb
@@ -33,7 +35,7 @@ def always(signal: Signal, *, since: float = 0.0, until: float | None = None, na
 
     def check(evidence: Evidence) -> Finding:
         span = span_of(evidence, since, until)
-        holds = signal(evidence)[span.start : span.stop]
+        holds = _truths(name, signal, evidence)[span.start : span.stop]
         return every(
             name, evidence, span, holds, lambda tick: f"it does not hold; the error is {evidence.error[tick]:.4g} m²"
         )
@@ -46,7 +48,7 @@ def eventually(signal: Signal, *, since: float = 0.0, within: float | None = Non
 
     def check(evidence: Evidence) -> Finding:
         span = span_of(evidence, since, None if within is None else since + within)
-        holds = signal(evidence)[span.start : span.stop]
+        holds = _truths(name, signal, evidence)[span.start : span.stop]
         if not len(holds):
             return Finding(name, "vacuous", None, "the run ended before")
         if holds.any():
@@ -253,6 +255,14 @@ def summed_up(evidence: Evidence, findings: Sequence[Finding]) -> Verdict:
     verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
     ranked: tuple[Verdict, ...] = ("fail", "vacuous", "pass")
     return next(verdict for verdict in ranked if verdict in verdicts)
+
+
+def _truths(name: str, signal: Signal, evidence: Evidence) -> Mask:
+    with Calling(signal, name):
+        holds = signal(evidence)
+        if not isinstance(holds, np.ndarray) or holds.dtype != np.bool_ or holds.shape != (evidence.ticks,):
+            raise WrongReturn(f"a signal must be bool (T,) = ({evidence.ticks},), got {shown(holds)}")
+    return holds
 
 
 def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:

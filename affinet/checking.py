@@ -14,6 +14,8 @@ import numpy as np
 
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
+from agents.calling import Calling
+from agents.returned import WrongReturn, kind
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,18 @@ class Checker:
     check: Callable[[Evidence], Finding]
 
     def __call__(self, evidence: Evidence) -> Finding:
-        """What it finds in a run."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a run may have diverged
-            return self.check(evidence)
+        """What it finds in a run.
+
+        Raises
+        ------
+        UserCodeError
+            When it fails, or returns no `Finding`.
+        """
+        with np.errstate(over="ignore", invalid="ignore"), Calling(self.check, self.name):  # a run may have diverged
+            found = self.check(evidence)
+            if not isinstance(found, Finding):
+                raise WrongReturn(f"must return a Finding, got {kind(found)}")
+        return found
 
     def __and__(self, other: Checker) -> Checker:
         """Both hold: the first failure counts, else what is vacuous."""

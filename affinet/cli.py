@@ -1,6 +1,6 @@
 """The `affinet` command.
 
-Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 130 interrupted.
+Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 3 a user's own code failed (estimator, law or module), 130 interrupted.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
@@ -28,14 +29,16 @@ from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import ScenarioError
 from affinet.words import among, one_line
+from netem.user_code import UserCodeError
 from world import history
 
 if TYPE_CHECKING:
     from affinet.checking import Checker
     from affinet.hunt import Quarry
+    from affinet.outcome import Outcome
     from affinet.study import Result
 
-PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+PASS, FAIL, BAD_INPUT, USER_CODE, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def command() -> None:
@@ -53,10 +56,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
+    except UserCodeError as error:
+        print(f"{error}; traceback: {_kept(error)}", file=sys.stderr)  # noqa: T201
+        return USER_CODE
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     return status
+
+
+def _kept(error: UserCodeError) -> str:
+    """The file that has the traceback: there is no run directory."""
+    with tempfile.NamedTemporaryFile("w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8") as log:
+        traceback.print_exception(error, file=log)
+    return log.name
+
+
+def _status(outcome: Outcome) -> int:
+    if outcome.user_code:
+        print(f"traceback: in {Path(outcome.out) / 'logs'}", file=sys.stderr)  # noqa: T201
+        return USER_CODE
+    return PASS if outcome.verdict == "pass" else FAIL
 
 
 def _overrides(parsed: argparse.Namespace) -> list[str]:
@@ -115,9 +135,9 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
         for number, runtime in enumerate(runs):
             with show.Progress(plan, runtime, Path(folder) / str(number)) as watch:
                 done = fly(plan, runtime, Path(folder) / str(number), watch.see)
-            if done.digest is None:
+            if done.digest is None or done.user_code:
                 print(f"{runtime}: {'; '.join(done.reasons)}", file=sys.stderr)  # noqa: T201
-                return FAIL
+                return USER_CODE if done.user_code else FAIL
             flown.append(history.load(Path(folder) / str(number) / history.FILE))
     for runtime, arrays in zip(runs[1:], flown[1:], strict=True):
         if difference := compare.first_difference(flown[0], arrays, plan.world.links, plan.channels):
@@ -216,7 +236,7 @@ def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
         print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
     else:
         show.outcome(outcome, plan)
-    return PASS if outcome.verdict == "pass" else FAIL
+    return _status(outcome)
 
 
 def _inject(parsed: argparse.Namespace) -> int:

@@ -20,6 +20,7 @@ from affinet.scenario import extended
 from affinet.sections import Scenario, ScenarioError
 from affinet.testing import strategies
 from affinet.testing.strategies import Entries
+from netem.user_code import UserCodeError
 
 
 @dataclass
@@ -97,6 +98,8 @@ def hunt(
     ------
     ScenarioError
         When the invariant fails with no fault added.
+    UserCodeError
+        When a user's own estimator or law does something wrong, under the smallest schedule found that makes it do so.
     """
     undisturbed = invariant(_flown(given))
     if undisturbed.verdict == "fail":
@@ -127,8 +130,13 @@ def hunt(
     except NoSuchExample:
         return None, coverage
     smallest = _without_the_needless(found, breaks)
-    broken = extended(given, [entry for fault in smallest for entry in fault])
-    evidence = _flown(broken)
+    entries = [entry for fault in smallest for entry in fault]
+    broken = extended(given, entries)
+    try:
+        evidence = _flown(broken)
+    except UserCodeError as error:
+        error.during = f"with the timeline {json.dumps(entries)}"
+        raise
     return Quarry(broken, invariant(evidence), str(evidence.outcome.digest)), coverage
 
 
@@ -147,6 +155,9 @@ def _breaks(given: Scenario, invariant: Checker, entries: Entries, coverage: Cov
         evidence = _flown(extended(given, entries))
     except (ScenarioError, PlanError):
         return None
+    except UserCodeError:
+        coverage.add(entries)
+        return True
     coverage.add(entries)
     found = invariant(evidence).verdict
     untold = evidence.outcome.verdict == "vacuous" or found == "vacuous"

@@ -6,7 +6,9 @@ this file. The answers are equal bit for bit.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import redirect_stdout
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +27,7 @@ from netem.links import Integers, Mask
 from netem.medium import Medium
 from netem.plain import to_plain
 from netem.timeline import Conditions
+from netem.user_code import UserCodeError
 from world.history import UNTOLD, Moment, Moments, Vigil, gather
 from world.world import Scene
 
@@ -86,15 +89,33 @@ class Swarm:
         return self._air.in_flight
 
     def fly(self, watch: Callable[[Moments, Array], None], batch: int) -> None:
-        """All ticks; `watch` sees them, a batch at a time, and where the last of them led."""
-        world, moments = self._plan.world, list[Moment]()
-        with np.errstate(over="ignore", invalid="ignore"):
-            for instant in self.ticks():
-                moments.append(self.moment(instant))
-                if len(moments) == batch or instant.tick == world.ticks - 1:
-                    gathered = gather(self.timeline, instant.tick + 1 - len(moments), moments)
-                    watch(gathered, instant.following.position)
-                    moments = []
+        """All ticks; `watch` sees them, a batch at a time, and where the last of them led.
+
+        Raises
+        ------
+        UserCodeError
+            When estimator or law do something wrong; `watch` has seen the ticks before.
+        """
+        flown = list[tuple[Instant, Moment]]()
+        # What estimators print goes where their processes' logs would have it, and not between what the command says.
+        with np.errstate(over="ignore", invalid="ignore"), redirect_stdout(sys.stderr):
+            try:
+                for instant in self.ticks():
+                    flown.append((instant, self.moment(instant)))
+                    if len(flown) == batch:
+                        flown = self._show(watch, flown)
+            except UserCodeError:
+                self._show(watch, flown)
+                raise
+            self._show(watch, flown)
+
+    def _show(
+        self, watch: Callable[[Moments, Array], None], flown: list[tuple[Instant, Moment]]
+    ) -> list[tuple[Instant, Moment]]:
+        if flown:
+            gathered = gather(self.timeline, flown[0][0].tick, [moment for _, moment in flown])
+            watch(gathered, flown[-1][0].following.position)
+        return []
 
     def ticks(self) -> Iterator[Instant]:
         """Tick after tick; a swarm that diverges overflows, and whoever flies it knows."""
@@ -110,7 +131,11 @@ class Swarm:
                 state = renew(state, fresh, np.isin(agents, [*cold]))
             now = timeline.at(tick)
             measured = world.measure(tick, scene, now)
-            state, action, verdicts, delivery = self._tick(tick, scene, measured, state)
+            try:
+                state, action, verdicts, delivery = self._tick(tick, scene, measured, state)
+            except UserCodeError as error:
+                error.tick = tick
+                raise
             flown = world.flown(scene, np.where(now.idle[:, None], 0.0, action.input), now)
             vigil.see(tick, scene, timeline)
             following = world.step(tick, scene, measured, flown, now)

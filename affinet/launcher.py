@@ -6,13 +6,13 @@ import secrets
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from affinet.inject import Access
 from affinet.plan import Plan
-from affinet.supervision import Child, Crew, RunFailed, module
+from affinet.supervision import Child, Crew, RunFailed, UserCodeFailed, module
 from agents.centre import Centre
 from agents.centre_process import CentreBrief
 from agents.process import AgentBrief
@@ -35,8 +35,8 @@ class Flight:
         Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
     fired
         In which tick each trigger fired that did.
-    failure
-        Why the run ended early, if it did.
+    failure, user_code
+        Why the run ended early, if it did, and whether a user's own code is why.
     start_s, wall_s
         From the first process started to the first tick, and from there to the end, in seconds.
     processes
@@ -47,6 +47,7 @@ class Flight:
     uninstructed: int | None = None
     fired: dict[int, int] = field(default_factory=dict)
     failure: str | None = None
+    user_code: bool = False
     start_s: float = 0.0
     wall_s: float = 0.0
     processes: list[dict[str, Any]] = field(default_factory=list)
@@ -102,6 +103,7 @@ class Launcher:
                         self._fly(crew, launched)
             except RunFailed as failure:
                 self.flight.failure = str(failure)
+                self.flight.user_code = isinstance(failure, UserCodeFailed)
         self.flight.processes = [child.report() for child in crew.children]
         _remove_unwritten(self._out)
         return self.flight
@@ -225,8 +227,7 @@ class Launcher:
 
     def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
         plan, row = self._plan, number - 1
-        whole, links = plan.brief, plan.world.links
-        told = bool(plan.told_mission[row])
+        links = plan.world.links
         return AgentBrief(
             run=self._run,
             login=login,
@@ -237,7 +238,8 @@ class Launcher:
             leaders=plan.scenario.agents.leaders,
             leader_gain=plan.scenario.agents.leader_gain,
             limit=plan.scenario.agents.limit,
-            brief=replace(whole.of(row), mission=whole.mission if told else None),
+            reports=plan.reports,
+            brief=plan.brief_of(row),
             checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
             remembers=remembers,
         )

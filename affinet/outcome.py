@@ -28,11 +28,12 @@ class Outcome:
 
     `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
     where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
-    they came to lie, `faults` what each took hold of.
+    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early.
     """
 
     verdict: Verdict
     reasons: tuple[str, ...]
+    user_code: bool
     digest: str | None
     flown: dict[str, Any]
     ticks: int
@@ -81,6 +82,7 @@ def judge(
     in_flight: int | None,
     uninstructed: int | None,
     failure: str | None,
+    user_code: bool,
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
@@ -97,8 +99,8 @@ def judge(
         What happened; None when the run left nothing.
     in_flight, uninstructed
         Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
-    failure
-        Why the run ended early, if it did.
+    failure, user_code
+        Why the run ended early, if it did, and whether a user's own code is why.
     wall_s
         From the first tick to the last, in seconds.
     processes, out
@@ -118,6 +120,7 @@ def judge(
     return Outcome(
         verdict=verdict,
         reasons=tuple(reasons),
+        user_code=user_code,
         digest=None if arrays is None else digest(arrays),
         flown=_flown(plan),
         ticks=ticks,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from affinet import air, checks, registry, scenario, script, sections
+from affinet import air, checks, registry, scenario, script, sections, tryout
 from affinet.blueprint import brief_of, formation_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
 from agents.brief import Brief, Mask
+from agents.calling import Calling
 from agents.centre import Centre
 from agents.controllers import Law, needs_mission
-from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.jor import JacobiOverRelaxation
 from agents.process import Choice
 from analysis.information import reported
-from analysis.pursuit import Sighting
+from analysis.unsuited import Unsuited
 from netem import channels
 from netem.fault import Fault, Verb
 from netem.medium import Verdicted, recorded
@@ -33,7 +35,6 @@ from netem.trigger import Trigger
 from world import stress
 from world.brief import Books
 from world.formation import Array, Formation
-from world.history import TAKEN
 from world.world import World
 
 
@@ -136,7 +137,16 @@ class Plan:
     @property
     def agents(self) -> Agent:
         """All agents, as one batch."""
-        return _agents(self.scenario, self.brief, self.estimator, self.law)
+        return _agents(self.scenario, self.brief, self.estimator, self.law, self.reports)
+
+    def brief_of(self, row: int) -> Brief:
+        """All that one agent is told, in a process of its own."""
+        told = bool(self.told_mission[row])
+        return replace(self.brief.of(row), mission=self.brief.mission if told else None)
+
+    def alone(self, row: int) -> Agent:
+        """One of the agents, as it flies in a process of its own."""
+        return _agents(self.scenario, self.brief_of(row), self.estimator, self.law, self.reports)
 
 
 def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | None = None) -> Plan:
@@ -157,9 +167,12 @@ def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | Non
         When something in it names what does not exist.
     PlanError
         When it cannot fly.
+    UserCodeError
+        When the user's own estimator or law does something wrong.
     """
     try:
-        return replace(_make(given), journal=journal).facing(injected)
+        with redirect_stdout(sys.stderr):  # what estimators and laws print is not between what the command says
+            return replace(_make(given), journal=journal).facing(injected)
     except ScenarioError as error:
         raise given.locate(error) from error
 
@@ -199,7 +212,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool) -> Plan:
 
 
 def _make(given: Scenario) -> Plan:
-    registry.check_names("agents.parameters", given.agents.parameters)
+    registry.check_parameters(given.agents.parameters)
     formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
@@ -213,15 +226,15 @@ def _make(given: Scenario) -> Plan:
     played = script.write(given, formation, world.links)
     if isinstance(estimator.build(), CentralizedFilter):
         _refuse_absences(played.faults)
-    agents = _agents(given, brief, estimator, law)
-    with sections.said_at("agents"):
-        reports = _try_out(agents)
+    agents = _agents(given, brief, estimator, law, None)
+    with registry.refusing("agents", Unsuited):
+        reports = tryout.silent_tick(agents)
     spoken = agents.channels()
-    names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
+    names = (channels.SENSE, *sorted([channels.MEASUREMENT, *spoken]))
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
     own, aired = air.plan(given, formation, world.links, bits)
     degraded = tuple(air.degraded(given, formation, world.links, bits, *named) for named in played.profiles)
-    return Plan(
+    plan = Plan(
         scenario=given,
         world=world,
         profiles=(own, *degraded),
@@ -234,6 +247,9 @@ def _make(given: Scenario) -> Plan:
         reports=reports,
         findings=(*findings, *aired, *checks.timeline(played.faults, given.time.ticks, given.time.dt)),
     )
+    with registry.refusing("agents", Unsuited):
+        tryout.alone(plan.alone, plan.positioned)
+    return plan
 
 
 def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: Any) -> tuple[list[Finding], Array]:
@@ -263,14 +279,13 @@ def _refuse_fatal(findings: Sequence[Finding]) -> None:
 
 
 def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
-    choice = registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
-    with sections.said_at(f"agents.parameters.{name}"):
-        choice.build()
-    return choice
+    return registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
 
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
-    if getattr(law, "order", None) not in range(1, len(sections.INTEGRATORS) + 1):
+    with Calling(law, "order"):
+        order = getattr(law, "order", None)
+    if order not in range(1, len(sections.INTEGRATORS) + 1):
         raise ScenarioError(
             f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations, 3 if jerks, "
             "4 if snaps"
@@ -294,9 +309,11 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
         )
 
 
-def _agents(given: Scenario, brief: Brief, estimator: Choice, law: Choice) -> Agent:
+def _agents(
+    given: Scenario, brief: Brief, estimator: Choice, law: Choice, reports: Mapping[str, tuple[int, ...]] | None
+) -> Agent:
     flown = given.agents
-    return Agent(brief, estimator.build(), law.build(), flown.leaders, flown.leader_gain, flown.limit)
+    return Agent(brief, estimator.build(), law.build(), flown.leaders, flown.leader_gain, flown.limit, reports)
 
 
 def _refuse_absences(faults: Sequence[Fault]) -> None:
@@ -304,28 +321,6 @@ def _refuse_absences(faults: Sequence[Fault]) -> None:
         raise ScenarioError(
             "timeline: the centralized filter waits for every agent in every tick; nobody can be killed or paused"
         )
-
-
-def _try_out(agents: Agent) -> Mapping[str, tuple[int, ...]]:
-    """One tick in silence: what law and estimator want of each other shows before anything starts; what will be reported."""
-    brief, batch = agents.brief, agents.brief.present.shape[:1]
-    nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
-    motion = np.repeat(nowhere[:, None], agents.law.order - 1, axis=1) if agents.law.order > 1 else None
-    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, motion)
-    silence = {
-        channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
-        for channel, fields in agents.channels().items()
-    }
-    unseen = np.zeros_like(brief.relative)
-    told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
-    sighting = None
-    if brief.target is not None:
-        sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), *np.zeros((2, *batch), dtype=np.int64))
-    _, action = agents.act(state, 0, {**silence, channels.CENTRE: Heard(told, nobody)}, nowhere, motion, sighting)
-    reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
-    if taken := sorted(reports.keys() & TAKEN):
-        raise ValueError(f"the estimator reports {', '.join(taken)}, which every run has already: give it another name")
-    return reports
 
 
 def _tick(seconds: float, dt: float) -> int:

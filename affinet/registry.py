@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterable
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import is_dataclass
 from importlib.metadata import entry_points
-from typing import Any, get_type_hints
+from typing import Any
 
-from pydantic import ConfigDict, ValidationError, create_model
-
-from affinet import explain
 from affinet.sections import ScenarioError
-from affinet.words import among, hint
+from affinet.words import among
+from agents import parameters
+from agents.calling import Calling, NoSuchAlgorithm, load, name_of
+from agents.controllers import Law
+from agents.estimators.base import Estimator
+from agents.parameters import ParameterError
 from agents.process import Choice
+from netem.user_code import UserCodeError, definition
 
 ESTIMATORS = "affinet.estimators"
 LAWS = "affinet.controllers"
+_PROTOCOLS: Mapping[str, tuple[type, tuple[str, ...]]] = {
+    ESTIMATORS: (Estimator, ("channels", "init", "sense", "fuse")),
+    LAWS: (Law, ("init", "command")),
+}
 
 
 def names(group: str) -> list[str]:
@@ -24,7 +31,7 @@ def names(group: str) -> list[str]:
     return sorted(point.name for point in entry_points(group=group))
 
 
-def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choice:
+def choose(group: str, key: str, name: str, given: Mapping[str, Any]) -> Choice:
     """The algorithm of this name with these parameters, checked against its fields.
 
     Parameters
@@ -35,59 +42,99 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         Of the scenario, for error messages.
     name
         An entry point, or "module:Class".
-    parameters
-        Keyword arguments; those not given keep their defaults.
+    given
+        Its parameters; those not given keep their defaults.
 
     Raises
     ------
     ScenarioError
         When there is no such algorithm, or it has no such parameter, or a value does not fit.
+    UserCodeError
+        When its module cannot be imported, or it is not what an algorithm of this group has to be.
     """
     path = _path(group, key, name)
     algorithm = _load(key, path)
-    if not is_dataclass(algorithm):
-        raise ScenarioError(f"{key}: {path} is not a dataclass of its parameters")
-    hints = get_type_hints(algorithm)
-    known: dict[str, Any] = {field.name: (hints[field.name], field.default) for field in fields(algorithm)}
-    model = create_model("Parameters", __config__=ConfigDict(extra="forbid", strict=True), **known)
-    try:
-        checked = model.model_validate(parameters)
-    except ValidationError as error:
-        (first, *_) = error.errors()
-        where = f"agents.parameters.{name}.{'.'.join(map(str, first['loc']))}"
-        wrong = explain.wrong(first, model)
-        if first["type"] == "extra_forbidden":
-            wrong = f"unknown; {hint(first['loc'][0], known)}".rstrip("; ")
-        raise ScenarioError(f"{where}: {wrong}; {name} has {', '.join(known) or 'no parameters'}") from error
-    return Choice(path, checked.model_dump())
+    _refuse_another_kind(group, algorithm)
+    return _made(name, path, algorithm, given)
 
 
-def check_names(key: str, given: Iterable[str]) -> None:
-    """Refuse parameters of an algorithm that does not exist.
+def check_parameters(given: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse parameters that do not fit, also of algorithms that are not in use: a study may choose them.
 
     Raises
     ------
     ScenarioError
-        When a name is neither an entry point nor "module:Class".
+        When there is no such algorithm, or it has no such parameter, or a value does not fit.
+    UserCodeError
+        When its module cannot be imported.
     """
-    known = [*names(ESTIMATORS), *names(LAWS)]
-    for name in given:
-        if name not in known and ":" not in name:
-            raise ScenarioError(f"{key}.{name}: no such estimator or law; {among(name, known)}")
+    offered = {
+        point.name: f"{point.module}:{point.attr}" for group in _PROTOCOLS for point in entry_points(group=group)
+    }
+    for name, table in given.items():
+        key = f"agents.parameters.{name}"
+        if name not in offered and ":" not in name:
+            raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(offered))}")
+        path = offered.get(name, name)
+        _made(name, path, _load(key, path), table)
+
+
+@contextmanager
+def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
+    """What an algorithm refuses by such an error is a problem of the scenario's key; whatever else it does is its own."""
+    try:
+        yield
+    except UserCodeError as error:
+        if isinstance(error.__cause__, refusal):
+            raise ScenarioError(f"{key}: {error.__cause__}") from error
+        raise
 
 
 def _path(group: str, key: str, name: str) -> str:
     if ":" in name:
         return name
-    offered = {point.name: point.value for point in entry_points(group=group)}
+    offered = {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}
     if name not in offered:
         raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(offered))}, or give 'module:Class'")
     return offered[name]
 
 
-def _load(key: str, path: str) -> Any:
-    module, _, attribute = path.partition(":")
+def _load(key: str, path: str) -> type:
     try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+        algorithm = load(path)
+    except NoSuchAlgorithm as error:
         raise ScenarioError(f"{key}: cannot load {path}: {error}") from error
+    if not is_dataclass(algorithm):
+        raise UserCodeError(name_of(algorithm), "is not a dataclass of its parameters", definition(algorithm))
+    return algorithm
+
+
+def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any]) -> Choice:
+    key = f"agents.parameters.{name}"
+    try:
+        with Calling(algorithm, "__init__"):
+            parameters.arguments(algorithm, given)
+    except UserCodeError as error:
+        if isinstance(refused := error.__cause__, ParameterError):
+            known = ", ".join(parameters.names(algorithm)) or "no parameters"
+            where, says = ".".join([key, *refused.path]), refused.says
+            raise ScenarioError(f"{where}: {says}; {name} has {known}") from error
+        raise
+    choice = Choice(path, dict(given))
+    with refusing(key, ValueError):
+        choice.build()
+    return choice
+
+
+def _refuse_another_kind(group: str, algorithm: type) -> None:
+    protocol, methods = _PROTOCOLS[group]
+    missing = [method for method in methods if not _has(algorithm, method, protocol)]
+    if missing:
+        has_no = f"has no method {', '.join(missing)}: {protocol.__name__} in docs/estimators.md says what each does"
+        raise UserCodeError(name_of(algorithm), has_no, definition(algorithm))
+
+
+def _has(algorithm: type, method: str, protocol: type) -> bool:
+    written = getattr(algorithm, method, None)
+    unwritten: frozenset[str] = getattr(algorithm, "__abstractmethods__", frozenset())
+    return callable(written) and written is not getattr(protocol, method) and method not in unwritten

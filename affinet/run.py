@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
@@ -14,6 +15,7 @@ from affinet.launcher import Launcher
 from affinet.outcome import Outcome
 from affinet.plan import Plan
 from affinet.rerun_command import mend
+from netem.user_code import UserCodeError
 from world import history
 from world.formation import Array
 from world.history import History, Moments
@@ -50,7 +52,13 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
 
 
 def rehearse(plan: Plan) -> Evidence:
-    """Run a plan in this process, and leave nothing behind."""
+    """Run a plan in this process, and leave nothing behind.
+
+    Raises
+    ------
+    UserCodeError
+        When estimator or law do something wrong.
+    """
     swarm, flown = Swarm(plan), History(plan.world, len(plan.channels), plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
@@ -80,6 +88,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
         in_flight=flight.in_flight,
         uninstructed=flight.uninstructed,
         failure=flight.failure,
+        user_code=flight.user_code,
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
@@ -98,21 +107,37 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
             logbook.write(moments, swarm.timeline)
             watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
 
-        swarm.fly(see, books.batch)
+        failure = _flown(swarm, see, books.batch, out)
     wall_s = time.perf_counter() - started
-    flown.save(out / history.FILE)
-    return _judged(plan, swarm, flown, wall_s, out).outcome
+    if flown.ticks:
+        flown.save(out / history.FILE)
+    return _judged(plan, swarm, flown, wall_s, out, failure).outcome
 
 
-def _judged(plan: Plan, swarm: Swarm, flown: History, wall_s: float, out: Path) -> Evidence:
+def _flown(swarm: Swarm, see: Callable[[Moments, Array], None], batch: int, out: Path) -> UserCodeError | None:
+    """Why the swarm did not fly to the end, if it did not; its log has the traceback."""
+    try:
+        swarm.fly(see, batch)
+    except UserCodeError as error:
+        log = out / "logs" / "inprocess.log"
+        log.parent.mkdir(exist_ok=True)
+        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+        return error
+    return None
+
+
+def _judged(
+    plan: Plan, swarm: Swarm, flown: History, wall_s: float, out: Path, failure: UserCodeError | None = None
+) -> Evidence:
     arrays = flown.arrays()
     done = outcome.judge(
         plan,
         swarm.timeline,
-        arrays,
+        arrays if flown.ticks else None,
         in_flight=swarm.in_flight,
         uninstructed=0,
-        failure=None,
+        failure=None if failure is None else str(failure),
+        user_code=failure is not None,
         wall_s=wall_s,
         processes=[],
         out=out,

@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from affinet import files
+from affinet import files, source
 from affinet.explain import explained
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
@@ -80,20 +80,20 @@ def _verbs(given: Scenario) -> dict[str, Any]:
     return {"timeline": entries} if entries else {}
 
 
-def _validated(raw: dict[str, Any], source: Source) -> Scenario:
-    for override in source.overrides:
+def _validated(raw: dict[str, Any], origin: Source) -> Scenario:
+    for override in origin.overrides:
         _override(raw, override)
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError(explained(error, Scenario, source)) from error
-    scenario._source = source
+        raise ScenarioError(explained(error, Scenario, origin)) from error
+    scenario._source = origin
     return scenario
 
 
 def _override(raw: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
-    *tables, name = key.strip().split(".")
+    *tables, name = source.parts(key)
     if not equals or not name:
         raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
     try:

@@ -163,7 +163,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console = Console()
     console.print(table)
     for reason in outcome.reasons:
-        console.print(reason, markup=False, highlight=False)
+        console.print(reason, markup=False, highlight=False, soft_wrap=True)
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:

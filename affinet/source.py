@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+_DOT = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")  # not inside quotes
+
 
 @dataclass(frozen=True)
 class Source:
@@ -17,12 +19,25 @@ class Source:
 
     def place(self, key: str) -> str:
         """Where a key was given: --set, or the file with the line of the key."""
-        given = [override.partition("=")[0].strip() for override in self.overrides]
+        given = [".".join(parts(override.partition("=")[0])) for override in self.overrides]
         if any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given):
             return "--set"
         steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
         line = _line_of(self.text, steps)
         return f"{self.file}:{line}" if line else self.file
+
+
+def parts(key: str) -> list[str]:
+    """The parts of a key as TOML writes it: a part in quotes may have dots in it."""
+    return [_unquoted(part.strip()) for part in _DOT.split(key)]
+
+
+def _unquoted(part: str) -> str:
+    return part[1:-1] if len(part) > 1 and part[0] == part[-1] and part[0] in "\"'" else part
+
+
+def _header(line: str) -> str:
+    return line.strip().replace('"', "").replace("'", "")
 
 
 def _line_of(text: str, steps: Sequence[str | int]) -> int | None:
@@ -32,7 +47,7 @@ def _line_of(text: str, steps: Sequence[str | int]) -> int | None:
     lines = text.splitlines()
     for depth in range(len(names), -1, -1):
         header = ".".join(names[:depth])
-        heads = [n for n, line in enumerate(lines) if header and line.strip() in (f"[{header}]", f"[[{header}]]")]
+        heads = [n for n, line in enumerate(lines) if header and _header(line) in (f"[{header}]", f"[[{header}]]")]
         start = heads[min(number, len(heads) - 1)] if heads else (-1 if not header else None)
         if start is None:
             continue

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -30,6 +30,7 @@ from affinet.study_checks import Wrong
 from analysis.graph import adjacency
 from analysis.indicator import Bounds, bounds
 from netem.links import Mask
+from netem.user_code import UserCodeError
 
 Labels = dict[str, str]
 _FOLDER = "studies"
@@ -233,7 +234,9 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
 def fly(planned: Sequence[tuple[Case, Plan]], runs: int) -> Iterator[Result]:
     """So many runs of each case, as many cases at a time as there are processors; each as it is done."""
     with closing(in_processes(_fly, [(plan, runs) for _, plan in planned])) as flown:
-        for (case, plan), done in zip(planned, flown, strict=True):
+        for case, plan in planned:
+            with _in_case(case):
+                done = next(flown)
             yield Result(case.labels, plan, done)
 
 
@@ -244,6 +247,8 @@ def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
     ------
     ScenarioError
         When something cannot.
+    UserCodeError
+        When a user's own estimator or law does something wrong.
     """
     todo = list(cases(study, quick=quick))
     study.refuse(study_checks.of_cases(study, todo, study.size(quick=quick).runs))
@@ -254,10 +259,21 @@ def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
 
 def _planned(study: Study, case: Case) -> Plan:
     try:
-        return planning.make(scenarios.load(study.scenario, case.overrides))
+        with _in_case(case):
+            return planning.make(scenarios.load(study.scenario, case.overrides))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
         raise ScenarioError(f"{where}case {study_checks.named(case.labels)}: {error}") from error
+
+
+@contextmanager
+def _in_case(case: Case) -> Iterator[None]:
+    """What a user's own code does wrong in the block, it does in this case."""
+    try:
+        yield
+    except UserCodeError as error:
+        error.during = f"case {study_checks.named(case.labels)}"
+        raise
 
 
 def _every(plan: Plan) -> int:

@@ -34,6 +34,10 @@ class RunFailed(RuntimeError):
     """The run ended before its last tick: why."""
 
 
+class UserCodeFailed(RunFailed):
+    """It did because a user's own code did something wrong."""
+
+
 @dataclass
 class Child:
     """A process of the run.
@@ -209,7 +213,8 @@ class Crew:
         for line in lines:
             event = json.loads(line)
             if event["event"] == "failed":
-                raise RunFailed(f"{child.name}: {event['reason']}")
+                failure = UserCodeFailed if event.get("user_code") else RunFailed
+                raise failure(f"{child.name}: {event['reason']}")
             if event["event"] == "done":  # it has done its part: agents leave while the world still writes
                 child.expected_to_die = True
             child.events.append(event)

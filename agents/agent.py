@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents import second_order
+from agents import returned, second_order
 from agents.brief import DERIVATIVES, Array, Brief, Mask, Own, Reading
+from agents.calling import Calling
 from agents.controllers import Law, hold_distances, pilot, saturated
 from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
 from analysis.affine import Manoeuvre
@@ -48,6 +50,13 @@ class Agent:
         How hard a leader pulls toward its target, per second; or toward its distances, per second and square metre.
     limit
         The longest input its body takes, in metres per second, or per second squared; None for any.
+    reports
+        What the estimator reports, and the shape of each for one agent; None as long as nobody knows.
+
+    Raises
+    ------
+    UserCodeError
+        By all its methods: when estimator or law fail, or return something else than was asked of them.
     """
 
     brief: Brief
@@ -56,19 +65,27 @@ class Agent:
     leaders: Literal["pilot", "distances"]
     leader_gain: float
     limit: float | None
+    reports: Mapping[str, tuple[int, ...]] | None = None
 
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
         moves = DERIVATIVES[: self.law.order]
-        return {INPUT: {name: Field((self.brief.dimension,)) for name in moves}, **self.estimator.channels(self.brief)}
+        return {INPUT: {name: Field((self.brief.dimension,)) for name in moves}, **self._spoken}
+
+    @cached_property
+    def _spoken(self) -> Channels:
+        with Calling(self.estimator, "channels"):
+            return returned.declared(self.estimator.channels(self.brief))
 
     def init(self, batch: tuple[int, ...]) -> AgentState:
         """A fresh agent, or a batch of them."""
-        return AgentState(
-            estimator=self.estimator.init(self.brief, batch),
-            law=self.law.init(self.brief, batch),
-            input=np.zeros((*batch, self.brief.dimension)),
-        )
+        with Calling(self.estimator, "init"):
+            estimator = self.estimator.init(self.brief, batch)
+            returned.fresh(estimator, batch)
+        with Calling(self.law, "init"):
+            law = self.law.init(self.brief, batch)
+            returned.fresh(law, batch)
+        return AgentState(estimator, law, input=np.zeros((*batch, self.brief.dimension)))
 
     def sense(
         self, state: AgentState, measured: Array, seen: Mask, motion: Array | None
@@ -78,7 +95,11 @@ class Agent:
         The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
         (..., m - 1, D) of integrators of an order m above 1.
         """
-        estimator, said = self.estimator.sense(self.brief, state.estimator, measured, seen)
+        with Calling(self.estimator, "sense"):
+            told = self.estimator.sense(self.brief, state.estimator, measured, seen)
+            estimator, said = returned.pair(told, "the state, and what to broadcast")
+            returned.state(state.estimator, estimator, seen.shape[:-1])
+            returned.said(self._spoken, said, seen.shape[:-1])
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
         return state._replace(estimator=estimator), {INPUT: dict(zip(DERIVATIVES, moves, strict=False)), **said}
 
@@ -99,8 +120,8 @@ class Agent:
         brief = self.brief
         velocity, higher = (state.input, None) if motion is None else (motion[..., 0, :], motion[..., 1:, :])
         own = Own(velocity, state.input, tick, position, sighting, higher)
-        estimator, estimate = self.estimator.fuse(brief, state.estimator, heard, own)
-        law, steered = self.law.command(brief, state.law, tick, own, estimate, heard[INPUT])
+        estimator, estimate = self._fused(state, heard, own)
+        law, steered = self._commanded(state, tick, own, estimate, heard[INPUT])
         if self.leaders == "distances":
             held = hold_distances(brief, self.leader_gain, estimate)
             steered = np.where(brief.leader[..., None], held, steered)
@@ -110,6 +131,25 @@ class Agent:
         if self.limit is not None:
             steered = saturated(steered, self.limit)
         return AgentState(estimator, law, steered), Action(steered, estimate)
+
+    def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
+        batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
+        with Calling(self.estimator, "fuse"):
+            told = self.estimator.fuse(self.brief, state.estimator, heard, own)
+            estimator, estimate = returned.pair(told, "the state, and an Estimate")
+            returned.state(state.estimator, estimator, batch)
+            return estimator, returned.estimate(estimate, slots, dimension, batch, self.reports)
+
+    def _commanded(
+        self, state: AgentState, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
+    ) -> tuple[Any, Array]:
+        batch = state.input.shape[:-1]
+        with Calling(self.law, "command"):
+            told = self.law.command(self.brief, state.law, tick, own, estimate, inputs)
+            law, steered = returned.pair(told, "the state, and the input")
+            returned.state(state.law, law, batch)
+            returned.array("the input", steered, "D", (self.brief.dimension,), batch)
+            return law, steered
 
     def _led(self, mission: Manoeuvre, tick: Reading, position: Array, velocity: Array) -> Array:
         if self.law.order == 1:

@@ -14,6 +14,7 @@ import numpy as np
 from agents.brief import Array, Brief, Own, Reading
 from agents.estimators.base import Estimate, Heard
 from analysis.affine import Manoeuvre
+from analysis.unsuited import Unsuited
 
 State = TypeVar("State")
 
@@ -198,10 +199,10 @@ class VaryingVelocity:
             return heard
         if self.source == "estimated":
             if estimate.relative_velocity is None:
-                raise ValueError("the velocity source 'estimated' needs an estimator that tracks relative velocities")
+                raise Unsuited("the velocity source 'estimated' needs an estimator that tracks relative velocities")
             return own.velocity[..., None, :] - estimate.relative_velocity
         if brief.mission is None:
-            raise ValueError("the velocity source 'feed-forward' needs the mission in the brief")
+            raise Unsuited("the velocity source 'feed-forward' needs the mission in the brief")
         of_edges = tick if isinstance(tick, int) else tick[..., None]
         return brief.mission.velocity(of_edges, brief.nominal[..., None, :] - brief.relative, brief.dt)
 

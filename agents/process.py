@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,10 @@ from typing import Any, Literal
 import numpy as np
 import zenoh
 
-from agents import checkpoint
+from agents import checkpoint, parameters
 from agents.agent import Agent, AgentState
 from agents.brief import Array, Brief
+from agents.calling import Calling, load
 from agents.estimators.base import Heard
 from agents.estimators.centralized import CentralizedFilter
 from analysis.pursuit import Sighting
@@ -22,19 +22,27 @@ from netem.keys import Keys
 from netem.sequence import Numbering, Sequences
 from netem.session import Login, await_subscribers, client
 from netem.supervised import Supervisor
+from netem.user_code import UserCodeError
 
 
 @dataclass(frozen=True)
 class Choice:
-    """An algorithm to run: "module:Class", and its parameters."""
+    """An algorithm to run: "module:Class", and those of its parameters that were given, as a scenario says them."""
 
     path: str
     parameters: dict[str, Any]
 
     def build(self) -> Any:
-        """The algorithm."""
-        module, _, name = self.path.partition(":")
-        return getattr(importlib.import_module(module), name)(**self.parameters)
+        """The algorithm.
+
+        Raises
+        ------
+        UserCodeError
+            When its module cannot be imported, or the algorithm not be made.
+        """
+        algorithm = load(self.path)
+        with Calling(algorithm, "__init__"):
+            return algorithm(**parameters.arguments(algorithm, self.parameters))
 
 
 @dataclass(frozen=True)
@@ -47,7 +55,7 @@ class AgentBrief:
         Where it connects, and as whom.
     agent, neighbours
         Its number, and the numbers of the agents in its neighbour slots.
-    estimator, law, leaders, leader_gain, limit, brief
+    estimator, law, leaders, leader_gain, limit, reports, brief
         What `Agent` is made of.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
@@ -62,6 +70,7 @@ class AgentBrief:
     leaders: Literal["pilot", "distances"]
     leader_gain: float
     limit: float | None
+    reports: Mapping[str, tuple[int, ...]]
     brief: Brief
     checkpoint: str | None
     remembers: bool
@@ -75,7 +84,13 @@ class Node:
         self._neighbours = brief.neighbours
         self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
         self._agent = Agent(
-            brief.brief, brief.estimator.build(), brief.law.build(), brief.leaders, brief.leader_gain, brief.limit
+            brief.brief,
+            brief.estimator.build(),
+            brief.law.build(),
+            brief.leaders,
+            brief.leader_gain,
+            brief.limit,
+            brief.reports,
         )
         self._width, self._dimension = brief.brief.relative.shape
         self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
@@ -112,13 +127,17 @@ class Node:
         while True:
             inbox = wire.unpack_inbox(self._inbox.recv().payload.to_bytes())
             self._inboxes.check("inbox", inbox.seq)
-            if isinstance(inbox, wire.SenseInbox):
-                sensed = inbox
-                self._sense(inbox)
-            elif isinstance(inbox, wire.ExchangeInbox) and sensed is not None:
-                self._exchange(inbox, sensed)
-            else:
-                return
+            try:
+                if isinstance(inbox, wire.SenseInbox):
+                    sensed = inbox
+                    self._sense(inbox)
+                elif isinstance(inbox, wire.ExchangeInbox) and sensed is not None:
+                    self._exchange(inbox, sensed)
+                else:
+                    return
+            except UserCodeError as error:
+                error.tick = inbox.k
+                raise
 
     def _sense(self, inbox: wire.SenseInbox) -> None:
         measured = np.zeros((self._width, self._dimension))
@@ -215,10 +234,9 @@ def main() -> None:
     """Fly one agent until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
-    with zenoh.open(client(brief.login)) as session:
+    with zenoh.open(client(brief.login)) as session, supervisor.confessing():
         node = Node(session, brief)
         node.await_everybody()
         supervisor.tell("ready")
-        with supervisor.confessing():
-            node.run()
+        node.run()
         supervisor.tell("done")

@@ -12,6 +12,7 @@ import numpy as np
 from agents.brief import DERIVATIVES, Array, Brief, Own, Reading
 from agents.controllers import Nothing
 from agents.estimators.base import Estimate, Heard
+from analysis.unsuited import Unsuited
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Pursuit:
     def _flown(self, brief: Brief, own: Own) -> list[Array]:
         """Own position less that of the place, and its derivatives."""
         if own.position is None:
-            raise ValueError("this law steers by its own position, and has none")
+            raise Unsuited("this law steers by its own position, and has none")
         motion = [] if self.order == 1 else [own.velocity]
         if own.higher is not None:
             motion += [*np.moveaxis(own.higher, -2, 0)]
@@ -77,7 +78,7 @@ class Pursuit:
     def _reference(self, estimate: Estimate) -> Array:
         reference = estimate.reports.get("reference")
         if reference is None or reference.shape[-2] <= self.order:
-            raise ValueError(
+            raise Unsuited(
                 f"this law follows a target and its derivatives up to {self.order}: the estimator has to report them, "
                 f"and the target to be of order {self.order} at least"
             )

@@ -15,6 +15,7 @@ from agents.brief import Array, Brief, Mask, Own, Reading
 from agents.controllers import stress_force, weighted
 from agents.estimators.base import Estimate, Heard
 from analysis.affine import Manoeuvre
+from analysis.unsuited import Unsuited
 
 Source = Literal["communicated", "estimated"]
 
@@ -152,5 +153,5 @@ def _closing(brief: Brief, source: Source, own: Own, estimate: Estimate, heard: 
         stress = np.where(heard.ever, brief.stress, 0.0)
         return weighted(stress, own.velocity[..., None, :] - heard.velocity)
     if estimate.relative_velocity is None:
-        raise ValueError("the velocity source 'estimated' needs an estimator that tracks relative velocities")
+        raise Unsuited("the velocity source 'estimated' needs an estimator that tracks relative velocities")
     return weighted(np.where(estimate.known, brief.stress, 0.0), estimate.relative_velocity)

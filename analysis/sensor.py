@@ -12,6 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.unsuited import Unsuited
+
 Array = NDArray[np.float64]
 
 
@@ -68,11 +70,11 @@ class Sensor:
 
         Raises
         ------
-        ValueError
+        Unsuited
             When each measurement has its own.
         """
         if self.reads != "coordinates":
-            raise ValueError(
+            raise Unsuited(
                 "this estimator takes one covariance for all measurements, and this sensor gives each its own; "
                 "choose another, or a sensor of coordinates"
             )

@@ -24,6 +24,7 @@ from typing import Any, NoReturn, TypeVar
 import msgpack
 
 from netem.plain import from_plain, plainly
+from netem.user_code import UserCodeError
 
 T = TypeVar("T")
 
@@ -82,9 +83,11 @@ class Supervisor:
         try:
             yield
         except Exception as error:
+            worded = isinstance(error, Stalled | UserCodeError)
             self.tell(
                 "failed",
-                reason=f"{error}" if isinstance(error, Stalled) else f"{type(error).__name__}: {error}",
+                reason=f"{error}" if worded else f"{type(error).__name__}: {error}",
+                user_code=isinstance(error, UserCodeError),
             )
             raise
 

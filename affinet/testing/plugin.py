@@ -52,7 +52,11 @@ def _wrong(mark: pytest.Mark) -> str | None:
     if mark.kwargs:
         return f"{mark.name} has no keyword {next(iter(mark.kwargs))!r}: {_right(mark.name)}"
     if mark.name == _RUNTIME:
-        return None if mark.args in [(one,) for one in _RUNTIMES] else f"{_RUNTIME}({', '.join(map(repr, mark.args))}): {_right(_RUNTIME)}"
+        return (
+            None
+            if mark.args in [(one,) for one in _RUNTIMES]
+            else f"{_RUNTIME}({', '.join(map(repr, mark.args))}): {_right(_RUNTIME)}"
+        )
     if not mark.args:
         return f"{_SEEDS} has no seed: {_right(_SEEDS)}"
     if odd := [seed for seed in mark.args if type(seed) is not int or not 0 <= seed < _MOST]:

@@ -18,6 +18,7 @@ from affinet.outcome import Verdict
 from affinet.plan import Plan
 from affinet.run import Runtime, evidence, fly, rehearse
 from affinet.sections import Scenario
+from netem.user_code import UserCodeError
 
 _KEPT = 4
 
@@ -80,12 +81,15 @@ class Swarm:
         Raises
         ------
         Broken
-            When it comes to another: why.
+            When it comes to another, or an estimator or law does something wrong: why.
         ScenarioError, PlanError
             When it cannot fly.
         """
         __tracebackhide__ = True
-        flown = self.launch(planning.make(self.scenario))
+        try:
+            flown = self.launch(planning.make(self.scenario))
+        except UserCodeError as error:
+            raise Broken(str(error)) from error
         if flown.outcome.verdict != verdict:
             why = "; ".join(flown.outcome.reasons) or "every fault bit and nothing broke"
             raise Broken(f"the run is {flown.outcome.verdict}, not {verdict}: {why}")
@@ -143,6 +147,8 @@ class Hangar:
         self._flown.append((plan, out))
         done = fly(plan, "processes", out, lambda *_: None)
         landed = evidence(plan, done)
+        if done.user_code:
+            raise Broken("; ".join(done.reasons))
         if landed is None:
             raise Broken(f"the run left nothing: {'; '.join(done.reasons)}")
         return Flown(plan, landed.arrays, done)

@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.brief import Array
 from agents.estimators.base import Heard
+from analysis.unsuited import Unsuited
 
 
 class Flown(NamedTuple):
@@ -69,8 +70,8 @@ def refuse_accelerations(said: Heard) -> None:
 
     Raises
     ------
-    ValueError
+    Unsuited
         When the agents are double integrators.
     """
     if "acceleration" in said.fields:
-        raise ValueError("this estimator predicts by inputs that are velocities; it is for single integrators")
+        raise Unsuited("this estimator predicts by inputs that are velocities; it is for single integrators")

@@ -20,6 +20,7 @@ from agents.estimators.redcho import Consensus
 from analysis import jets
 from analysis.information import numbers, packed, position_jet, unpacked
 from analysis.pursuit import Target, diffusion, transition
+from analysis.unsuited import Unsuited
 from netem.channels import TARGET
 from netem.links import Integers
 
@@ -119,7 +120,7 @@ class TargetEstimator:
         """In tick 0 the target was at the origin and at rest, as far as is known."""
         order = _target(brief).order
         if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
-            raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
+            raise Unsuited(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
         prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
         first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.zeros(batch, dtype=np.int64))
@@ -195,7 +196,7 @@ class TargetEstimator:
         """The optimal estimate of the tick in which the detection was done (5), where one was."""
         sighting, target = own.sighting, _target(brief)
         if sighting is None:
-            raise ValueError("this estimator needs a target: give the scenario a [target]")
+            raise Unsuited("this estimator needs a target: give the scenario a [target]")
         latency = target.latencies[sighting.by]
         seconds = np.asarray(latency * brief.dt, dtype=np.float64)
         R = target.variances[sighting.by]
@@ -248,7 +249,7 @@ class TargetEstimator:
 
 def _target(brief: Brief) -> Target:
     if brief.target is None:
-        raise ValueError("this estimator needs a target: give the scenario a [target]")
+        raise Unsuited("this estimator needs a target: give the scenario a [target]")
     return brief.target
 
 

@@ -1,0 +1,105 @@
+"""What a user's own code does wrong, said so that it can be found: class and method, the error, file and line."""
+
+from __future__ import annotations
+
+import inspect
+import sysconfig
+import traceback
+from types import TracebackType
+from typing import Any, NamedTuple
+
+_LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
+_LONGEST = 400
+
+
+class UserCodeError(RuntimeError):
+    """An estimator, a law, a checker or a module of the user's own failed.
+
+    Parameters
+    ----------
+    where
+        Class and method, or module.
+    what
+        The error.
+    place
+        File and line.
+
+    Attributes
+    ----------
+    tick
+        In which it was called; None before take-off.
+    during
+        What was being flown, for people, where that is not plain.
+    """
+
+    def __init__(self, where: str, what: str, place: str) -> None:
+        super().__init__(where, what, place)
+        self.where, self.what, self.place = where, what, place
+        self.tick: int | None = None
+        self.during: str | None = None
+
+    def __str__(self) -> str:
+        start = "" if self.during is None else f"{self.during}: "
+        when = "" if self.tick is None else f" in tick {self.tick}"
+        return f"{start}{self.where}{when}: {self.what} ({self.place})"
+
+
+class _Step(NamedTuple):
+    file: str
+    line: int
+    package: str
+
+
+def worded(error: BaseException) -> str:
+    """An error with its type, in one line."""
+    if isinstance(error, SystemExit):
+        return "it called sys.exit(), and only the run may end the run"
+    said = error.msg if isinstance(error, SyntaxError) else str(error)
+    line = " ".join(str(said).split())
+    if len(line) > _LONGEST:
+        line = f"{line[:_LONGEST]} ..."
+    return f"{type(error).__name__}: {line}" if line else type(error).__name__
+
+
+def place_of(error: BaseException, package: str) -> str | None:
+    """File and line of the last step of an error inside a package, or inside files that nobody installed.
+
+    None where it never got there: it came of the call itself.
+    """
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}:{error.lineno}"
+    steps = _steps(error.__traceback__)[1:]  # the first is the call
+    theirs = [step for step in steps if step.package == package or not (_is_ours(step) or _is_installed(step))]
+    return f"{theirs[-1].file}:{theirs[-1].line}" if theirs else None
+
+
+def definition(of: Any) -> str:
+    """File and line where a class, method or module is written."""
+    written = inspect.unwrap(of)
+    try:
+        file = inspect.getsourcefile(written) or inspect.getfile(written)
+        line = 1 if inspect.ismodule(written) else inspect.getsourcelines(written)[1]
+    except (OSError, TypeError):
+        return f"module {getattr(written, '__module__', '?')}"
+    return f"{file}:{line}"
+
+
+def is_of_a_signal(error: BaseException) -> bool:
+    """Whether it is the exit that a signal handler of ours asks for, wherever it met the user's code."""
+    steps = _steps(error.__traceback__)
+    return isinstance(error, SystemExit) and len(steps) > 1 and _is_ours(steps[-1])
+
+
+def _steps(trace: TracebackType | None) -> list[_Step]:
+    return [
+        _Step(frame.f_code.co_filename, line, str(frame.f_globals.get("__name__", "")).partition(".")[0])
+        for frame, line in traceback.walk_tb(trace)
+    ]
+
+
+def _is_ours(step: _Step) -> bool:
+    return step.package in {"affinet", "agents", "world", "netem", "analysis"}
+
+
+def _is_installed(step: _Step) -> bool:
+    return step.file.startswith(("<", *_LIBRARIES))
