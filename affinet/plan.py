@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
-from affinet import air, checks, registry, scenario, script, sections
+from affinet import air, checks, limits, registry, scenario, script, sections
 from affinet.blueprint import brief_of, formation_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
@@ -205,12 +206,15 @@ def _make(given: Scenario) -> Plan:
     law = _choice(given, registry.LAWS, "law", given.agents.law)
     _check_order(given, law.build())
     findings, L = _framework(given, formation, law.build(), estimator.build())
-    world = world_of(given, formation)
+    first = world_of(limits.first_tick(given), formation)
     if isinstance(built := estimator.build(), JacobiOverRelaxation):
-        findings.append(checks.localization_step(world, built))
+        findings.append(checks.localization_step(first, built))
         _refuse_fatal(findings)
-    brief = brief_of(world, L)
-    played = script.write(given, formation, world.links)
+    memory = psutil.virtual_memory().total
+    findings.append(limits.swarm(formation, first.links, memory))
+    _refuse_fatal(findings)
+    brief = brief_of(first, L)
+    played = script.write(given, formation, first.links)
     if isinstance(estimator.build(), CentralizedFilter):
         _refuse_absences(played.faults)
     agents = _agents(given, brief, estimator, law)
@@ -218,6 +222,9 @@ def _make(given: Scenario) -> Plan:
         reports = _try_out(agents)
     spoken = agents.channels()
     names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
+    findings.append(limits.run(first, len(names), reports, given.time, memory))
+    _refuse_fatal(findings)
+    world = world_of(given, formation)
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
     own, aired = air.plan(given, formation, world.links, bits)
     degraded = tuple(air.degraded(given, formation, world.links, bits, *named) for named in played.profiles)
@@ -228,7 +235,7 @@ def _make(given: Scenario) -> Plan:
         faults=played.faults,
         triggers=played.triggers,
         channels=names,
-        brief=brief,
+        brief=replace(brief, mission=world.manoeuvre),
         estimator=estimator,
         law=law,
         reports=reports,
@@ -264,6 +271,7 @@ def _refuse_fatal(findings: Sequence[Finding]) -> None:
 
 def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
     choice = registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
+    limits.parameters(f"agents.parameters.{name}", choice.parameters)
     with sections.said_at(f"agents.parameters.{name}"):
         choice.build()
     return choice
