@@ -6,6 +6,7 @@ quotients of what a scenario says are far from where floats vanish and overflow,
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
@@ -24,6 +25,8 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False), After
 Below1 = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Bearing = Annotated[float, Field(gt=0.0, le=pi, allow_inf_nan=False), AfterValidator(_not_tiny)]
+ShareOfDistance = Annotated[float, Field(gt=0.0, le=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 AtLeast1 = Annotated[float, Field(ge=1.0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]

@@ -53,10 +53,11 @@ def run(first: World, channels: int, reports: Mapping[str, tuple[int, ...]], tim
     memory
         Of the machine, in bytes.
     """
-    tick = replace(first, ticks=1)
-    arrays = History(tick, channels, reports).arrays()
+    history = History(replace(first, ticks=1), channels, reports)
+    history.ticks = 1
     maps = (first.manoeuvre.theta, first.manoeuvre.offset)
-    each = _COPIES * (sum(array.nbytes for array in arrays.values()) + sum(of_ticks[0].nbytes for of_ticks in maps))
+    of_a_tick = [*history.arrays().values(), *(of_ticks[0] for of_ticks in maps)]
+    each = _COPIES * sum(array.nbytes for array in of_a_tick)
     most = int(memory / each)
     return _fits(
         each * time.ticks,
@@ -84,7 +85,9 @@ def delays(classes: Iterable[LinkClass], message_bits: np.ndarray[Any, np.dtype[
     """
     for one in classes:
         if one.delay_ticks > time.ticks:
-            raise ScenarioError(f"network.delay_ticks: {one.delay_ticks} ticks, and the run has {time.ticks}: give fewer")
+            raise ScenarioError(
+                f"network.delay_ticks: {one.delay_ticks} ticks, and the run has {time.ticks}: give fewer"
+            )
         key, profile = f"network.profiles.{one.name}", one.profile
         for number, loss in enumerate(profile.loss or [], start=1):
             delay(f"{key}.loss.{number}.extra_delay", getattr(loss, "extra_delay", 0.0), time)
@@ -114,7 +117,9 @@ def delay(key: str, seconds: float, time: Time) -> None:
         raise ScenarioError(f"{key}: {seconds:g} s is longer than the run; give at most {time.duration:g} s")
     if 0.0 < seconds < _LEAST_OF_A_TICK * time.dt:
         least = _LEAST_OF_A_TICK * time.dt
-        raise ScenarioError(f"{key}: {seconds:g} s is nothing in ticks of {time.dt:g} s; give 0, or at least {least:g} s")
+        raise ScenarioError(
+            f"{key}: {seconds:g} s is nothing in ticks of {time.dt:g} s; give 0, or at least {least:g} s"
+        )
 
 
 def parameters(key: str, given: Any) -> None:

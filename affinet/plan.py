@@ -12,7 +12,7 @@ import numpy as np
 import psutil
 
 from affinet import air, checks, limits, registry, scenario, script, sections
-from affinet.blueprint import brief_of, formation_of, world_of
+from affinet.blueprint import brief_of, formation_of, keyframes_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
@@ -251,7 +251,13 @@ def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: 
     if given.agents.leaders == "distances":
         findings.append(checks.leaders_apart(formation))
     late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
-    findings += [*checks.in_time(estimator, late), *checks.chatter(estimator, given.time.dt)]
+    flown, dt = given.agents, given.time.dt
+    findings += [*checks.in_time(estimator, late), *checks.chatter(estimator, dt), *checks.forgetting(estimator, dt)]
+    findings += [*checks.led(formation, flown.leaders, law.order, flown.leader_gain, dt), *checks.pursued(law, dt)]
+    findings += checks.averaging(estimator, given.time.ticks)
+    if given.manoeuvre.keyframes:
+        times, theta, _, angle = keyframes_of(given, formation.dimension)
+        findings += checks.maneuver(times, theta, angle)
     _refuse_fatal(findings)
     if not law.by_stress:
         return findings, np.zeros((formation.agents, formation.agents))

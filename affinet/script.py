@@ -158,10 +158,12 @@ def _add(draft: _Draft, number: int, entry: Event) -> None:
     with said_at(key):
         for moment, start, end in _occurrences(draft, number, entry):
             if end is not None and end <= start:
-                raise ValueError(f"lasts less than half a tick of {draft.given.time.dt:g} s, which is none; give at least a tick")
+                raise ValueError(f"lasts no tick of {draft.given.time.dt:g} s; let it last at least that")
             draft.faults += [(number, replace(shape, trigger=moment.frame, start=start, end=end)) for shape in shapes]
             if len(draft.faults) > _MOST_FAULTS:
-                raise ValueError(f"makes more than {_MOST_FAULTS} faults of the timeline; lengthen every, or give times")
+                raise ValueError(
+                    f"makes more than {_MOST_FAULTS} faults of the timeline; lengthen every, or give times"
+                )
         Timeline(draft.links, [replace(shape, trigger=None) for shape in shapes])
 
 

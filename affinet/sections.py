@@ -10,7 +10,18 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
-from affinet.bounds import Below1, Finite, NotNegative, Positive, Probability, Steps, Tick, Ticks
+from affinet.bounds import (
+    Bearing,
+    Below1,
+    Finite,
+    NotNegative,
+    Positive,
+    Probability,
+    ShareOfDistance,
+    Steps,
+    Tick,
+    Ticks,
+)
 from affinet.events import AnyEvent, Links
 from affinet.impairments import LinkProfile, Section
 from affinet.selectors import edge
@@ -70,7 +81,7 @@ class Formation(Section):
 
 
 class Keyframe(Section):
-    """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i turned by an angle, in radians, + offset."""
+    """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i, turned by an angle in radians, + offset."""
 
     time: NotNegative
     theta: Matrix
@@ -129,9 +140,9 @@ class Sensing(Section):
     sigma: NotNegative | None = None
     covariance: Matrix | None = None
     sigma_range: Positive | None = None
-    sigma_bearing: Positive | None = None
-    sigma_along: Positive | None = None
-    sigma_across: Positive | None = None
+    sigma_bearing: Bearing | None = None
+    sigma_along: ShareOfDistance | None = None
+    sigma_across: ShareOfDistance | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Sensing:

@@ -1,6 +1,7 @@
 """Scenarios in which every number that a scenario can hold is said, and where each of them stands."""
 
 from collections.abc import Iterator
+from inspect import get_annotations
 from typing import Any, get_args
 
 from affinet import scenario
@@ -141,16 +142,20 @@ BASES: dict[str, dict[str, Any]] = {
     },
 }
 
-Path = tuple[str | int, ...]
+Place = tuple[str | int, ...]
 
 
-def numbers(section: Section, path: Path = ()) -> Iterator[tuple[Path, str]]:
+def numbers(section: Section, path: Place = ()) -> Iterator[tuple[Place, str]]:
     """Where numbers stand in a scenario, and which field of which section each is."""
     for name in type(section).model_fields:
-        yield from _inside(getattr(section, name), (*path, name), f"{type(section).__name__}.{name}")
+        yield from _inside(getattr(section, name), (*path, name), f"{_declared_in(type(section), name)}.{name}")
 
 
-def _inside(value: Any, path: Path, field: str) -> Iterator[tuple[Path, str]]:
+def _declared_in(section: type[Section], name: str) -> str:
+    return next(kind.__name__ for kind in section.__mro__ if name in get_annotations(kind))
+
+
+def _inside(value: Any, path: Place, field: str) -> Iterator[tuple[Place, str]]:
     match value:
         case Section():
             yield from numbers(value, path)
@@ -171,7 +176,7 @@ def numeric_fields() -> set[str]:
         for section in scenario._every_section()
         if section.__module__ != "affinet.study"
         for name, field in section.model_fields.items()
-        if _numeric(field.annotation)
+        if _numeric(field.annotation) and _declared_in(section, name) == section.__name__
     }
 
 
@@ -179,7 +184,7 @@ def _numeric(annotation: Any) -> bool:
     return annotation in (int, float) or any(_numeric(each) for each in get_args(annotation))
 
 
-def changed(base: dict[str, Any], path: Path, value: Any) -> dict[str, Any]:
+def changed(base: dict[str, Any], path: Place, value: Any) -> dict[str, Any]:
     """What a file says, with another value at a place."""
     first, *rest = path
     copy: Any = base.copy()
@@ -187,9 +192,9 @@ def changed(base: dict[str, Any], path: Path, value: Any) -> dict[str, Any]:
     return copy
 
 
-def places(base: dict[str, Any]) -> list[tuple[Path, str]]:
+def places(base: dict[str, Any]) -> list[tuple[Place, str]]:
     """The numbers of a base: one of each list of numbers stands for all."""
-    found: dict[tuple[Any, ...], tuple[Path, str]] = {}
+    found: dict[tuple[Any, ...], tuple[Place, str]] = {}
     for path, field in numbers(Scenario.model_validate(base)):
         steps: Any = base
         try:

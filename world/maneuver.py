@@ -116,9 +116,9 @@ def keyframes(
 
 
 def narrowest(times: Sequence[float], theta: Array) -> Array:
-    """How narrow a formation gets on its way from each keyframe to the next, as a share of its width at the ends, shape (F - 1,).
+    """How narrow a formation gets from each keyframe to the next, shape (F - 1,), as a share of its width at the narrower end.
 
-    Of the smallest singular value of the map: 1 where it is no smaller than at the narrower end, 0 where the formation collapses.
+    By the smallest singular value of the map: 1 where it is nowhere smaller than at the ends, 0 where the formation collapses.
     """
     way = np.array([np.linspace(*leg, _LOOKS) for leg in pairwise(times)])
     smallest = np.linalg.svd(_smooth(times, theta)(way), compute_uv=False)[..., -1]
@@ -128,9 +128,9 @@ def narrowest(times: Sequence[float], theta: Array) -> Array:
 
 
 def turned(theta: Array, angle: Array) -> Array:
-    """By how much a formation turns from each keyframe to the next, shape (F - 1,), in radians: by theta the shortest way, and by angle.
+    """How far a formation turns from each keyframe to the next, shape (F - 1,), in radians: by theta the shortest way, and by angle.
 
-    In three dimensions theta's turn is counted about its own axis, without a sign.
+    In three dimensions theta turns it about an axis of its own, and has no sign.
     """
     U, _, Vt = np.linalg.svd(theta)
     rotation = U @ Vt
