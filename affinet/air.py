@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from affinet import impairments
+from affinet import impairments, limits
 from affinet.checks import Finding
 from affinet.echo import echo
 from affinet.impairments import LinkProfile
@@ -43,6 +43,7 @@ def plan(
     network, dt = given.network, given.time.dt
     groups = classes(network, formation, links)
     heard = [one for one in groups if one.comms]
+    limits.delays(heard, message_bits, given.time)
     profile = Profile(
         dt=dt,
         coupled=network.coupled,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
 import numpy as np
 
 from affinet import sections, selectors
@@ -18,6 +22,15 @@ from world.world import World
 
 # Presets that are flown in so many dimensions.
 _MANOEUVRES = {"corridor": (2, maneuver.corridor), "ravine": (3, maneuver.ravine)}
+
+
+class Keyframes(NamedTuple):
+    """Times (s), theta (F, D, D), offset (F, D), in metres, and angle (F,), in radians, if there is one."""
+
+    times: Sequence[float]
+    theta: Array
+    offset: Array
+    angle: Array | None
 
 
 def formation_of(given: Scenario) -> Formation:
@@ -101,13 +114,33 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
                 f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
             )
         return flown(seconds)
-    square = (dimension, dimension)
+    frames = keyframes_of(given, dimension)
+    for number, (earlier, later) in enumerate(pairwise(frames.times), start=2):
+        if later - earlier < given.time.dt:
+            raise ScenarioError(
+                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after the one before; "
+                "move it, or lower time.dt"
+            )
+    return maneuver.keyframes(seconds, *frames)
+
+
+def keyframes_of(given: Scenario, dimension: int) -> Keyframes:
+    """What the keyframes of a scenario say.
+
+    Raises
+    ------
+    ScenarioError
+        When one does not fit the formation.
+    """
+    section, square = given.manoeuvre, (dimension, dimension)
     theta, offset = [], []
     for number, frame in enumerate(section.keyframes, start=1):
         key = f"manoeuvre.keyframes.{number}"
         theta.append(sections.array(f"{key}.theta", frame.theta, square))
         offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
-    return maneuver.keyframes(seconds, [frame.time for frame in section.keyframes], np.array(theta), np.array(offset))
+    times = [frame.time for frame in section.keyframes]
+    angles = [frame.angle for frame in section.keyframes if frame.angle is not None]
+    return Keyframes(times, np.array(theta), np.array(offset), np.array(angles) if angles else None)
 
 
 def brief_of(world: World, L: Array) -> Brief:

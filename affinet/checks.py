@@ -16,12 +16,15 @@ from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.joint_kf import JointEdgeFilter
 from agents.estimators.jor import JacobiOverRelaxation
+from agents.estimators.silent import SilentEdgeFilter
 from agents.estimators.target import TargetEstimator
+from agents.pursuit import Pursuit
 from agents.second_order import DoubleVaryingVelocity
 from analysis import localization
 from analysis.affine import Array
 from analysis.graph import reached
 from netem.fault import Fault
+from world import maneuver as manoeuvres
 from world import sensors, stress
 from world.formation import Formation
 from world.localized import FirstMeasurements
@@ -30,6 +33,9 @@ from world.world import World
 Level = Literal["ok", "note", "error"]
 
 _SMALL_CHATTER = 1.0
+_FORGOTTEN = 2.0  # an Euler step of -gamma diverges from here on
+_NARROW = 0.7  # a quarter turn by the entries of theta gets no narrower
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,73 @@ def leaders_apart(formation: Formation) -> Finding:
         says = f"leaders that keep their distances must all see each other: there is no edge {', '.join(missing)}"
         return Finding("leaders apart", "error", says)
     return Finding("leaders apart", "ok", "the leaders all see each other, and can keep their distances")
+
+
+def led(
+    formation: Formation, leaders: Literal["pilot", "distances"], order: int, gain: float, dt: float
+) -> list[Finding]:
+    """Whether a tick is short enough for the pull of the leaders toward their targets, or toward their distances."""
+    if not formation.leaders or not gain:
+        return []
+    if leaders == "pilot":
+        most = (2.0, 1.0)[order - 1] / dt
+        unit, radius = "1/s", stability.radius(stability.chain_step(((gain,), (gain**2, 2.0 * gain))[order - 1], dt))
+    else:
+        places = formation.nominal[formation.is_leader]
+        stretch = 2.0 * stability.stretch_eigenvalue(places)
+        most, unit, radius = 2.0 / (dt * stretch), "1/(s m2)", abs(1.0 - dt * gain * stretch)
+    if gain < most:
+        return [Finding("leader gain", "ok", f"{gain:g} {unit} is below the bound {most:.4g} at dt {dt:g} s")]
+    says = f"{gain:g} {unit} is not below the bound {most:.4g} at dt {dt:g} s (radius {radius:.4g}): leaders diverge"
+    return [Finding("leader gain", "error", f"{says}; lower agents.leader_gain, or dt")]
+
+
+def pursued(law: Any, dt: float) -> list[Finding]:
+    """Whether a tick is short enough for the pull of those who are after a target."""
+    if not isinstance(law, Pursuit):
+        return []
+    radius = stability.radius(stability.chain_step(law.kappa, dt))
+    if radius < 1.0:
+        settles = f"settles to 1/e in {_settle(radius, dt)}"
+        return [Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {dt:g} s, kappa {list(law.kappa)}: {settles}")]
+    says = f"radius {radius:.4g} >= 1 at dt {dt:g} s: the step is too long for kappa {list(law.kappa)}; lower it, or dt"
+    return [Finding("step", "error", says)]
+
+
+def averaging(estimator: Any, ticks: int) -> list[Finding]:
+    """Whether a window of ticks fits into a run of so many."""
+    if not isinstance(estimator, SilentEdgeFilter) or estimator.window < ticks:
+        return []
+    says = f"a window of {estimator.window} ticks is never full in a run of {ticks}; give at most {ticks - 1}"
+    return [Finding("window", "error", says)]
+
+
+def forgetting(estimator: Any, dt: float) -> list[Finding]:
+    """Whether a tick is short enough for REDCHO to forget what it has gathered, by gamma."""
+    if not (isinstance(estimator, TargetEstimator) and estimator.fusion == "redcho"):
+        return []
+    fastest = max(estimator.gamma)
+    if fastest * dt < _FORGOTTEN:
+        return []
+    says = f"gamma {fastest:g} 1/s is not below the bound {_FORGOTTEN / dt:g} at dt {dt:g} s: REDCHO diverges; lower it, or dt"
+    return [Finding("REDCHO", "error", says)]
+
+
+def maneuver(times: Sequence[float], theta: Array, angle: Array | None) -> list[Finding]:
+    """What keyframes make of a formation on the way from one to the next."""
+    share = manoeuvres.narrowest(times, theta)
+    turns = manoeuvres.turned(theta, np.zeros(len(theta)) if angle is None else angle)
+    told = f"the formation turns by {', '.join(f'{turn:.3g}' for turn in turns)} rad from keyframe to keyframe"
+    found = [Finding("manoeuvre", "ok", told)]
+    for number, (narrow, earlier, later) in enumerate(zip(share, theta[:-1], theta[1:], strict=True), start=1):
+        legs = f"keyframes {number} to {number + 1}"
+        if narrow < _NARROW:
+            says = f"{legs}: on the way the formation shrinks to {narrow:.1%} of its width, as entries of theta go straight"
+            found.append(Finding("manoeuvre", "note", f"{says}; to turn it, give keyframes an angle (rad)"))
+        elif (earlier != later).any() and np.allclose(earlier, later, rtol=0.0, atol=_ROUNDING):
+            says = f"{legs}: theta is the same but for rounding, and nothing turns"
+            found.append(Finding("manoeuvre", "note", f"{says}; for a full turn, give keyframes an angle (rad)"))
+    return found
 
 
 def in_time(estimator: Any, late: bool) -> list[Finding]:
@@ -240,6 +313,10 @@ def _consensus(formation: Formation, epsilon: float) -> Finding:
     B = stress.incidence(formation.agents, formation.edges)
     laplacian = B @ B.T
     bound = 2.0 / (np.linalg.eigvalsh(laplacian)[-1] + np.diag(laplacian).max() + 1.0)
+    if epsilon <= 0.0:
+        return Finding(
+            "consensus", "error", f"epsilon {epsilon:g}: nothing is agreed on; give one above 0, below {bound:.4f}"
+        )
     if epsilon < bound:
         return Finding("consensus", "ok", f"epsilon {epsilon:g} is below the bound {bound:.4f} of (14) on this graph")
     return Finding(

@@ -28,7 +28,7 @@ def echo(one: LinkClass, links: Links, dt: float, least_delay: int) -> Finding:
             for period, lasts in zip(turns.period[one.rows], turns.lasts[one.rows], strict=True)
         }
         open_share = float((turns.lasts / turns.period)[one.rows].mean())
-        if len(periods) == 1:
+        if len(periods) == 1 and max(periods)[0] <= _LARGEST_CHAIN:
             parts.append(schedule.turning(*periods.pop()))
             open_share = 1.0
     passing = open_share * float(np.prod([1.0 - part.mean_loss for part in parts]))

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field, PlainValidator, model_validator
 
 from affinet import selectors
-from affinet.impairments import NotNegative, Positive, Probability, Section
+from affinet.bounds import Finite, NotNegative, Positive, Probability, Rate, Steps
+from affinet.impairments import Section
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Links = Annotated[str, AfterValidator(selectors.check)]
 Whom = Annotated[list[Annotated[int | str, PlainValidator(selectors.agent_or_word)]], Field(min_length=1)]
 On = Annotated[list[Links], Field(min_length=1)]
@@ -39,7 +39,7 @@ class Event(Section):
     after: str | None = None
     when: When | None = None
     every: Positive | None = None
-    times: Annotated[int, Field(ge=1)] | None = None
+    times: Steps | None = None
 
     @model_validator(mode="after")
     def _timed(self) -> Event:
@@ -158,7 +158,7 @@ class Clock(Lasting):
 
     verb: Literal["clock"] = "clock"
     agents: Whom
-    rate: Annotated[float, Field(gt=-1.0, lt=10.0)]
+    rate: Rate
 
     @model_validator(mode="after")
     def _drifts(self) -> Clock:

@@ -9,14 +9,11 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from affinet.bounds import AtLeast1, Below1, Finite, NotNegative, Positive, Probability, Steps, Ticks
 from affinet.words import among
 from netem import text
 
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Step = Literal["time", "packet"]
-Steps = Annotated[int, Field(ge=1)]
 
 
 class Section(BaseModel):
@@ -37,7 +34,7 @@ class Gilbert(Section):
 
     model: Literal["gilbert"]
     loss: Probability
-    burst: Annotated[float, Field(ge=1.0)]
+    burst: AtLeast1
     extra_delay: NotNegative = 0.0
     step: Step = "time"
 
@@ -87,7 +84,7 @@ class Listed(Section):
     """Exactly these messages of every link and channel, counted from 0."""
 
     model: Literal["list"]
-    messages: Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1)]
+    messages: Annotated[list[Ticks], Field(min_length=1)]
 
 
 class Traced(Section):
@@ -185,7 +182,7 @@ class DelayModel(Section):
     mean: NotNegative | None = None
     jitter: NotNegative | None = None
     table: list[NotNegative] | None = None
-    correlation: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    correlation: Below1 = 0.0
     order: Literal["free", "kept"] = "free"
 
     @model_validator(mode="after")
@@ -206,7 +203,7 @@ class Corruption(Section):
 
     kind: Literal["stale", "bias", "nan", "bit-flip"]
     p: Probability
-    by: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    by: Finite | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Corruption:
@@ -219,8 +216,8 @@ class RateLimit(Section):
     """A token bucket: rate in bits per second, burst and queue in bytes."""
 
     rate: Positive
-    queue: Annotated[int, Field(ge=1)] = 10_000
-    burst: Annotated[int, Field(ge=0)] = 0
+    queue: Steps = 10_000
+    burst: Ticks = 0
 
 
 class LinkProfile(Section):

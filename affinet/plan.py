@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
-from affinet import air, checks, registry, scenario, script, sections, tryout
-from affinet.blueprint import brief_of, formation_of, world_of
+from affinet import air, checks, limits, registry, scenario, script, sections, tryout
+from affinet.blueprint import brief_of, formation_of, keyframes_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
@@ -212,18 +213,22 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool) -> Plan:
 
 
 def _make(given: Scenario) -> Plan:
+    limits.parameters("agents.parameters", given.agents.parameters)
     registry.check_parameters(given.agents.parameters)
     formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)
     _check_order(given, law.build())
     findings, L = _framework(given, formation, law.build(), estimator.build())
-    world = world_of(given, formation)
+    first = world_of(limits.first_tick(given), formation)
     if isinstance(built := estimator.build(), JacobiOverRelaxation):
-        findings.append(checks.localization_step(world, built))
+        findings.append(checks.localization_step(first, built))
         _refuse_fatal(findings)
-    brief = brief_of(world, L)
-    played = script.write(given, formation, world.links)
+    memory = psutil.virtual_memory().total
+    findings.append(limits.swarm(formation, first.links, memory))
+    _refuse_fatal(findings)
+    brief = brief_of(first, L)
+    played = script.write(given, formation, first.links)
     if isinstance(estimator.build(), CentralizedFilter):
         _refuse_absences(played.faults)
     agents = _agents(given, brief, estimator, law, None)
@@ -231,6 +236,9 @@ def _make(given: Scenario) -> Plan:
         reports = tryout.silent_tick(agents)
     spoken = agents.channels()
     names = (channels.SENSE, *sorted([channels.MEASUREMENT, *spoken]))
+    findings.append(limits.run(first, len(names), reports, given.time, memory))
+    _refuse_fatal(findings)
+    world = world_of(given, formation)
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
     own, aired = air.plan(given, formation, world.links, bits)
     degraded = tuple(air.degraded(given, formation, world.links, bits, *named) for named in played.profiles)
@@ -241,7 +249,7 @@ def _make(given: Scenario) -> Plan:
         faults=played.faults,
         triggers=played.triggers,
         channels=names,
-        brief=brief,
+        brief=replace(brief, mission=world.manoeuvre),
         estimator=estimator,
         law=law,
         reports=reports,
@@ -260,7 +268,13 @@ def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: 
     if given.agents.leaders == "distances":
         findings.append(checks.leaders_apart(formation))
     late = given.time.exchange == "next-tick" or given.network.delay_ticks > 0
-    findings += [*checks.in_time(estimator, late), *checks.chatter(estimator, given.time.dt)]
+    flown, dt = given.agents, given.time.dt
+    findings += [*checks.in_time(estimator, late), *checks.chatter(estimator, dt), *checks.forgetting(estimator, dt)]
+    findings += [*checks.led(formation, flown.leaders, law.order, flown.leader_gain, dt), *checks.pursued(law, dt)]
+    findings += checks.averaging(estimator, given.time.ticks)
+    if given.manoeuvre.keyframes:
+        times, theta, _, angle = keyframes_of(given, formation.dimension)
+        findings += checks.maneuver(times, theta, angle)
     _refuse_fatal(findings)
     if not law.by_stress:
         return findings, np.zeros((formation.agents, formation.agents))

@@ -21,6 +21,7 @@ from netem.trigger import Trigger
 from world.formation import Formation
 
 _ENDED_BY = {"restart": Verb.KILL, "resume": Verb.PAUSE, "rejoin": Verb.DEPART, "replace": Verb.DEPART}
+_MOST_FAULTS = 10_000
 _ON_LINKS = (Verb.CUT, Verb.PARTITION, Verb.LOSE, Verb.DELAY, Verb.DEGRADE)
 
 
@@ -144,7 +145,9 @@ def _length(entry: Event, begin: Moment) -> float:
 
 def _occurrences(draft: _Draft, number: int, entry: Event) -> Iterator[tuple[Moment, int, int | None]]:
     """When it begins, each time, the tick in which it does, and the first in which it holds no longer."""
-    first, again = draft.begins[number], 0
+    first, again, dt = draft.begins[number], 0, draft.given.time.dt
+    if entry.every is not None and entry.every < dt:
+        raise ValueError(f"every {entry.every:g} s is less than a tick of {dt:g} s; give at least that")
     while again == 0 or (entry.every is not None and again < (entry.times or again + 1)):
         seconds = first.seconds + again * (entry.every or 0.0)
         if again and draft.ticks(seconds) >= draft.given.time.ticks:
@@ -159,9 +162,15 @@ def _occurrences(draft: _Draft, number: int, entry: Event) -> Iterator[tuple[Mom
 def _add(draft: _Draft, number: int, entry: Event) -> None:
     key = f"timeline.{number + 1}"
     shapes = _shapes(draft, number, entry, key)
-    for moment, start, end in _occurrences(draft, number, entry):
-        draft.faults += [(number, replace(shape, trigger=moment.frame, start=start, end=end)) for shape in shapes]
     with said_at(key):
+        for moment, start, end in _occurrences(draft, number, entry):
+            if end is not None and end <= start:
+                raise ValueError(f"lasts no tick of {draft.given.time.dt:g} s; let it last at least that")
+            draft.faults += [(number, replace(shape, trigger=moment.frame, start=start, end=end)) for shape in shapes]
+            if len(draft.faults) > _MOST_FAULTS:
+                raise ValueError(
+                    f"makes more than {_MOST_FAULTS} faults of the timeline; lengthen every, or give times"
+                )
         Timeline(draft.links, [replace(shape, trigger=None) for shape in shapes])
 
 

@@ -10,15 +10,26 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
-from affinet.events import AnyEvent, Finite, Links
-from affinet.impairments import LinkProfile, NotNegative, Positive, Probability, Section
+from affinet.bounds import (
+    Bearing,
+    Below1,
+    Finite,
+    NotNegative,
+    Positive,
+    Probability,
+    ShareOfDistance,
+    Steps,
+    Tick,
+    Ticks,
+)
+from affinet.events import AnyEvent, Links
+from affinet.impairments import LinkProfile, Section
 from affinet.selectors import edge
 from affinet.source import Source
 from affinet.words import among
 from analysis.sensor import Sensor
 from world.formation import PRESETS
 
-Ticks = Annotated[int, Field(ge=0)]
 Matrix = list[list[Finite]]
 
 
@@ -71,11 +82,12 @@ class Formation(Section):
 
 
 class Keyframe(Section):
-    """An affine map at a time: targets are theta p_i + offset, in metres."""
+    """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i, turned by an angle in radians, + offset."""
 
     time: NotNegative
     theta: Matrix
     offset: list[Finite]
+    angle: Finite | None = None
 
 
 class Manoeuvre(Section):
@@ -93,13 +105,15 @@ class Manoeuvre(Section):
         times = [frame.time for frame in self.keyframes]
         if any(later <= earlier for earlier, later in pairwise(times)):
             raise ValueError(f"keyframe times must increase, got {times}")
+        if len({frame.angle is None for frame in self.keyframes}) > 1:
+            raise ValueError("give every keyframe an angle (rad), or none")
         return self
 
 
 class Time(Section):
     """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick."""
 
-    dt: Positive
+    dt: Tick
     duration: Positive
     mode: Literal["lockstep"] = "lockstep"
     exchange: Literal["same-tick", "next-tick"] = "same-tick"
@@ -123,13 +137,13 @@ class Sensing(Section):
     across the line of sight, as shares of the distance. It makes `samples` of them in a tick, and reports their mean.
     """
 
-    samples: Annotated[int, Field(ge=1)] = 1
+    samples: Steps = 1
     sigma: NotNegative | None = None
     covariance: Matrix | None = None
     sigma_range: Positive | None = None
-    sigma_bearing: Positive | None = None
-    sigma_along: Positive | None = None
-    sigma_across: Positive | None = None
+    sigma_bearing: Bearing | None = None
+    sigma_along: ShareOfDistance | None = None
+    sigma_across: ShareOfDistance | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Sensing:
@@ -169,7 +183,7 @@ class Dynamics(Section):
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
     kernel: Kernel | None = None
-    persistence: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    persistence: Below1 = 0.0
 
     @model_validator(mode="after")
     def _one(self) -> Dynamics:
@@ -263,7 +277,7 @@ class Record(Section):
     """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
     enabled: bool = True
-    every: Annotated[int, Field(ge=1)] = 5
+    every: Annotated[int, Field(ge=1, le=10_000)] = 5
     window: Positive = 1.0
 
 

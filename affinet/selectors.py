@@ -250,7 +250,7 @@ def _drawn(number: int, candidates: Integers, src: ArrayLike, dst: ArrayLike, lo
 
 def _named(word: str, formation: Formation) -> frozenset[int]:
     everybody = range(1, formation.agents + 1)
-    if word.isdecimal():
+    if word.removeprefix("-").isdecimal():
         if int(word) not in everybody:
             raise ValueError(f"agent {word} does not exist: agents are 1 to {formation.agents}")
         return frozenset({int(word)})

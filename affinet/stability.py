@@ -6,6 +6,9 @@ radius of its step is below one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import factorial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,6 +70,34 @@ def step_matrix(law: object, stress: Array, degree: Array, dt: float) -> Array |
 def _integrated(acceleration: Array, dt: float) -> Array:
     """What accelerations, rows (F, S) over the state, do to positions and velocities in a tick, shape (2 F, S)."""
     return np.vstack([0.5 * dt**2 * acceleration, dt * acceleration])
+
+
+def chain_step(gains: Sequence[float], dt: float) -> Array:
+    """One tick of a body of order m that is drawn to a place and its derivatives, shape (m, m).
+
+    Parameters
+    ----------
+    gains
+        On what it is off in position, velocity and so on, m of them; its input is held for the tick.
+    dt
+        Tick, in seconds.
+    """
+    order = len(gains)
+    taylor = np.array([dt**power / factorial(power) for power in range(order + 1)])
+    free = sum((taylor[power] * np.eye(order, k=power) for power in range(order)), start=np.zeros((order, order)))
+    return np.asarray(free - np.outer(taylor[:0:-1], gains), dtype=np.float64)
+
+
+def stretch_eigenvalue(places: Array) -> float:
+    """The largest eigenvalue of sum_j p_ij p_ij^T over all pairs of places (N, D), in square metres.
+
+    Near their distances, places that the gradient of `hold_distances` draws together come closer by 2 gain times this a second.
+    """
+    agents, dimension = places.shape
+    apart = places[:, None] - places[None]
+    outer = apart[..., :, None] * apart[..., None, :]
+    blocks = np.eye(agents)[:, :, None, None] * outer.sum(axis=1)[:, None] - outer
+    return float(np.linalg.eigvalsh(np.swapaxes(blocks, 1, 2).reshape(agents * dimension, -1))[-1])
 
 
 def one_tick_radius(stress: Array, degree: Array, relaxation: float) -> float:

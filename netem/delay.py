@@ -18,6 +18,8 @@ from netem.links import Integers, Mask
 
 # A delay of exactly three ticks must not become four by rounding.
 _SLACK = 1e-9
+# Ticks beyond the end of every run, far from where integers wrap.
+_NEVER = 2.0**30
 
 
 class Law(StrEnum):
@@ -102,7 +104,7 @@ class Delay:
 
 def ticks(seconds: Array, dt: float) -> Integers:
     """Whole ticks until the first exchange at or after the delay."""
-    return np.ceil(seconds / dt - _SLACK).astype(np.int64)
+    return np.ceil(np.minimum(seconds / dt - _SLACK, _NEVER)).astype(np.int64)
 
 
 def correlated(before: Array, fresh: Array, correlation: float) -> Array:

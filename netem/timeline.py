@@ -151,11 +151,11 @@ class Timeline:
 
     def starting(self, tick: int) -> list[Fault]:
         """Faults whose first tick this is."""
-        return [fault for fault in self.faults if fault.trigger is None and fault.start == tick]
+        return [self.faults[number] for number in self._starts.get(tick, ())]
 
     def ending(self, tick: int) -> list[Fault]:
         """Faults that hold no longer from this tick on."""
-        return [fault for fault in self.faults if fault.trigger is None and fault.end == tick]
+        return [self.faults[number] for number in self._ends.get(tick, ())]
 
     def restarted(self, tick: int) -> list[int]:
         """Agents whose processes are new in this tick."""
@@ -188,8 +188,9 @@ class Timeline:
     def clock(self, tick: int) -> Integers:
         """What each agent's clock says in this tick, in ticks, shape (N,)."""
         reading = np.full(self.links.agents, tick)
-        for fault, mask in self._acting(tick, Verb.CLOCK, self._agent_masks):
-            reading += mask * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
+        for number in self._in_force[bisect_right(self._boundaries, tick) - 1]:
+            if (fault := self.faults[number]).verb is Verb.CLOCK:
+                reading += self._agent_masks[number] * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
         return np.maximum(reading, 0)
 
     def held(self, fault: int) -> Mask:
@@ -202,49 +203,66 @@ class Timeline:
         return frozenset(agent for fault in self.faults if fault.warm for agent in fault.agents)
 
     @cached_property
+    def _starts(self) -> dict[int, list[int]]:
+        """Numbers of the faults that begin in a tick."""
+        return _by_tick((number, fault.start) for number, fault in enumerate(self.faults) if fault.trigger is None)
+
+    @cached_property
+    def _ends(self) -> dict[int, list[int]]:
+        """Numbers of the faults that hold no longer from a tick on."""
+        placed = ((number, fault) for number, fault in enumerate(self.faults) if fault.trigger is None)
+        return _by_tick((number, fault.end) for number, fault in placed if fault.end is not None)
+
+    @cached_property
     def _boundaries(self) -> list[int]:
-        placed = [fault for fault in self.faults if fault.trigger is None]
-        ends = {fault.end for fault in placed if fault.end is not None}
-        return sorted({0} | {fault.start for fault in placed} | ends)
+        return sorted({0, *self._starts, *self._ends})
+
+    @cached_property
+    def _in_force(self) -> list[list[int]]:
+        """Numbers of the faults that hold from each boundary to the next."""
+        segments, now = [], set[int]()
+        for tick in self._boundaries:
+            now = (now | set(self._starts.get(tick, ()))) - set(self._ends.get(tick, ()))
+            segments.append(sorted(number for number in now if self.faults[number].active(tick)))
+        return segments
 
     @cached_property
     def _segments(self) -> list[Conditions]:
-        return [self._conditions(tick) for tick in self._boundaries]
+        return [self._conditions(numbers) for numbers in self._in_force]
 
-    def _acting(self, tick: int, verb: Verb, masks: Sequence[Mask]) -> list[tuple[Fault, Mask]]:
-        pairs = zip(self.faults, masks, strict=True)
-        return [(fault, mask) for fault, mask in pairs if fault.verb is verb and fault.active(tick)]
-
-    def _conditions(self, tick: int) -> Conditions:
+    def _conditions(self, in_force: Sequence[int]) -> Conditions:
         size, agents = len(self.links), self.links.agents
 
+        def under(verb: Verb, masks: Sequence[Mask]) -> list[tuple[Fault, Mask]]:
+            return [(self.faults[number], masks[number]) for number in in_force if self.faults[number].verb is verb]
+
         def links(*verbs: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
-            acting = [pair for verb in verbs for pair in self._acting(tick, verb, self._link_masks)]
+            acting = [pair for verb in verbs for pair in under(verb, self._link_masks)]
             return np.logical_or.reduce([np.zeros(size, dtype=bool), *(m for f, m in acting if which(f))])
 
         def whom(verb: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
-            acting = self._acting(tick, verb, self._agent_masks)
+            acting = under(verb, self._agent_masks)
             return np.logical_or.reduce([np.zeros(agents, dtype=bool), *(m for f, m in acting if which(f))])
 
         def chance(verb: Verb) -> Array:
             passing = np.ones(size)
-            for fault, mask in self._acting(tick, verb, self._link_masks):
+            for fault, mask in under(verb, self._link_masks):
                 passing = passing * np.where(mask, 1.0 - fault.probability, 1.0)
             return 1.0 - passing
 
         def sums(verb: Verb, masks: Sequence[Mask], rows: int) -> Array:
-            acting = self._acting(tick, verb, masks)
+            acting = under(verb, masks)
             return sum((mask[:, None] * np.array(fault.vector) for fault, mask in acting), start=np.zeros((rows, 1)))
 
         def largest(verb: Verb, value: Callable[[Fault], float]) -> Array:
-            acting = self._acting(tick, verb, self._link_masks)
+            acting = under(verb, self._link_masks)
             return np.max([np.zeros(size), *(mask * value(fault) for fault, mask in acting)], axis=0)
 
         dead, receiver = whom(Verb.KILL), self.links.dst - 1
         drops, holds = (
             (lambda fault, policy=policy: fault.under_way is policy) for policy in UnderWay if policy != "deliver"
         )
-        delays = [mask * fault.seconds for fault, mask in self._acting(tick, Verb.DELAY, self._link_masks)]
+        delays = [mask * fault.seconds for fault, mask in under(Verb.DELAY, self._link_masks)]
         return Conditions(
             dead=dead,
             paused=whom(Verb.PAUSE) & ~dead,
@@ -266,7 +284,7 @@ class Timeline:
             push=sums(Verb.GUST, self._agent_masks, agents),
             outlier=chance(Verb.OUTLIER),
             deviation=largest(Verb.OUTLIER, lambda fault: fault.deviation),
-            liars=tuple(fault for fault, _ in self._acting(tick, Verb.LIE, self._agent_masks)),
+            liars=tuple(fault for fault, _ in under(Verb.LIE, self._agent_masks)),
         )
 
     def _links_held(self, fault: Fault) -> Mask:
@@ -279,6 +297,13 @@ class Timeline:
                 raise ValueError(f"agent {agent} does not exist: agents are 1 to {self.links.agents}")
             mask[agent - 1] = True
         return mask
+
+
+def _by_tick(numbered: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
+    ticks: dict[int, list[int]] = {}
+    for number, tick in numbered:
+        ticks.setdefault(tick, []).append(number)
+    return ticks
 
 
 def _placed(fault: Fault, tick: int) -> Fault:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
@@ -14,6 +15,7 @@ from analysis.affine import Array, Manoeuvre
 _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _COLLAPSE = np.array([[-1.375, -0.375], [0.0, 0.0]])
 _ANCHOR = np.array([4.0, 0.0])
+_LOOKS = 65  # at the way from one keyframe to the next, its middle among them
 
 
 def corridor(seconds: Array) -> Manoeuvre:
@@ -89,7 +91,9 @@ def hover(seconds: Array, dimension: int) -> Manoeuvre:
     )
 
 
-def keyframes(seconds: Array, times: Sequence[float], theta: Array, offset: Array) -> Manoeuvre:
+def keyframes(
+    seconds: Array, times: Sequence[float], theta: Array, offset: Array, angle: Array | None = None
+) -> Manoeuvre:
     """Monotone cubic interpolation between affine maps: no overshoot, continuous velocity, at rest before and after.
 
     Parameters
@@ -100,15 +104,57 @@ def keyframes(seconds: Array, times: Sequence[float], theta: Array, offset: Arra
         Of the keyframes, increasing, at least two, in seconds.
     theta, offset
         The maps at these times, shapes (F, D, D) and (F, D).
+    angle
+        By which what theta makes is turned at these times, counterclockwise, in three dimensions about the third axis, shape
+        (F,), in radians. It passes through all angles between, where the entries of a theta that turns go straight.
     """
     within = np.clip(seconds, times[0], times[-1])
-    return Manoeuvre(_smooth(times, theta)(within), _smooth(times, offset)(within))
+    shape = _smooth(times, theta)(within)
+    if angle is not None:
+        shape = _turn(_smooth(times, angle)(within), theta.shape[-1]) @ shape
+    return Manoeuvre(shape, _smooth(times, offset)(within))
+
+
+def narrowest(times: Sequence[float], theta: Array) -> Array:
+    """How narrow a formation gets from each keyframe to the next, shape (F - 1,), as a share of its width at the narrower end.
+
+    By the smallest singular value of the map: 1 where it is nowhere smaller than at the ends, 0 where the formation collapses.
+    """
+    way = np.array([np.linspace(*leg, _LOOKS) for leg in pairwise(times)])
+    smallest = np.linalg.svd(_smooth(times, theta)(way), compute_uv=False)[..., -1]
+    ends = np.minimum(smallest[:, 0], smallest[:, -1])
+    narrow = smallest.min(axis=-1)
+    return np.where(narrow < ends, narrow / np.where(ends > 0.0, ends, 1.0), 1.0)
+
+
+def turned(theta: Array, angle: Array) -> Array:
+    """How far a formation turns from each keyframe to the next, shape (F - 1,), in radians: by theta the shortest way, and by angle.
+
+    In three dimensions theta turns it about an axis of its own, and has no sign.
+    """
+    U, _, Vt = np.linalg.svd(theta)
+    rotation = U @ Vt
+    between = rotation[1:] @ np.swapaxes(rotation[:-1], -1, -2)
+    if theta.shape[-1] == 2:
+        by_theta = np.arctan2(between[:, 1, 0] - between[:, 0, 1], between[:, 0, 0] + between[:, 1, 1])
+    else:
+        by_theta = np.arccos(np.clip((np.trace(between, axis1=-2, axis2=-1) - 1.0) / 2.0, -1.0, 1.0))
+    total: Array = by_theta + np.diff(angle)
+    return total
 
 
 def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
     slopes = PchipInterpolator(times, values).derivative()(times)
     slopes[0], slopes[-1] = 0.0, 0.0  # from rest, and to rest
     return CubicHermiteSpline(times, values, slopes)
+
+
+def _turn(angle: Array, dimension: int) -> Array:
+    """Rotations by angles (T,), shape (T, D, D)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rotation = np.broadcast_to(np.eye(dimension), (len(angle), dimension, dimension)).copy()
+    rotation[:, :2, :2] = _matrix([[cosine, -sine], [sine, cosine]])
+    return rotation
 
 
 def _matrix(rows: list[list[Array]]) -> Array:

@@ -106,3 +106,16 @@ def no_edges(slots: Mask, dimension: int, reports: Mapping[str, Array]) -> Estim
 def no_indicator(known: Mask) -> Array:
     """The psi of an estimator that has none: NaN, shape (...)."""
     return np.full(known.shape[:-1], np.nan)
+
+
+def refuse_negative(**deviations: float) -> None:
+    """Refuse standard deviations below 0.
+
+    Raises
+    ------
+    ValueError
+        Naming the first.
+    """
+    for name, deviation in deviations.items():
+        if deviation < 0.0:
+            raise ValueError(f"{name} is a standard deviation, and at least 0, not {deviation:g}")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.inputs import refuse_accelerations
 from netem.channels import CENTRE, INPUT
 
@@ -29,6 +29,9 @@ class CentralizedFilter:
     """
 
     prior_position: float = 1.0
+
+    def __post_init__(self) -> None:
+        refuse_negative(prior_position=self.prior_position)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.small import determinant, inverse
 
 
@@ -60,6 +60,7 @@ class InteractingMultipleModel:
     def __post_init__(self) -> None:
         if not 0.0 < self.stay < 1.0:
             raise ValueError(f"stay is a probability strictly between 0 and 1, not {self.stay}")
+        refuse_negative(**{name: value for name, value in vars(self).items() if name != "stay"})
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing: a neighbour's measurements of others say nothing of this edge."""

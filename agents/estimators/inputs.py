@@ -11,6 +11,8 @@ from agents.brief import Array
 from agents.estimators.base import Heard
 from analysis.unsuited import Unsuited
 
+_ROUNDING = 1e-9  # of the root of a random walk
+
 
 class Flown(NamedTuple):
     """Inputs of the neighbours in the last p ticks, newest first, (..., n, p, D), and their covariances (..., n, p, D, D)."""
@@ -63,6 +65,19 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
         np.concatenate([newest[..., None, :], flown.inputs[..., :-1, :]], axis=-2),
         np.concatenate([doubt[..., None, :, :], flown.covariance[..., :-1, :, :]], axis=-3),
     )
+
+
+def refuse_growing(coefficients: Sequence[float]) -> None:
+    """Refuse an autoregressive model whose inputs grow without end.
+
+    Raises
+    ------
+    ValueError
+        When a root of the model lies outside the unit circle.
+    """
+    roots = np.abs(np.roots([1.0, *(-a for a in coefficients)]))
+    if roots.max(initial=0.0) > 1.0 + _ROUNDING:
+        raise ValueError(f"inputs with the coefficients {list(coefficients)} grow without end; give smaller ones")
 
 
 def refuse_accelerations(said: Heard) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import inputs
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.blocks import block_diagonal, diagonal_blocks
 from agents.estimators.geometry import identity
 from netem.channels import INPUT
@@ -45,6 +45,10 @@ class JointEdgeFilter:
     prior_position: float = 1.0
     coefficients: Sequence[float] = (1.0,)
     sigma_n: float = 0.0
+
+    def __post_init__(self) -> None:
+        refuse_negative(prior_position=self.prior_position, sigma_n=self.sigma_n)
+        inputs.refuse_growing(self.coefficients)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""

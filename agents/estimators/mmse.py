@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.geometry import identity
 
 
@@ -32,6 +32,9 @@ class MinimumMeanSquareError:
     """
 
     sigma_prior: float = 0.1
+
+    def __post_init__(self) -> None:
+        refuse_negative(sigma_prior=self.sigma_prior)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 
 
 class Tracks(NamedTuple):
@@ -44,6 +44,10 @@ class EdgeFilters:
     prior_velocity: float = 2.0
     prior_acceleration: float = 1.0
     model: kalman.Model = "constant-acceleration"
+
+    def __post_init__(self) -> None:
+        priors = {name: getattr(self, name) for name in ("prior_position", "prior_velocity", "prior_acceleration")}
+        refuse_negative(sigma_w=self.sigma_w, **priors)
 
     def unknown(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
         """All edges unknown."""

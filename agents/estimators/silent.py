@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import inputs, kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.edge_kf import of_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
@@ -66,6 +66,8 @@ class SilentEdgeFilter:
     def __post_init__(self) -> None:
         if self.window < 1:
             raise ValueError(f"window counts ticks, from 1; got {self.window}")
+        refuse_negative(prior_position=self.prior_position, sigma_u=self.sigma_u)
+        inputs.refuse_growing([self.coefficient])
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing."""

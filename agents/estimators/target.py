@@ -24,6 +24,7 @@ from analysis.unsuited import Unsuited
 from netem.channels import TARGET
 from netem.links import Integers
 
+_SUREST, _LEAST_SURE = 1e-3, 1e3  # standard deviations whose information can be inverted side by side
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
 
@@ -103,6 +104,9 @@ class TargetEstimator:
             raise ValueError(f"REDCHO's gains must be above 0: theta {self.theta}, k {self.k}, gamma {self.gamma}")
         if self.hold < 0:
             raise ValueError(f"hold is a number of ticks, not {self.hold}")
+        for name in ("prior_position", "prior_derivatives"):
+            if not _SUREST <= getattr(self, name) <= _LEAST_SURE:
+                raise ValueError(f"{name} is from {_SUREST:g} to {_LEAST_SURE:g}, not {getattr(self, name):g}")
 
     def channels(self, brief: Brief) -> Channels:
         """The information: as agreed on so far, or one's own with its derivatives."""

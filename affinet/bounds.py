@@ -1,0 +1,35 @@
+"""How small and how large the numbers of a scenario may be.
+
+In SI units nothing that flies is measured in less than a billionth, or in more than a billion; within these bounds squares and
+quotients of what a scenario says are far from where floats vanish and overflow, and counts from where integers wrap.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+SMALLEST, LARGEST = 1e-9, 1e9
+MOST = 10**9
+
+
+def _not_tiny(value: float) -> float:
+    if 0.0 < abs(value) < SMALLEST:
+        raise ValueError(f"is too small to tell from 0: should be at least {SMALLEST:g}, got {value:g}")
+    return value
+
+
+Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Below1 = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Bearing = Annotated[float, Field(gt=0.0, le=pi, allow_inf_nan=False), AfterValidator(_not_tiny)]
+ShareOfDistance = Annotated[float, Field(gt=0.0, le=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+AtLeast1 = Annotated[float, Field(ge=1.0, le=LARGEST, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Tick = Annotated[float, Field(ge=1e-6, le=100.0, allow_inf_nan=False)]
+Steps = Annotated[int, Field(ge=1, le=MOST)]
+Ticks = Annotated[int, Field(ge=0, le=MOST)]
