@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -45,6 +46,6 @@ def read(name: str, folder: str, what: str) -> Read:
     else:
         raise ScenarioError(f"{name}: no such file, and no such {what}; shipped are {', '.join(shipped(folder))}")
     try:
-        return Read(path.name, text, tomllib.loads(text), path.absolute().parent)
+        return Read(path.name, text, tomllib.loads(text), Path(os.path.abspath(path)).parent)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path.name}: not TOML: {error}") from error

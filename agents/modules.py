@@ -32,9 +32,7 @@ def algorithm(path: str, folder: str | None) -> Any:
         When there is no such module, or nothing of this name in it.
     """
     module, _, name = path.partition(":")
-    if folder is None:
-        return getattr(importlib.import_module(module), name)
-    return getattr(_SHELVES.module(module, folder), name)
+    return getattr(_SHELVES.installed(module) if folder is None else _SHELVES.module(module, folder), name)
 
 
 def holder(module: str, folders: Iterable[Path]) -> Path | None:
@@ -81,23 +79,33 @@ class _Shelves:
             shelf.modules |= {one: here[one] for one in here if one in shelf.brought or one == name}
         return shelf.modules[name]
 
+    def installed(self, name: str) -> Any:
+        if self.open is not None and holder(name, [Path(self.open)]):
+            self._close()
+        return importlib.import_module(name)
+
     def sources(self, folder: str) -> Iterable[Path]:
         shelf = self.shelves.get(folder, _Shelf())
         return (Path(module.__file__) for module in shelf.modules.values())
 
     def _change_to(self, folder: str) -> None:
-        if self.open not in (None, folder):
-            before = self.shelves[str(self.open)]
-            for name in before.brought:
-                sys.modules.pop(name, None)
-            if before.on_path:
-                sys.path.remove(str(self.open))
-                before.on_path = False
+        if self.open != folder:
+            self._close()
         shelf, self.open = self.shelves[folder], folder
-        sys.modules.update({name: shelf.modules[name] for name in shelf.brought if name in shelf.modules})
+        sys.modules.update({name: shelf.modules[name] for name in shelf.brought})
         if folder not in sys.path:
             sys.path.append(folder)  # last: what lies beside takes the place of nothing that is installed
             shelf.on_path = True
+
+    def _close(self) -> None:
+        if self.open is None:
+            return
+        shelf = self.shelves[self.open]
+        for name in shelf.brought:
+            sys.modules.pop(name, None)
+        if shelf.on_path and self.open in sys.path:
+            sys.path.remove(self.open)
+        shelf.on_path, self.open = False, None
 
 
 _SHELVES = _Shelves()

@@ -57,7 +57,7 @@ full = { runs = 1 }
 quick = { runs = 1 }
 [[axes]]
 name = "trace"
-values = { half = ['network.profiles.traced.loss=[{model="trace",file="half.csv"}]'] }
+values = { half = ['network.profiles.traced.loss=[]', 'network.profiles.traced.delay.table="half.txt"'] }
 """
 
 
@@ -146,13 +146,12 @@ def test_a_study_names_what_lies_beside_it(tmp_path, elsewhere):
     field(tmp_path / "home")
     (tmp_path / "home" / "studies").mkdir()
     (tmp_path / "home" / "studies" / "mine.toml").write_text(STUDY)
-    (tmp_path / "home" / "studies" / "half.csv").write_text(trace_text(0.25))
+    (tmp_path / "home" / "studies" / "half.txt").write_text("0.5\n")
     mine = study.load(str(tmp_path / "home" / "studies" / "mine.toml"))
     (case,) = study.cases(mine, quick=True)
-    profile = study._planned(mine, case).profiles[0]
-    assert (profile.traces[0].availability == 0.25).all()
-    (result,) = study.run(mine, quick=True, watch=lambda _: None)
-    assert (result.plan.profiles[0].traces[0].availability == 0.25).all()
+    plan = study._planned(mine, case)
+    assert plan.profiles[0].delays[0].table.tolist() == [0.5]
+    assert plan.estimator.folder == str(tmp_path / "home")
 
 
 def test_a_test_names_what_lies_beside_it(tmp_path, elsewhere):
@@ -178,7 +177,9 @@ def test_a_run_is_flown_again_from_any_folder_after_its_files_are_gone(runtime, 
     said = capsys.readouterr().err
     assert "the same bits as" in said
     assert "note: " not in said
-    assert cli.main(["replay", str(tmp_path / "again"), "--runtime", "inprocess", "--out", str(tmp_path / "third")]) == 0
+    assert (
+        cli.main(["replay", str(tmp_path / "again"), "--runtime", "inprocess", "--out", str(tmp_path / "third")]) == 0
+    )
     kept = json.loads((tmp_path / "third" / "inputs" / "inputs.json").read_text())
     assert sorted(kept["originals"]) == ["modules/helper.py", "modules/mine.py", "pings.txt", "trace.csv"]
 
@@ -208,7 +209,9 @@ def test_files_of_one_name_do_not_collide(tmp_path):
         f'network.profiles.{name}.loss=[{{model="trace",file="{path}"}}]'
         for name, path in (("a", "a/trace.csv"), ("b", "b/trace.csv"), ("c", "inputs.json"))
     ]
-    faults = "timeline=[{verb='degrade',links=['1-2'],at=0.1,profile='a'},{verb='degrade',links=['1-3'],at=0.1,profile='b'}]"
+    faults = (
+        "timeline=[{verb='degrade',links=['1-2'],at=0.1,profile='a'},{verb='degrade',links=['1-3'],at=0.1,profile='b'}]"
+    )
     plan = planning.make(scenario.load(str(file), [*losses, faults]))
     fly(plan, "inprocess", tmp_path / "run", lambda *_: None)
     again = planning.again(tmp_path / "run", (), verdicts=False)
