@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from affinet import measures, scenario
+from affinet import inputs, measures, scenario
 from affinet.bites import Bite, bites
 from affinet.measures import Figures
 from affinet.plan import Plan
@@ -137,7 +137,7 @@ def judge(
 
 
 def prepare(plan: Plan, out: Path) -> None:
-    """Make the run directory, and write down what is about to be flown.
+    """Make the run directory, and write down what is about to be flown, with a copy of all it reads.
 
     Raises
     ------
@@ -147,9 +147,8 @@ def prepare(plan: Plan, out: Path) -> None:
     if (out / scenario.FILE).exists():
         raise FileExistsError(f"{out} holds a run already; name another directory with --out")
     out.mkdir(parents=True, exist_ok=True)
-    (out / scenario.FILE).write_text(
-        plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n", encoding="utf-8"
-    )
+    flown = inputs.keep(plan.scenario, plan.journal, out)
+    (out / scenario.FILE).write_text(flown.model_dump_json(indent=2, exclude_none=True) + "\n", encoding="utf-8")
 
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:

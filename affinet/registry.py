@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any
 
 from affinet.sections import ScenarioError
@@ -31,7 +32,7 @@ def names(group: str) -> list[str]:
     return sorted(point.name for point in entry_points(group=group))
 
 
-def choose(group: str, key: str, name: str, given: Mapping[str, Any]) -> Choice:
+def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mapping[str, Path]) -> Choice:
     """The algorithm of this name with these parameters, checked against its fields.
 
     Parameters
@@ -44,6 +45,8 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any]) -> Choice:
         An entry point, or "module:Class".
     given
         Its parameters; those not given keep their defaults.
+    own
+        Folders in which modules of the user's own lie, by "module:Class".
 
     Raises
     ------
@@ -53,12 +56,12 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any]) -> Choice:
         When its module cannot be imported, or it is not what an algorithm of this group has to be.
     """
     path = _path(group, key, name)
-    algorithm = _load(key, path)
+    algorithm = _load(key, path, own.get(name))
     _refuse_another_kind(group, algorithm)
-    return _made(name, path, algorithm, given)
+    return _made(name, path, algorithm, given, own.get(name))
 
 
-def check_parameters(given: Mapping[str, Mapping[str, Any]]) -> None:
+def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, Path]) -> None:
     """Refuse parameters that do not fit, also of algorithms that are not in use: a study may choose them.
 
     Raises
@@ -76,7 +79,7 @@ def check_parameters(given: Mapping[str, Mapping[str, Any]]) -> None:
         if name not in offered and ":" not in name:
             raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(offered))}")
         path = offered.get(name, name)
-        _made(name, path, _load(key, path), table)
+        _made(name, path, _load(key, path, own.get(name)), table, own.get(name))
 
 
 @contextmanager
@@ -99,9 +102,9 @@ def _path(group: str, key: str, name: str) -> str:
     return offered[name]
 
 
-def _load(key: str, path: str) -> type:
+def _load(key: str, path: str, folder: Path | None) -> type:
     try:
-        algorithm = load(path)
+        algorithm = load(path, None if folder is None else str(folder))
     except NoSuchAlgorithm as error:
         raise ScenarioError(f"{key}: cannot load {path}: {error}") from error
     if not is_dataclass(algorithm):
@@ -109,7 +112,7 @@ def _load(key: str, path: str) -> type:
     return algorithm
 
 
-def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any]) -> Choice:
+def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any], folder: Path | None) -> Choice:
     key = f"agents.parameters.{name}"
     try:
         with Calling(algorithm, "__init__"):
@@ -120,7 +123,7 @@ def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any]) -> Ch
             where, says = ".".join([key, *refused.path]), refused.says
             raise ScenarioError(f"{where}: {says}; {name} has {known}") from error
         raise
-    choice = Choice(path, dict(given))
+    choice = Choice(path, dict(given), None if folder is None else str(folder))
     with refusing(key, ValueError):
         choice.build()
     return choice

@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -144,6 +145,12 @@ class Study(Section):
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
     _source: Source | None = PrivateAttr(default=None)
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path | None:
+        """Of the file that says it: paths in it, and modules it names, are relative to that."""
+        return self._folder
 
     @model_validator(mode="after")
     def _drawn(self) -> Study:
@@ -216,6 +223,7 @@ def load(name: str) -> Study:
     except ValidationError as error:
         raise ScenarioError(explained(error, Study, source)) from error
     study._source = source
+    study._folder = file.folder
     study.refuse(study_checks.of_file(study))
     return study
 
@@ -258,9 +266,11 @@ def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
 
 
 def _planned(study: Study, case: Case) -> Plan:
+    folder = study.folder or Path()
+    name = str(folder / study.scenario) if study.scenario.endswith(".toml") else study.scenario
     try:
         with _in_case(case):
-            return planning.make(scenarios.load(study.scenario, case.overrides))
+            return planning.make(scenarios.load(name, case.overrides, study.folder))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
         raise ScenarioError(f"{where}case {study_checks.named(case.labels)}: {error}") from error

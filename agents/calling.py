@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import importlib
 import inspect
 import re
 from types import FunctionType, ModuleType, TracebackType
 from typing import Any
 
+from agents import modules
 from agents.returned import WrongReturn
 from netem.user_code import UserCodeError, definition, is_of_a_signal, place_of, worded
 
@@ -70,8 +70,8 @@ def name_of(algorithm: type) -> str:
     return f"{algorithm.__module__}:{algorithm.__qualname__}"
 
 
-def load(path: str) -> type:
-    """The class at "module:Class".
+def load(path: str, folder: str | None) -> type:
+    """The class at "module:Class", of which the module lies in a folder, or is installed.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def load(path: str) -> type:
     if not _PATH.fullmatch(path):
         raise NoSuchAlgorithm("write it as module:Class")
     name, _, attributes = path.partition(":")
-    found: Any = _imported(name)
+    found: Any = _imported(name, folder)
     for attribute in attributes.split("."):
         if not hasattr(found, attribute):
             raise NoSuchAlgorithm(f"{name} has no {attribute!r}{_instead(found, attribute)}")
@@ -93,9 +93,9 @@ def load(path: str) -> type:
     return found
 
 
-def _imported(name: str) -> ModuleType:
+def _imported(name: str, folder: str | None) -> ModuleType:
     try:
-        return importlib.import_module(name)
+        return modules.imported(name, folder)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{name}.".startswith(f"{error.name}."):
             raise NoSuchAlgorithm(

@@ -27,10 +27,21 @@ from netem.user_code import UserCodeError
 
 @dataclass(frozen=True)
 class Choice:
-    """An algorithm to run: "module:Class", and those of its parameters that were given, as a scenario says them."""
+    """An algorithm to run.
+
+    Parameters
+    ----------
+    path
+        "module:Class".
+    parameters
+        Those of its parameters that were given, as a scenario says them.
+    folder
+        In which its module lies, if that is the user's own.
+    """
 
     path: str
     parameters: dict[str, Any]
+    folder: str | None = None
 
     def build(self) -> Any:
         """The algorithm.
@@ -40,7 +51,7 @@ class Choice:
         UserCodeError
             When its module cannot be imported, or the algorithm not be made.
         """
-        algorithm = load(self.path)
+        algorithm = load(self.path, self.folder)
         with Calling(algorithm, "__init__"):
             return algorithm(**parameters.arguments(algorithm, self.parameters))
 

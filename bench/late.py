@@ -46,7 +46,7 @@ CASES = (
     Case("30 ms", Law.EXPONENTIAL, 0.030, 0.0, 0.0, stats.expon(0.0, 0.030).cdf),
     Case("30 ms, correlation 0.9", Law.EXPONENTIAL, 0.030, 0.0, 0.9, stats.expon(0.0, 0.030).cdf),
     Case("40, 10 ms", Law.PARETO, 0.040, 0.010, 0.0, _PARETO.cdf),
-    Case("6 values", Law.TABLE, 0.0, 0.0, 0.0, lambda s: np.interp(s, _TABLE, np.linspace(0.0, 1.0, len(_TABLE)))),
+    Case("6 values", Law.TABLE, 0.0, 0.0, 0.0, lambda s: np.searchsorted(_TABLE, s, side="right") / len(_TABLE)),
 )
 
 
@@ -83,6 +83,10 @@ def _delay(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     at_once = float(case.cdf(np.zeros(1))[0])
     if at_once > 0.01:
         yield against.share("share at once", at_once, apart == 0.0)
+    if case.law is Law.TABLE:
+        counted = np.array([(apart == value).sum() for value in _TABLE])
+        yield against.counts("seconds", np.full(len(_TABLE), 1.0 / len(_TABLE)), counted)
+        return
     above = apart[apart > 0.0]
     yield against.distribution("seconds", lambda s: (case.cdf(s) - at_once) / (1.0 - at_once), above)
     if case.correlation:

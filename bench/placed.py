@@ -166,12 +166,9 @@ def _trace(verdicts: int, seed: int) -> Iterator[Row]:
     rng, changes = np.random.default_rng(seed), 10
     when = np.arange(changes) * (ticks // changes)
     due = rng.uniform(0.05, 0.95, size=(changes, len(links)))
-    lines = ["time,src,dst,availability"] + [
-        f"{tick * flown.DT!r},{src},{dst},{value!r}"
-        for tick, row in zip(when.tolist(), due.tolist(), strict=True)
-        for src, dst, value in zip(links.src, links.dst, row, strict=True)
-    ]
-    read = Trace(*trace.read(lines, links, np.ones(len(links), dtype=bool), flown.DT), True, True)
+    every, time = np.arange(len(links)), np.repeat(when * flown.DT, len(links))
+    measured = trace.Measured(time, np.tile(every, changes), due.ravel())
+    read = Trace(*trace.table(measured, links, every >= 0, flown.DT, ticks), True, True)
     lost = flown.fly(flown.medium(seed, links, traces=(read,)), ticks).fate[:, 0] == Fate.LOST
     against = Against("trace", f"{changes} changes on each of {len(links)} links")
     hits = np.add.reduceat(~lost, when, axis=0)

@@ -48,7 +48,7 @@ class Delay:
     jitter
         In seconds: half-width of UNIFORM, standard deviation of NORMAL and PARETO, not used by the others.
     table
-        TABLE: measured delays in seconds, sorted; the quantile function is straight between them.
+        TABLE: measured delays in seconds, ascending; each comes with the same probability, and no other does.
     correlation
         Of the underlying Gaussian sequence from tick to tick, in [0, 1).
     ordered
@@ -78,7 +78,8 @@ class Delay:
                 shape = self._shape
                 seconds = self.mean * (shape - 1.0) / shape * (1.0 - u) ** (-1.0 / shape)
             case Law.TABLE:
-                seconds = np.interp(u, np.linspace(0.0, 1.0, len(self.table)), self.table)
+                place = (u * len(self.table)).astype(np.int64)
+                seconds = self.table[np.minimum(place, len(self.table) - 1)]
         return np.maximum(seconds, 0.0)
 
     @property
@@ -93,7 +94,7 @@ class Delay:
                 density = np.exp(-ratio * ratio / 2.0) / np.sqrt(2.0 * np.pi)
                 return float(mean * ndtr(ratio) + jitter * density)
             case Law.TABLE:
-                return float(np.trapezoid(self.table, dx=1.0 / (len(self.table) - 1))) if len(self.table) > 1 else mean
+                return float(self.table.mean())
         return mean
 
     @property
