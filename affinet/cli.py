@@ -6,19 +6,20 @@ Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 130 interrupted.
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import operator
 import os
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, fit, options, scenario, show
+from affinet import compare, directories, fit, options, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
@@ -26,6 +27,7 @@ from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import ScenarioError
+from netem.system_errors import about, said
 from world import history
 
 if TYPE_CHECKING:
@@ -41,13 +43,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = options.parser().parse_args(arguments)
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying) as error:
         print(error, file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        print(said(error), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except RuntimeError as error:
+        if (refused := _refused(error)) is None:
+            raise
+        print(refused, file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     return status
+
+
+def _refused(error: RuntimeError) -> str | None:
+    """In one line what the system refused, where a library says so by an error of its own."""
+    if isinstance(error, BrokenExecutor):
+        return f"a worker process ended: {error}; was there memory enough, and room for its threads (ulimit -v, -u)?"
+    if "can't start new thread" in str(error):
+        return said(OSError(errno.EAGAIN, str(error)))
+    return None
 
 
 def _overrides(parsed: argparse.Namespace) -> list[str]:
@@ -122,12 +143,13 @@ def _study(parsed: argparse.Namespace) -> int:
     from affinet import study as studies
 
     study = studies.load(parsed.study)
-    out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
+    out = study_report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
     total = len(list(studies.cases(study, quick=parsed.quick)))
-    with show.Grid(study.title, total) as grid:
-        results = studies.run(study, quick=parsed.quick, watch=grid.see)
-    verdicts = judging.judge(study, results)
-    study_report.save(out, study, results, verdicts)
+    with directories.unless_empty(out):
+        with show.Grid(study.title, total) as grid:
+            results = studies.run(study, quick=parsed.quick, watch=grid.see)
+        verdicts = judging.judge(study, results)
+        study_report.save(out, study, results, verdicts)
     show.claims(study, verdicts, out)
     return PASS
 
@@ -147,15 +169,16 @@ def _hunt(parsed: argparse.Namespace) -> int:
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
         raise ScenarioError(f"--verbs {','.join(strangers)}: there are {', '.join(strategies.VERBS)}")
-    file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
-    if not file.parent.is_dir():
-        raise ScenarioError(f"--out {file}: there is no directory {file.parent}")
-    with show.Chase(parsed.budget) as chase:
+    if parsed.out and not parsed.out.parent.is_dir():
+        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
+    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
+    with directories.unless_empty(file), show.Chase(parsed.budget) as chase:
         quarry, coverage = hunt.hunt(
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
         )
-    if quarry is not None:
-        file.write_text(scenario.to_toml(quarry.scenario))
+        if quarry is not None:
+            with about(file):
+                file.write_text(scenario.to_toml(quarry.scenario), encoding="utf-8")
     show.hunted(quarry, coverage)
     status = PASS if quarry is None else _confirm(quarry, invariant, file)
     if parsed.json:
@@ -168,19 +191,19 @@ def _hunt(parsed: argparse.Namespace) -> int:
 
 def _confirm(quarry: Quarry, invariant: Checker, file: Path) -> int:
     plan = planning.make(scenario.load(str(file)))
-    out = Path("runs") / f"{file.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    out = directories.for_run(file.stem)
     with show.Progress(plan, file.stem, out) as watch:
         flown = fly(plan, "processes", out, watch.see)
     same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
     landed = evidence(plan, flown)
     found = invariant(landed) if landed else "; ".join(flown.reasons)
-    print(f"over processes, {same}: {found}\n{file}: affinet run {file}")  # noqa: T201
+    print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
     return FAIL
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
-    parsed.out = parsed.out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
     viewer = open_viewer() if parsed.view else None
+    parsed.out = parsed.out or directories.for_run(name)
     with show.Progress(plan, name, parsed.out) as watch:
         outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
     if parsed.json:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich import progress as bar
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from affinet.checks import Finding
 from affinet.outcome import Outcome
@@ -34,9 +35,9 @@ class Progress:
         self._dt = plan.world.dt
         self._first: tuple[int, float] | None = None
         self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
+            bar.TextColumn("{task.description}", markup=False),
             bar.BarColumn(),
-            bar.TextColumn("{task.fields[says]}"),
+            bar.TextColumn("{task.fields[says]}", markup=False),
             bar.TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
@@ -44,7 +45,7 @@ class Progress:
         self._task = self._bar.add_task(name, total=plan.world.ticks, says="starting")
 
     def __enter__(self) -> Progress:
-        self._bar.console.print(f"{self._name} flies in {self._out}", highlight=False)
+        self._bar.console.print(_plain(f"{self._name} flies in {self._out}"))
         self._bar.start()
         return self
 
@@ -67,9 +68,9 @@ class Chase:
         self._budget = budget
         self._broken = 0
         self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
+            bar.TextColumn("{task.description}", markup=False),
             bar.BarColumn(),
-            bar.TextColumn("{task.fields[says]}"),
+            bar.TextColumn("{task.fields[says]}", markup=False),
             console=Console(stderr=True),
             transient=True,
         )
@@ -87,7 +88,7 @@ class Chase:
         if broken is not None:
             self._broken += 1
             verbs = ", ".join(entry["verb"] for entry in broken)
-            self._bar.console.print(f"breaks: {verbs}", highlight=False)
+            self._bar.console.print(_plain(f"breaks: {verbs}"))
         says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
         self._bar.update(self._task, completed=min(coverage.schedules, self._budget), says=says)
 
@@ -97,10 +98,10 @@ class Grid:
 
     def __init__(self, title: str, cases: int) -> None:
         self._bar = bar.Progress(
-            bar.TextColumn("{task.description}"),
+            bar.TextColumn("{task.description}", markup=False),
             bar.BarColumn(),
             bar.MofNCompleteColumn(),
-            bar.TextColumn("{task.fields[says]}"),
+            bar.TextColumn("{task.fields[says]}", markup=False),
             bar.TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
@@ -121,12 +122,13 @@ class Grid:
 
 def claims(study: Study, verdicts: Sequence[Verdict], out: Path) -> None:
     """What a study says of the claims it examines."""
-    table = Table("claim", "", "found", title=f"{study.title} ({study.source})")
+    table = Table("claim", "", "found", title=_plain(f"{study.title} ({study.source})"))
     for verdict in verdicts:
-        table.add_row(verdict.says, "[green]holds[/]" if verdict.holds else "[red]does not hold[/]", verdict.found)
+        holds = "[green]holds[/]" if verdict.holds else "[red]does not hold[/]"
+        table.add_row(_plain(verdict.says), holds, _plain(verdict.found))
     console = Console()
     console.print(table)
-    console.print(f"data and figure in {out}", highlight=False)
+    console.print(_plain(f"data and figure in {out}"))
 
 
 def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
@@ -135,14 +137,14 @@ def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
     if quarry is None:
         console.print("nothing found that breaks it", highlight=False)
     else:
-        console.print(f"{quarry.finding}", markup=False, highlight=False)
+        console.print(_plain(f"{quarry.finding}"))
         for entry in quarry.scenario.timeline:
             said = entry.model_dump(mode="json", exclude_none=True)
-            console.print(f"  {said.pop('verb')} {said}", markup=False, highlight=False)
+            console.print(_plain(f"  {said.pop('verb')} {said}"))
     table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
     for counted in (coverage.verbs, coverage.selectors):
         for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
-            table.add_row(name, str(number))
+            table.add_row(_plain(name), str(number))
         table.add_section()
     console.print(table)
 
@@ -170,18 +172,18 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         ("directory", outcome.out),
     ]
     for name, value in rows:
-        table.add_row(name, value)
+        table.add_row(name, _plain(value))
     console = Console()
     console.print(table)
     for reason in outcome.reasons:
-        console.print(reason, markup=False, highlight=False)
+        console.print(_plain(reason))
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:
     """What was checked."""
-    table = Table("check", "", "says", title=f"{name}: {'can fly' if flies else 'cannot fly'}")
+    table = Table("check", "", "says", title=_plain(f"{name}: {'can fly' if flies else 'cannot fly'}"))
     for finding in found:
-        table.add_row(finding.check, _LEVELS[finding.level], finding.says)
+        table.add_row(_plain(finding.check), _LEVELS[finding.level], _plain(finding.says))
     Console().print(table)
 
 
@@ -190,7 +192,12 @@ def answer(told: Answer, dt: float) -> None:
     console = Console()
     console.print(f"from tick {told.k} ({told.k * dt:.2f} s) on:", highlight=False)
     for line in told.holds or ["nothing is imposed"]:
-        console.print(f"  {line}", markup=False, highlight=False)
+        console.print(_plain(f"  {line}"))
+
+
+def _plain(text: str) -> Text:
+    """Text of a user's as it stands: no markup, no emoji, and nothing that moves the terminal's cursor."""
+    return Text("".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text))
 
 
 def _figure(value: float | None) -> str:

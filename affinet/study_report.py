@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from affinet import directories
 from affinet.judging import graph_rates
 from affinet.quantities import NAMES, Quantity, over_time
 from affinet.study import Result, Study
@@ -24,7 +25,24 @@ from analysis.information import Array, reported, unpacked
 from analysis.target_figures import Flight
 from netem.channels import PLACE
 
+_CLAIMS = "claims.json"
 _MOST_FLIGHTS = 8  # in one picture
+
+
+def prepare(out: Path | str) -> Path:
+    """The directory for what a study leaves, made before anything flies: this one, or by default one of this name.
+
+    Raises
+    ------
+    OSError
+        When it holds a study already, or cannot be made.
+    """
+    if isinstance(out, str):
+        return directories.for_study(out)
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / _CLAIMS).exists():
+        raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
+    return out
 
 
 def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]) -> None:
@@ -32,7 +50,7 @@ def save(out: Path, study: Study, results: list[Result], verdicts: list[Verdict]
     out.mkdir(parents=True, exist_ok=True)
     pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
     pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
-    (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+    (out / _CLAIMS).write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
     if any(claim.check == "slower_with_anchor" for claim in study.claims):
         figures.rates(out / "rates.png", study.title, graph_rates())
     if all(reported(one.runs.first) for one in results):
