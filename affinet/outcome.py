@@ -154,9 +154,7 @@ def prepare(plan: Plan, out: Path) -> None:
         ) from error
     out.mkdir(parents=True, exist_ok=True)
     if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
-        raise FileExistsError(
-            f"{str(out)!r} holds a run already, or some of one: {taken[0]}; name another directory with --out"
-        )
+        raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory with --out")
     text = plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n"
     with system_errors.about(out / scenario.FILE):
         try:

@@ -74,7 +74,7 @@ def _command() -> str:
     beside = Path(sys.executable).with_name("rerun")
     command = str(beside) if beside.exists() else shutil.which("rerun")
     if command is None:
-        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
+        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path; fly without --view")
     return command
 
 
