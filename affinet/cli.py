@@ -6,20 +6,20 @@ Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 3 a user's own code failed 
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import operator
 import sys
 import tempfile
-import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet import compare, fit, options, scenario, show, terminal
+from affinet import compare, directories, fit, options, scenario, show, terminal
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
@@ -28,6 +28,7 @@ from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import Scenario, ScenarioError
 from affinet.words import among, one_line
+from netem.system_errors import about, said
 from netem.user_code import UserCodeError
 from world import history
 
@@ -51,12 +52,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = options.parser().parse_args(arguments)
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except UserCodeError as error:
         print(f"{error}; traceback: {_kept(error)}", file=sys.stderr)  # noqa: T201
         return USER_CODE
+    except OSError as error:
+        print(one_line(said(error)), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except RuntimeError as error:
+        if (refused := _refused(error)) is None:
+            raise
+        print(one_line(refused), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
@@ -75,6 +84,15 @@ def _status(outcome: Outcome) -> int:
         print(f"traceback: in {Path(outcome.out) / 'logs'}", file=sys.stderr)  # noqa: T201
         return USER_CODE
     return PASS if outcome.verdict == "pass" else FAIL
+
+
+def _refused(error: RuntimeError) -> str | None:
+    """In one line what the system refused, where a library says so by an error of its own."""
+    if isinstance(error, BrokenExecutor):
+        return f"a worker process ended: {error}; was there memory enough, and room for its threads (ulimit -v, -u)?"
+    if "can't start new thread" in str(error):
+        return said(OSError(errno.EAGAIN, str(error)))
+    return None
 
 
 def _overrides(parsed: argparse.Namespace) -> list[str]:
@@ -157,23 +175,23 @@ def _study(parsed: argparse.Namespace) -> int:
     from affinet import study as studies
 
     study = studies.load(parsed.study)
-    out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
-    planned = studies.plans(
-        study, quick=parsed.quick
-    )  # what cannot fly, be drawn or be judged is found before any has flown
-    out.mkdir(parents=True, exist_ok=True)
+    planned = studies.plans(study, quick=parsed.quick)
+    out = study_report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
     results: list[Result] = []
-    try:
-        with show.Grid(study.title, len(planned)) as grid:
-            for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
-                results.append(result)
-                grid.see(result)
-    except BrokenProcessPool:
-        print(f"a process that flew cases is gone, for want of memory perhaps; {out} has those done", file=sys.stderr)  # noqa: T201
-        return FAIL
-    finally:
-        if results:  # whatever happened meanwhile, what was flown is kept
-            study_report.save(out, study, results)
+    with directories.unless_empty(out):
+        try:
+            with show.Grid(study.title, len(planned)) as grid:
+                for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
+                    results.append(result)
+                    grid.see(result)
+        except BrokenExecutor:
+            print(
+                f"a process that flew cases is gone, for want of memory perhaps; {out} has those done", file=sys.stderr
+            )  # noqa: T201
+            return FAIL
+        finally:
+            if results:  # whatever happened meanwhile, what was flown is kept
+                study_report.save(out, study, results)
     try:
         verdicts = judging.judge(study, results)
         study_report.tell(out, verdicts)
@@ -201,18 +219,20 @@ def _hunt(parsed: argparse.Namespace) -> int:
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
         raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
-    file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
-    if not file.parent.is_dir():
-        raise ScenarioError(f"--out {file}: there is no directory {file.parent}")
-    for name, folder in given.own_modules.items():
-        if file.parent.absolute() != folder:
-            raise ScenarioError(f"--out {file}: {name} lies in {folder}: write the file there")
-    with show.Chase(parsed.budget) as chase:
+    if parsed.out and not parsed.out.parent.is_dir():
+        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
+    folder = parsed.out.absolute().parent if parsed.out else Path.cwd()
+    for name, lies_in in given.own_modules.items():
+        if folder != lies_in:
+            raise ScenarioError(f"--out: {name} lies in {lies_in}: write the file there")
+    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
+    with directories.unless_empty(file), show.Chase(parsed.budget) as chase:
         quarry, coverage = hunt.hunt(
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
         )
-    if quarry is not None:
-        file.write_text(scenario.to_toml(quarry.scenario), encoding="utf-8")
+        if quarry is not None:
+            with about(file):
+                file.write_text(scenario.to_toml(quarry.scenario), encoding="utf-8")
     show.hunted(quarry, coverage)
     status = PASS if quarry is None else _confirm(quarry, invariant, file)
     if parsed.json:
@@ -225,19 +245,19 @@ def _hunt(parsed: argparse.Namespace) -> int:
 
 def _confirm(quarry: Quarry, invariant: Checker, file: Path) -> int:
     plan = planning.make(scenario.load(str(file)))
-    out = Path("runs") / f"{file.stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    out = directories.for_run(file.stem)
     with show.Progress(plan, file.stem, out) as watch:
         flown = fly(plan, "processes", out, watch.see)
     same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
     landed = evidence(plan, flown)
     found = invariant(landed) if landed else "; ".join(flown.reasons)
-    print(f"over processes, {same}: {found}\n{file}: affinet run {file}")  # noqa: T201
+    print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
     return FAIL
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
-    parsed.out = parsed.out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
     viewer = open_viewer() if parsed.view else None
+    parsed.out = parsed.out or directories.for_run(name)
     with show.Progress(plan, name, parsed.out) as watch:
         outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
     if parsed.json:

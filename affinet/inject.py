@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import zenoh
@@ -19,6 +20,7 @@ from netem.fault import Fault, UnderWay, Verb
 from netem.keys import Keys
 from netem.links import Links
 from netem.session import Login, client
+from netem.system_errors import about, afterwards
 
 _FILE = "control.json"
 _PATIENCE_S = 5.0
@@ -91,12 +93,11 @@ class Access:
     def granted(self, out: Path) -> Iterator[None]:
         """Leave the access in the run directory, for this user alone, for as long as the run flies."""
         file = out / _FILE
-        file.touch(mode=0o600)
-        file.write_text(json.dumps({"run": self.run, "login": vars(self.login)}))
-        try:
+        with afterwards(partial(file.unlink, missing_ok=True)):
+            with about(file):
+                file.touch(mode=0o600)
+                file.write_text(json.dumps({"run": self.run, "login": vars(self.login)}))
             yield
-        finally:
-            file.unlink()
 
     @classmethod
     def to(cls, out: Path) -> Access:
@@ -113,6 +114,8 @@ class Access:
             raise NotFlying(
                 f"no run flies over processes in {out}; name the directory that `affinet run` printed"
             ) from error
+        except ValueError as error:
+            raise NotFlying(f"{out}: the run begins just now, or was broken off: {_FILE} is not whole") from error
         return cls(told["run"], Login(**told["login"]))
 
     def ask(self, order: Order) -> Answer:

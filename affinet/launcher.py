@@ -16,8 +16,10 @@ from affinet.supervision import Child, Crew, RunFailed, UserCodeFailed, module
 from agents.centre import Centre
 from agents.centre_process import CentreBrief
 from agents.process import AgentBrief
+from netem import keys
 from netem.process import MediumBrief
-from netem.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name
+from netem.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
+from netem.system_errors import said
 from world.brief import WorldBrief
 
 # The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
@@ -83,7 +85,7 @@ class Launcher:
         self._viewer = viewer
         self._watch = watch
         self._programs = programs or {}
-        self._run = f"{out.name}-{secrets.token_hex(4)}"
+        self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}
         self.flight = Flight()
@@ -94,7 +96,7 @@ class Launcher:
         logs.mkdir(parents=True, exist_ok=True)
         crew = Crew(logs)
         launched = time.perf_counter()
-        with tempfile.TemporaryDirectory(prefix="affinet-") as private:
+        with tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private:
             self._private = Path(private)
             try:
                 with crew:
@@ -104,6 +106,8 @@ class Launcher:
             except RunFailed as failure:
                 self.flight.failure = str(failure)
                 self.flight.user_code = isinstance(failure, UserCodeFailed)
+            except OSError as error:
+                self.flight.failure = f"the swarm could not be launched: {said(error)}"
         self.flight.processes = [child.report() for child in crew.children]
         _remove_unwritten(self._out)
         return self.flight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -15,9 +15,14 @@ from affinet import inputs, measures, scenario
 from affinet.bites import Bite, bites
 from affinet.measures import Figures
 from affinet.plan import Plan
+from netem import system_errors
 from netem.fate import Ledger
 from netem.timeline import Timeline
+from world import history
 from world.history import Arrays, digest
+
+_SUMMARY = "summary.json"
+_LEFT_BY_A_RUN = (scenario.FILE, _SUMMARY, history.FILE, "journal.arrows", "graph.arrows", "run.rrd")
 
 Verdict = Literal["pass", "fail", "vacuous"]
 
@@ -69,9 +74,21 @@ class Outcome:
         """Simulated seconds per second of wall time."""
         return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
 
+    def failing(self, reason: str) -> Outcome:
+        """The outcome of a run that failed for this reason too."""
+        return replace(self, verdict="fail", reasons=(*self.reasons, reason))
+
     def save(self) -> None:
-        """Write `summary.json` into the run directory."""
-        (Path(self.out) / "summary.json").write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
+        """Write `summary.json` into the run directory.
+
+        Raises
+        ------
+        OSError
+            When it cannot be written.
+        """
+        path = Path(self.out) / _SUMMARY
+        with system_errors.about(path):
+            path.write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
 
 
 def judge(
@@ -143,12 +160,26 @@ def prepare(plan: Plan, out: Path) -> None:
     ------
     FileExistsError
         When it holds a run already.
+    OSError
+        When it cannot be made, or written to.
     """
-    if (out / scenario.FILE).exists():
-        raise FileExistsError(f"{out} holds a run already; name another directory with --out")
+    try:
+        str(out).encode()
+    except UnicodeEncodeError as error:
+        raise OSError(
+            f"{str(out)!r} is no UTF-8, as what writes recordings wants it; name another with --out"
+        ) from error
     out.mkdir(parents=True, exist_ok=True)
-    flown = inputs.keep(plan.scenario, plan.journal, out)
-    (out / scenario.FILE).write_text(flown.model_dump_json(indent=2, exclude_none=True) + "\n", encoding="utf-8")
+    if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
+        raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory with --out")
+    text = inputs.keep(plan.scenario, plan.journal, out).model_dump_json(indent=2, exclude_none=True) + "\n"
+    with system_errors.about(out / scenario.FILE):
+        try:
+            file = (out / scenario.FILE).open("x", encoding="utf-8")
+        except FileExistsError as error:
+            raise FileExistsError(f"{str(out)!r} holds a run already; name another directory with --out") from error
+        with file:
+            file.write(text)
 
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:

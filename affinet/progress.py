@@ -33,7 +33,7 @@ class Bar:
         self._title, self._total, self._done, self._says = title, total, 0, says
         self._console = Console(stderr=True)
         self._bar = progress.Progress(
-            progress.TextColumn("{task.description}"), *columns, console=self._console, transient=True
+            progress.TextColumn("{task.description}", markup=False), *columns, console=self._console, transient=True
         )
         self._task = self._bar.add_task(title, total=total, says=says)
         self._every_s, self._over = every_s, threading.Event()

@@ -17,6 +17,10 @@ class NoViewer(RuntimeError):
     """The command is not there, or no viewer could be started: why."""
 
 
+class NotMended(RuntimeError):
+    """A recording that breaks off stays as it is: why."""
+
+
 def mend(recording: Path) -> None:
     """Give a recording whose writer was killed the ending it lacks, so that every tool reads it.
 
@@ -24,11 +28,15 @@ def mend(recording: Path) -> None:
 
     Raises
     ------
-    subprocess.CalledProcessError
+    NotMended
         When it cannot be mended.
     """
+    recording = recording.absolute()  # a name that begins with a dash is no option
     mended = recording.with_suffix(".mended.rrd")
-    _rrd("merge", "-o", str(mended), str(recording)).check_returncode()
+    merged = _rrd("merge", "-o", str(mended), str(recording))
+    if merged.returncode:
+        mended.unlink(missing_ok=True)
+        raise NotMended(f"{recording} breaks off, and cannot be mended: {_last_line(merged.stderr)}")
     mended.replace(recording)
     # The command asks in a tenth of the time in which its library is imported, and a run that failed is to end soon.
     if _NOTHING_IN_IT in _rrd("compare", str(recording), str(recording)).stderr:
@@ -54,8 +62,8 @@ def open_viewer() -> str:
     deadline = time.monotonic() + _START_S
     while not _listens(port):
         if viewer.poll() is not None:
-            said = viewer.stderr.read().decode(errors="replace").strip().splitlines() if viewer.stderr else []
-            raise NoViewer(f"the Rerun viewer ended at once: {said[-1] if said else 'it did not say why'}")
+            why = _last_line(viewer.stderr.read() if viewer.stderr else b"")
+            raise NoViewer(f"the Rerun viewer ended at once: {why}; fly without --view, and open run.rrd later")
         if time.monotonic() > deadline:
             viewer.terminate()
             raise NoViewer(f"the Rerun viewer did not listen within {_START_S:g} s")
@@ -66,13 +74,18 @@ def _command() -> str:
     beside = Path(sys.executable).with_name("rerun")
     command = str(beside) if beside.exists() else shutil.which("rerun")
     if command is None:
-        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path")
+        raise NoViewer("the `rerun` command of the rerun-sdk package is not on the path; fly without --view")
     return command
 
 
 def _rrd(*arguments: str) -> subprocess.CompletedProcess[bytes]:
     command = [_command(), "rrd", *arguments]
     return subprocess.run(command, check=False, stdin=subprocess.DEVNULL, capture_output=True)
+
+
+def _last_line(told: bytes) -> str:
+    lines = told.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else "it did not say why"
 
 
 def _free_port() -> int:

@@ -14,11 +14,14 @@ from affinet.inprocess import Swarm
 from affinet.launcher import Launcher
 from affinet.outcome import Outcome
 from affinet.plan import Plan
-from affinet.rerun_command import mend
+from affinet.rerun_command import NotMended, NoViewer, mend
+from netem import keys
+from netem.system_errors import said
 from netem.user_code import UserCodeError
 from world import history
 from world.formation import Array
 from world.history import History, Moments
+from world.recording import wrong_with
 
 Runtime = Literal["processes", "inprocess"]
 Watch = Callable[[int, float], None]
@@ -44,10 +47,15 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     ------
     FileExistsError
         When `out` holds a run already.
+    OSError
+        When `out` cannot be made or written to. What the system refuses later fails the run, and is told in its outcome.
     """
     outcome.prepare(plan, out)
     done = (_over_processes if runtime == "processes" else _in_process)(plan, out, watch, viewer)
-    done.save()
+    try:
+        done.save()
+    except OSError as error:
+        return done.failing(f"the summary is not written: {said(error)}")
     return done
 
 
@@ -74,20 +82,35 @@ def evidence(plan: Plan, done: Outcome) -> Evidence | None:
 def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
     from netem import journal  # pyarrow takes a while to import, and the start should not wait for it
 
-    flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
+    launcher = Launcher(plan, out, watch=watch, viewer=viewer)
+    flight = launcher.flight
+    try:
+        launcher.fly()
+    except OSError as error:
+        flight.failure = flight.failure or f"the swarm could not be launched: {said(error)}"
     path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
-    timeline = (plan.facing(journal.injected(journal.read(book))) if book.exists() else plan).timeline
+    failure, timeline = flight.failure, plan.timeline
+    if book.exists():
+        try:
+            timeline = plan.facing(journal.injected(journal.read(book))).timeline
+        except journal.JournalError as error:
+            failure = "; ".join([*filter(None, [failure]), str(error)])
     for trigger, tick in flight.fired.items():
         timeline = timeline.fired([trigger], tick)
-    if flight.failure and not path.exists() and recording.exists():
-        mend(recording)  # the world was killed, or never got far: it could not close its recording
+    if failure and not path.exists() and recording.exists():
+        try:
+            mend(recording)  # the world was killed, or never got far: it could not close its recording
+        except (NotMended, NoViewer, OSError) as error:
+            failure += f"; {said(error) if isinstance(error, OSError) else error}"
+    if not failure and plan.scenario.record.enabled:
+        failure = wrong_with(recording)
     return outcome.judge(
         plan,
         timeline,
         history.load(path) if path.exists() else None,
         in_flight=flight.in_flight,
         uninstructed=flight.uninstructed,
-        failure=flight.failure,
+        failure=failure,
         user_code=flight.user_code,
         wall_s=flight.wall_s,
         processes=flight.processes,
@@ -99,23 +122,30 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
     swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels), plan.reports)
-    started = time.perf_counter()
-    with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
+    started, failure, broken = time.perf_counter(), None, None
+    try:
+        with Logbook(out, keys.fresh(), plan.world, plan.channels, books) as logbook:
 
-        def see(moments: Moments, next_position: Array) -> None:
-            flown.extend(moments, next_position)
-            logbook.write(moments, swarm.timeline)
-            watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+            def see(moments: Moments, next_position: Array) -> None:
+                flown.extend(moments, next_position)
+                logbook.write(moments, swarm.timeline)
+                watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
 
-        failure = _flown(swarm, see, books.batch, out)
+            broken = _flown(swarm, see, books.batch, out)
+            failure = None if broken is None else str(broken)
+    except OSError as error:
+        failure = f"the run could not be written down: {said(error)}"
     wall_s = time.perf_counter() - started
-    if flown.ticks:
-        flown.save(out / history.FILE)
-    return _judged(plan, swarm, flown, wall_s, out, failure).outcome
+    try:
+        if flown.ticks:
+            flown.save(out / history.FILE)
+    except OSError as error:
+        failure = failure or f"the run could not be written down: {said(error)}"
+    return _judged(plan, swarm, flown, wall_s, out, failure, user_code=broken is not None).outcome
 
 
 def _flown(swarm: Swarm, see: Callable[[Moments, Array], None], batch: int, out: Path) -> UserCodeError | None:
-    """Why the swarm did not fly to the end, if it did not; its log has the traceback."""
+    """Why the swarm did not fly to the end, if a user's own code is why; its log has the traceback."""
     try:
         swarm.fly(see, batch)
     except UserCodeError as error:
@@ -127,7 +157,14 @@ def _flown(swarm: Swarm, see: Callable[[Moments, Array], None], batch: int, out:
 
 
 def _judged(
-    plan: Plan, swarm: Swarm, flown: History, wall_s: float, out: Path, failure: UserCodeError | None = None
+    plan: Plan,
+    swarm: Swarm,
+    flown: History,
+    wall_s: float,
+    out: Path,
+    failure: str | None = None,
+    *,
+    user_code: bool = False,
 ) -> Evidence:
     arrays = flown.arrays()
     done = outcome.judge(
@@ -136,8 +173,8 @@ def _judged(
         arrays if flown.ticks else None,
         in_flight=swarm.in_flight,
         uninstructed=0,
-        failure=None if failure is None else str(failure),
-        user_code=failure is not None,
+        failure=failure,
+        user_code=user_code,
         wall_s=wall_s,
         processes=[],
         out=out,

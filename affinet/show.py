@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich import progress as bar
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from affinet.checks import Finding
 from affinet.outcome import Outcome
@@ -102,12 +103,13 @@ class Grid:
 
 def claims(study: Study, verdicts: Sequence[Verdict], out: Path) -> None:
     """What a study says of the claims it examines."""
-    table = Table("claim", "", "found", title=f"{study.title} ({study.source})")
+    table = Table("claim", "", "found", title=_plain(f"{study.title} ({study.source})"))
     for verdict in verdicts:
-        table.add_row(verdict.says, "[green]holds[/]" if verdict.holds else "[red]does not hold[/]", verdict.found)
+        holds = "[green]holds[/]" if verdict.holds else "[red]does not hold[/]"
+        table.add_row(_plain(verdict.says), holds, _plain(verdict.found))
     console = Console()
     console.print(table)
-    console.print(f"data and figure in {out}", highlight=False)
+    console.print(_plain(f"data and figure in {out}"))
 
 
 def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
@@ -116,14 +118,14 @@ def hunted(quarry: Quarry | None, coverage: Coverage) -> None:
     if quarry is None:
         console.print("nothing found that breaks it", highlight=False)
     else:
-        console.print(f"{quarry.finding}", markup=False, highlight=False)
+        console.print(_plain(f"{quarry.finding}"))
         for entry in quarry.scenario.timeline:
             said = entry.model_dump(mode="json", exclude_none=True)
-            console.print(f"  {said.pop('verb')} {said}", markup=False, highlight=False)
+            console.print(_plain(f"  {said.pop('verb')} {said}"))
     table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
     for counted in (coverage.verbs, coverage.selectors):
         for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
-            table.add_row(name, str(number))
+            table.add_row(_plain(name), str(number))
         table.add_section()
     console.print(table)
 
@@ -159,18 +161,18 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         ("directory", outcome.out),
     ]
     for name, value in rows:
-        table.add_row(name, value)
+        table.add_row(name, _plain(value))
     console = Console()
     console.print(table)
     for reason in outcome.reasons:
-        console.print(reason, markup=False, highlight=False, soft_wrap=True)
+        console.print(_plain(reason), soft_wrap=True)
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:
     """What was checked."""
-    table = Table("check", "", "says", title=f"{name}: {'can fly' if flies else 'cannot fly'}")
+    table = Table("check", "", "says", title=_plain(f"{name}: {'can fly' if flies else 'cannot fly'}"))
     for finding in found:
-        table.add_row(finding.check, _LEVELS[finding.level], finding.says)
+        table.add_row(_plain(finding.check), _LEVELS[finding.level], _plain(finding.says))
     Console().print(table)
 
 
@@ -179,7 +181,12 @@ def answer(told: Answer, dt: float) -> None:
     console = Console()
     console.print(f"from tick {told.k} ({told.k * dt:.2f} s) on:", highlight=False)
     for line in told.holds or ["nothing is imposed"]:
-        console.print(f"  {line}", markup=False, highlight=False)
+        console.print(_plain(f"  {line}"))
+
+
+def _plain(text: str) -> Text:
+    """Text of a user's as it stands: no markup, no emoji, and nothing that moves the terminal's cursor."""
+    return Text("".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text))
 
 
 def _figure(value: float | None) -> str:

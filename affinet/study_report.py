@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from affinet import directories
 from affinet.judging import graph_rates
 from affinet.quantities import NAMES, Quantity, over_time
 from affinet.study import Result, Study
@@ -25,7 +26,24 @@ from analysis.information import Array, reported, unpacked
 from analysis.target_figures import Flight
 from netem.channels import PLACE
 
+_CLAIMS = "claims.json"
 _MOST_FLIGHTS = 8  # in one picture
+
+
+def prepare(out: Path | str) -> Path:
+    """The directory for what a study leaves, made before anything flies: this one, or by default one of this name.
+
+    Raises
+    ------
+    OSError
+        When it holds a study already, or cannot be made.
+    """
+    if isinstance(out, str):
+        return directories.for_study(out)
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / _CLAIMS).exists():
+        raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
+    return out
 
 
 def save(out: Path, study: Study, results: list[Result]) -> None:
@@ -36,7 +54,7 @@ def save(out: Path, study: Study, results: list[Result]) -> None:
 
 def tell(out: Path, verdicts: list[Verdict]) -> None:
     """Write the verdicts into a directory."""
-    (out / "claims.json").write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+    (out / _CLAIMS).write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
 
 
 def failed(out: Path) -> Path:

@@ -6,6 +6,7 @@ end is `netem/supervised.py`.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import selectors
@@ -28,6 +29,11 @@ from netem.supervised import brief_bytes
 
 _LAST_LINES = 12
 _GRACE_S = 1.2
+# What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
+_RUN = """import json, runpy, sys
+path, _, package = sys.argv[1:]
+sys.path[:] = json.loads(path)
+runpy.run_module(package, run_name="__main__", alter_sys=True)"""
 
 
 class RunFailed(RuntimeError):
@@ -75,7 +81,10 @@ class Child:
     def brief(self, brief: Any) -> None:
         """Give it its brief, which it reads when it has come that far."""
         # Longer than a pipe holds: to wait for one that imports, or is frozen, would keep a death of another from being seen.
-        threading.Thread(target=self._write, args=(brief_bytes(brief),), daemon=True).start()
+        try:
+            threading.Thread(target=self._write, args=(brief_bytes(brief),), daemon=True).start()
+        except RuntimeError as error:  # what Python makes of it where the system has no more threads
+            raise OSError(errno.EAGAIN, str(error)) from error
 
     def pause(self) -> None:
         """Stop it, as the script says."""
@@ -116,8 +125,9 @@ class Child:
 
 
 def module(package: str) -> list[str]:
-    """The command line of `python -m package`."""
-    return [sys.executable, "-P", "-m", package]
+    """The command line of `python -m package`, with the search path of this process."""
+    path = [os.path.abspath(entry) for entry in sys.path if entry]
+    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", package]
 
 
 class Crew:
@@ -138,14 +148,13 @@ class Crew:
     def start(self, role: str, program: Sequence[str], brief: Any, number: int | None = None) -> Child:
         """Start a program, and give it its brief."""
         log = self._logs / (f"{role}.log" if number is None else f"{role}-{number}.log")
-        path = os.pathsep.join(entry for entry in sys.path if entry)
         with log.open("ab") as standard_error:
             process = subprocess.Popen(
                 program,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=standard_error,
-                env=os.environ | ENVIRONMENT | {"PYTHONPATH": path},
+                env=os.environ | ENVIRONMENT,
                 start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
             )
         child = Child(role, number, process, log)

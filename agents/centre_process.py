@@ -110,12 +110,11 @@ def main() -> None:
     """Estimate until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(CentreBrief)
-    with zenoh.open(client(brief.login)) as session:
+    with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
         listener = Listener(session, brief)
         listener.await_everybody()
         supervisor.tell("ready")
-        with supervisor.confessing():
-            listener.run()
+        listener.run()
         supervisor.tell("done")
 
 

@@ -245,7 +245,7 @@ def main() -> None:
     """Fly one agent until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
-    with zenoh.open(client(brief.login)) as session, supervisor.confessing():
+    with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
         node = Node(session, brief)
         node.await_everybody()
         supervisor.tell("ready")

@@ -16,7 +16,9 @@ from analysis.consistency import DRAWN, band
 
 Array = NDArray[np.float64]
 
-mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
+mpl.rcParams.update(
+    {"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False, "text.parse_math": False}
+)
 _LOST, _FAR = 1.0, 100.0  # m²
 _DECADES = 30.0  # labels that reach farther stand on a logarithmic axis
 _LEGEND = 1.4  # inches beside the panels

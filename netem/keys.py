@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+import re
+import secrets
 from dataclasses import dataclass
+
+_PLAIN = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def fresh() -> str:
+    """A name for a run, unlike any other; it holds nothing that a user wrote, for a key expression is a grammar."""
+    return secrets.token_hex(8)
 
 
 @dataclass(frozen=True)
@@ -10,6 +19,10 @@ class Keys:
     """The keys of one run; `agent` is an agent's number, or "*" for all of them."""
 
     run: str
+
+    def __post_init__(self) -> None:
+        if not _PLAIN.fullmatch(self.run):
+            raise ValueError(f"a run called {self.run!r} has no keys: use letters, digits, '_' and '-'")
 
     def broadcast(self, agent: int | str, channel: str) -> str:
         """What an agent broadcasts on one channel (agent to medium)."""

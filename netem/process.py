@@ -320,11 +320,10 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
-    with zenoh.open(config) as session:
+    with supervisor.confessing(), zenoh.open(config) as session:
         relay = Relay(session, brief)
         relay.await_everybody()
         supervisor.tell("ready")
-        with supervisor.confessing():
-            relay.run()
+        relay.run()
         supervisor.tell("done", in_flight=relay.in_flight)
         supervisor.await_order("leave")

@@ -7,6 +7,9 @@ messages to any other that subscribes, so access control at the hub says, by def
 from __future__ import annotations
 
 import json
+import os
+import re
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +41,30 @@ _PRIORITIES = (
 _LONGEST_QUEUE = 16
 # A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh.
 _LEASE_MS = 3_600_000
+
+
+_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
+_PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
+_LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
+
+
+def socket_folder() -> str:
+    """A temporary folder in which the path of a socket is short enough for the system and plain enough for an endpoint.
+
+    Raises
+    ------
+    OSError
+        When there is none.
+    """
+    own = tempfile.gettempdir()
+    for folder in (own, *_PLACES):
+        fits = len(folder) + len(_SOCKET) <= _LONGEST_SOCKET and _PLAIN_PATH.fullmatch(folder)
+        if fits and os.access(folder, os.W_OK | os.X_OK):
+            return folder
+    raise OSError(
+        f"{own!r} is too long or too odd a path for the run's socket, and {', '.join(_PLACES)} cannot be written to; "
+        f"set TMPDIR to a plain path of at most {_LONGEST_SOCKET - len(_SOCKET)} characters"
+    )
 
 
 def agent_name(agent: int) -> str:

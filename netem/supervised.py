@@ -24,6 +24,7 @@ from typing import Any, NoReturn, TypeVar
 import msgpack
 
 from netem.plain import from_plain, plainly
+from netem.system_errors import said
 from netem.user_code import UserCodeError
 
 T = TypeVar("T")
@@ -51,6 +52,7 @@ class Supervisor:
         # What the child or a library prints belongs in its log, not among the events.
         self._events = os.dup(_STDOUT)
         os.dup2(_STDERR, _STDOUT)
+        self._confessed = False
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
         _go_on_without_a_launcher()
@@ -83,12 +85,9 @@ class Supervisor:
         try:
             yield
         except Exception as error:
-            worded = isinstance(error, Stalled | UserCodeError)
-            self.tell(
-                "failed",
-                reason=f"{error}" if worded else f"{type(error).__name__}: {error}",
-                user_code=isinstance(error, UserCodeError),
-            )
+            if not self._confessed:
+                self._confessed = True
+                self.tell("failed", reason=_reason(error), user_code=isinstance(error, UserCodeError))
             raise
 
     def _watch(self) -> None:
@@ -127,6 +126,12 @@ def _go_on_without_a_launcher() -> None:
 
 def _leave(signum: int, _frame: FrameType | None) -> NoReturn:
     raise SystemExit(128 + signum)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, Stalled | UserCodeError):
+        return str(error)
+    return said(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
 
 
 def _read_exactly(size: int) -> bytes:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.metrics import tracking_error
+from netem import system_errors
 from netem.air import Entry, newest_of
 from netem.corrupt import Mark
 from netem.fate import Fate, Fates
@@ -250,10 +251,20 @@ class History:
         return by_tick | said | {"position": self.position[: self.ticks + 1]}
 
     def save(self, path: Path) -> None:
-        """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes."""
+        """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes.
+
+        Raises
+        ------
+        OSError
+            When they cannot be written.
+        """
         unfinished = path.with_suffix(".unfinished.npz")
-        np.savez(unfinished, allow_pickle=False, **self.arrays())
-        unfinished.replace(path)
+        with system_errors.about(path):
+            try:
+                np.savez(unfinished, allow_pickle=False, **self.arrays())
+                unfinished.replace(path)
+            finally:
+                unfinished.unlink(missing_ok=True)
 
 
 def load(path: Path) -> Arrays:

@@ -8,6 +8,7 @@ from types import TracebackType
 
 import pyarrow as pa
 
+from netem import system_errors
 from netem.arrow import NAMES, Stream, named
 from netem.journal import FILE, Writer
 from netem.timeline import Timeline
@@ -38,16 +39,22 @@ class Logbook:
     Parameters
     ----------
     out, run
-        The run directory, and the run's name.
+        The run directory, and a name that no other run has.
     world, channels
         What is flown.
     books
         How to write it down.
+
+    Raises
+    ------
+    OSError
+        When something cannot be written, from the first byte to the last: which file, and why.
     """
 
     def __init__(self, out: Path, run: str, world: World, channels: Sequence[str], books: Books) -> None:
         self._every = books.every
         self._channels = list(channels)
+        self._out = out
         self._journal = Writer(out / FILE, world.links, channels)
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
         self._watch = Watch(world.formation, world.links, world.dt, books.window)
@@ -56,6 +63,7 @@ class Logbook:
             self._recorder = Recorder(
                 out / RECORDING,
                 run=run,
+                name=out.absolute().name,
                 world=world,
                 localizes=books.localizes,
                 pursues=books.pursues,
@@ -69,16 +77,22 @@ class Logbook:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._journal.close()
-        self._graph.close()
-        if self._recorder:
-            self._recorder.close()
+        def close_tables() -> None:
+            with system_errors.about(self._out), system_errors.afterwards(self._graph.close):
+                self._journal.close()
+
+        closing = [close_tables, *([self._recorder.close] if self._recorder else [])]
+        with system_errors.afterwards(*closing):
+            if error is not None:
+                raise error
 
     def write(self, moments: Moments, timeline: Timeline) -> None:
         """Write down consecutive ticks, flown under this timeline."""
-        self._journal.write(moments.first, moments.entries)
+        with system_errors.about(self._out / FILE):
+            self._journal.write(moments.first, moments.entries)
         realised = self._watch.follow(moments.first, moments.newest, timeline, self._every)
         table = columns(realised, self._channels)
-        self._graph.write({**table, "channel": named(table["channel"], self._channels)})
+        with system_errors.about(self._out / GRAPH):
+            self._graph.write({**table, "channel": named(table["channel"], self._channels)})
         if self._recorder:
             self._recorder.record(moments, timeline, realised)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import zenoh
 
-from netem import wire
+from netem import system_errors, wire
 from netem.fault import Fault
 from netem.keys import Keys
 from netem.plain import from_plain
@@ -197,17 +197,19 @@ def main() -> None:
     brief = supervisor.brief(WorldBrief)
     from world.logbook import Logbook  # takes a second to import: the lifeline is to be watched by then
 
-    with zenoh.open(client(brief.login)) as session:
+    out = Path(brief.out)
+    with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
         theatre = Theatre(session, supervisor, brief)
+        last: list[Callable[[], None]] = []
         with (
-            ExitStack() as last,
-            Logbook(Path(brief.out), brief.run, brief.world, brief.channels, brief.books) as logbook,
+            system_errors.afterwards(lambda: [step() for step in last]),
+            Logbook(out, brief.run, brief.world, brief.channels, brief.books) as logbook,
         ):
             theatre.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")
             # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
-            last.callback(theatre.history.save, Path(brief.out) / ARRAYS)
+            last.append(partial(theatre.history.save, out / ARRAYS))
             with supervisor.confessing():
                 theatre.run(logbook)
         supervisor.tell("done", uninstructed=theatre.uninstructed)

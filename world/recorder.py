@@ -5,6 +5,7 @@ Many ticks are logged at once, as columns: that is several times cheaper than ti
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis import consistency
 from analysis.metrics import procrustes_error
+from netem import system_errors
 from netem.fate import REASONS, Fate, Fates
 from netem.timeline import Conditions, Timeline
 from world.edges import of_swarms
@@ -23,6 +25,7 @@ from world.history import Moments
 from world.realised import Realised
 from world.recorded_places import Places
 from world.recorded_target import Pursued
+from world.recording import NotRecorded, writing, wrong_with
 from world.stage import TIMELINE, scalars, spatial
 from world.world import World
 
@@ -46,6 +49,7 @@ _LINK_COLOURS = {
     Fate.LOST: 0xFF9F1CFF,
     Fate.OVERFLOW: 0x26C6DAFF,
 }
+_FLUSH_S = 20.0
 _COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
 
 
@@ -57,7 +61,9 @@ class Recorder:
     path
         Of the recording.
     run
-        Its name.
+        What tells it from all others: a viewer takes recordings that share it for one.
+    name
+        What people call it.
     world
         What is flown.
     localizes, pursues
@@ -66,6 +72,11 @@ class Recorder:
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
         URL of a viewer that is listening already.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; when it is closed at the latest.
     """
 
     def __init__(
@@ -73,6 +84,7 @@ class Recorder:
         path: Path,
         *,
         run: str,
+        name: str,
         world: World,
         localizes: bool,
         pursues: bool,
@@ -85,15 +97,23 @@ class Recorder:
         self._dt = world.dt
         self._every = every
         self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
+        self._path = path
         self._stream = rr.RecordingStream("affinet", recording_id=run)
+        if not rr.is_enabled(self._stream):
+            raise NotRecorded(
+                f"{path} cannot be written: RERUN={os.environ.get('RERUN')} in the environment turns the recording off; "
+                "unset it, or set record.enabled=false"
+            )
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
-        self._stream.set_sinks(
-            *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
-        )
+        with writing(path):
+            self._stream.set_sinks(
+                *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
+            )
+        self._stream.send_recording_name(name)
         self._log_static()
         kinds = ((Places, localizes), (Pursued, pursues))
         self._layers = [layer(self._stream, world) for layer, wanted in kinds if wanted]
-        self._stream.flush()  # what a killed run leaves can be read from the first tick on
+        self._flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
@@ -117,8 +137,21 @@ class Recorder:
             layer.log(time, moments, kept, timeline)
 
     def close(self) -> None:
-        """End the file."""
-        self._stream.disconnect()
+        """End the file.
+
+        Raises
+        ------
+        OSError
+            When it is not whole.
+        """
+        with system_errors.afterwards(self._stream.disconnect):
+            self._flush()
+        if wrong := wrong_with(self._path):
+            raise NotRecorded(wrong)
+
+    def _flush(self) -> None:
+        with writing(self._path):
+            self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
 
     def _log_static(self) -> None:
         numbers = [str(agent) for agent in range(1, self._formation.agents + 1)]

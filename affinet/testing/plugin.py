@@ -101,10 +101,12 @@ def pytest_runtest_makereport(
 
 
 def _kept(hangar: Hangar) -> list[str]:
+    from affinet.directories import on_a_command_line
+
     try:
         return [
             f"seed {plan.scenario.seed}, {hangar.runtime}\nrecording: {out / 'run.rrd'}\n"
-            f"repeat: affinet replay {out} --runtime {hangar.runtime}"
+            f"repeat: affinet replay {on_a_command_line(out)} --runtime {hangar.runtime}"
             for plan, out in hangar.keep()
         ]
     except Exception as error:  # noqa: BLE001 - whatever goes wrong here, the test's own failure is what counts
