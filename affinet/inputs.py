@@ -49,7 +49,7 @@ def anchored(said: Any, folder: Path) -> Any:
     return _placed(said, lambda path: os.path.abspath(folder / path))
 
 
-def own(given: Scenario, folders: Callable[[str], Iterable[Path]]) -> dict[str, Path]:
+def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[str, Path]:
     """The folders in which the modules of a scenario's algorithms lie, by "module:Class"; without those that are installed.
 
     Parameters
@@ -57,11 +57,13 @@ def own(given: Scenario, folders: Callable[[str], Iterable[Path]]) -> dict[str, 
     given
         The scenario.
     folders
-        Where to look, by the key that names the algorithm.
+        Where to look, by the key that names the algorithm, and its name.
     """
     named = {f"agents.parameters.{name}": name for name in given.agents.parameters}
     named |= {"agents.estimator": given.agents.estimator, "agents.law": given.agents.law}
-    found = {name: modules.holder(name.partition(":")[0], folders(key)) for key, name in named.items() if ":" in name}
+    found = {
+        name: modules.holder(name.partition(":")[0], folders(key, name)) for key, name in named.items() if ":" in name
+    }
     return {name: folder for name, folder in found.items() if folder is not None}
 
 
@@ -160,7 +162,7 @@ class _Copies:
         if copy not in self.originals:
             (self.folder / copy).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, self.folder / copy)
-            self.originals[copy] = str(file)
+            self.originals[copy] = os.path.abspath(file)
 
 
 def _placed(said: Any, place: Callable[[str], str]) -> Any:

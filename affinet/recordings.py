@@ -93,7 +93,7 @@ def _notes(before: Scenario, carried: Carried, links: Links, rows: Mask, time: T
         )
     if untold := float(carried.untold[:, rows].mean()) if rows.any() else 0.0:
         notes.append(
-            f"in {untold:.2%} of its ticks and links nothing was offered, or a fault held it: there the air lets all pass"
+            f"in {untold:.2%} of its ticks and links nothing was offered, or a fault held it: there all passes"
         )
     return notes
 

@@ -46,7 +46,7 @@ def load(name: str, overrides: Sequence[str] = (), folder: Path | None = None) -
     file = files.read(name, _FOLDER, "scenario")
     origin, asked_from = Source(file.name, file.text, tuple(overrides)), folder or file.folder
     scenario = _validated(inputs.anchored(file.says, file.folder), origin, asked_from)
-    scenario._own = inputs.own(scenario, lambda key: _folders(origin, key, asked_from, file.folder))
+    scenario._own = inputs.own(scenario, lambda key, _: _folders(origin, key, asked_from, file.folder))
     return scenario
 
 
@@ -72,9 +72,12 @@ def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = Non
         raise ScenarioError(f"{out}: no run directory: {error}") from error
     origin, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
     scenario = _validated(inputs.anchored(raw, out.absolute()), origin, asked_from)
-    copies = out.absolute() / inputs.FOLDER
-    kept = [copies / shelf for shelf in dict.fromkeys(inputs.kept(out).modules.values())]
-    scenario._own = inputs.own(scenario, lambda key: _folders(origin, key, asked_from, *kept))
+    shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}
+
+    def folders(key: str, name: str) -> Sequence[Path]:
+        return _folders(origin, key, asked_from, *([shelves[name]] if name in shelves else []))
+
+    scenario._own = inputs.own(scenario, folders)
     return scenario
 
 

@@ -97,7 +97,8 @@ def elsewhere(tmp_path, monkeypatch):
     return tmp_path / "elsewhere"
 
 
-def test_what_a_scenario_names_lies_beside_it_wherever_one_works(tmp_path, monkeypatch, elsewhere):
+@pytest.mark.usefixtures("elsewhere")
+def test_what_a_scenario_names_lies_beside_it_wherever_one_works(tmp_path, monkeypatch):
     """Before: trace and module were looked for in the working directory: other files, or none."""
     file = field(tmp_path / "home")
     there = digest_of(scenario.load(str(file)))
@@ -106,7 +107,8 @@ def test_what_a_scenario_names_lies_beside_it_wherever_one_works(tmp_path, monke
     assert digest_of(scenario.load("../elsewhere/mine.toml")) != there
 
 
-def test_what_lies_only_in_the_working_directory_is_not_found(tmp_path, elsewhere):
+@pytest.mark.usefixtures("elsewhere")
+def test_what_lies_only_in_the_working_directory_is_not_found(tmp_path):
     file = field(tmp_path / "home")
     (tmp_path / "home" / "mine.py").unlink()
     assert "agents.estimator: cannot load mine:Mine" in complaint(str(file))
@@ -127,7 +129,7 @@ def test_two_scenarios_have_modules_of_one_name(tmp_path):
     assert digests[0] != digests[1]
 
 
-def test_on_the_command_line_paths_and_modules_are_those_of_the_working_directory(tmp_path, elsewhere, capsys):
+def test_on_the_command_line_paths_and_modules_are_those_of_the_working_directory(tmp_path, elsewhere):
     file = field(tmp_path / "home", estimator="none")
     shutil.rmtree(tmp_path / "home" / "field")
     sets = [
@@ -142,7 +144,8 @@ def test_on_the_command_line_paths_and_modules_are_those_of_the_working_director
     assert scenario.load(str(file), sets, elsewhere).own_modules == {"mine:Mine": tmp_path / "home"}
 
 
-def test_a_study_names_what_lies_beside_it(tmp_path, elsewhere):
+@pytest.mark.usefixtures("elsewhere")
+def test_a_study_names_what_lies_beside_it(tmp_path):
     field(tmp_path / "home")
     (tmp_path / "home" / "studies").mkdir()
     (tmp_path / "home" / "studies" / "mine.toml").write_text(STUDY)
@@ -154,7 +157,8 @@ def test_a_study_names_what_lies_beside_it(tmp_path, elsewhere):
     assert plan.estimator.folder == str(tmp_path / "home")
 
 
-def test_a_test_names_what_lies_beside_it(tmp_path, elsewhere):
+@pytest.mark.usefixtures("elsewhere")
+def test_a_test_names_what_lies_beside_it(tmp_path):
     field(tmp_path / "home")
     swarm = Hangar("inprocess", None, lambda: tmp_path / "room", tmp_path / "home")
     shipped = swarm("corridor", "time.dt=0.05", 'agents.estimator="mine:Mine"', "time.duration=0.5")
@@ -164,8 +168,9 @@ def test_a_test_names_what_lies_beside_it(tmp_path, elsewhere):
     assert digest_of(late.scenario) != digest_of(scenario.load(str(tmp_path / "home" / "mine.toml")))
 
 
+@pytest.mark.usefixtures("elsewhere")
 @pytest.mark.parametrize("runtime", ["inprocess", "processes"])
-def test_a_run_is_flown_again_from_any_folder_after_its_files_are_gone(runtime, tmp_path, elsewhere, capsys):
+def test_a_run_is_flown_again_from_any_folder_after_its_files_are_gone(runtime, tmp_path, capsys):
     """Before: a replay read the originals, relative to the working directory."""
     file = field(tmp_path / "home")
     first = fly(planning.make(scenario.load(str(file))), runtime, tmp_path / "run", lambda *_: None)
@@ -222,7 +227,7 @@ def test_files_of_one_name_do_not_collide(tmp_path):
     assert files == ["inputs/trace.csv", "inputs/trace-2.csv", "inputs/trace-3.csv", "inputs/inputs-2.json"]
 
 
-def test_an_earlier_run_that_is_the_air_of_another_is_copied(tmp_path, capsys):
+def test_an_earlier_run_that_is_the_air_of_another_is_copied(tmp_path):
     lossy = scenario.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
     fly(planning.make(lossy), "inprocess", tmp_path / "before", lambda *_: None)
     traced = [f'network.profiles.t.loss=[{{model="trace",file="{tmp_path}/before"}}]', 'network.profile="t"', "seed=3"]
@@ -244,7 +249,8 @@ def test_a_run_under_the_verdicts_of_another_is_flown_again_under_them(tmp_path)
     assert fly(again, "inprocess", tmp_path / "third", lambda *_: None).digest == second.digest
 
 
-def test_a_hunted_scenario_finds_the_estimator_of_the_hunt(tmp_path, elsewhere, capsys):
+@pytest.mark.usefixtures("elsewhere")
+def test_a_hunted_scenario_finds_the_estimator_of_the_hunt(tmp_path, capsys):
     file = field(tmp_path / "home")
     hunt = ["hunt", str(file), "--invariant", "bounded(1)", "--out", "smallest.toml"]
     assert cli.main(hunt) == 2
