@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from affinet import impairments
+from affinet import impairments, recordings
 from affinet.checks import Finding
 from affinet.echo import echo
 from affinet.impairments import LinkProfile
@@ -20,20 +20,20 @@ from netem import channels, reach, trace
 from netem.chain import ChainLayer, steady
 from netem.corrupt import Mark
 from netem.jamming import Zone
-from netem.links import Integers, Links
+from netem.links import Integers, Links, Mask
 from netem.profile import Profile
 from netem.rate import Rate
 from netem.reach import Reach
-from netem.trace import Trace
+from netem.trace import Measured, Trace
 from world.formation import Formation
 
 _ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
 
 
 def plan(
-    given: Scenario, formation: Formation, links: Links, message_bits: Array
+    given: Scenario, formation: Formation, links: Links, message_bits: Array, ruled: Mask | None = None
 ) -> tuple[Profile, tuple[Finding, ...]]:
-    """The air of a scenario, and what is to be said of it.
+    """The air of a scenario, and what is to be said of it; `ruled` are the links that ever meet it, shape (L,), if not all.
 
     Raises
     ------
@@ -43,12 +43,17 @@ def plan(
     network, dt = given.network, given.time.dt
     groups = classes(network, formation, links)
     heard = [one for one in groups if one.comms]
+    traced = [
+        _trace(one, links, one.rows if ruled is None else one.rows & ruled, given.time)
+        for one in groups
+        if one.losses(impairments.Traced)
+    ]
     profile = Profile(
         dt=dt,
         coupled=network.coupled,
         least_delay=1 if given.time.exchange == "next-tick" else 0,
         chains=tuple(layer for group in _by_channels(groups) for layer in _chain_layers(group, links)),
-        traces=tuple(_trace(one, links, given.time) for one in groups if one.losses(impairments.Traced)),
+        traces=tuple(held for held, _ in traced),
         schedules=tuple(one.schedule(links) for one in groups if one.losses(SCHEDULES)),
         reaches=tuple(_reach(one, dt) for one in groups if one.losses(REACHES)),
         zones=_zones(network, formation, links),
@@ -62,11 +67,23 @@ def plan(
         message_bits=message_bits,
     )
     notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
+    notes += [note for _, said in traced for note in said]
     return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)
 
 
-def degraded(given: Scenario, formation: Formation, links: Links, message_bits: Array, name: str, key: str) -> Profile:
-    """The air of a scenario where all links have the profile of this name, which stands at this key.
+def degraded(
+    given: Scenario, formation: Formation, links: Links, message_bits: Array, name: str, key: str, ruled: Mask
+) -> tuple[Profile, list[Finding]]:
+    """The air of links that have the profile of this name in place of their own, and the notes on it.
+
+    Parameters
+    ----------
+    given, formation, links, message_bits
+        As of `plan`.
+    name, key
+        Of the profile, and the key that names it.
+    ruled
+        The links that ever have it, shape (L,).
 
     Raises
     ------
@@ -77,9 +94,10 @@ def degraded(given: Scenario, formation: Formation, links: Links, message_bits: 
         impairments.resolve(name, given.network.profiles)
     network = given.network.model_copy(update={"profile": name, "links": []})
     try:
-        return plan(given.model_copy(update={"network": network}), formation, links, message_bits)[0]
+        air, said = plan(given.model_copy(update={"network": network}), formation, links, message_bits, ruled)
     except ScenarioError as error:
         raise ScenarioError(f"{key}: {error}") from error
+    return air, [finding for finding in said if finding.check == "trace"]
 
 
 def message_bits(names: Sequence[str], spoken: Channels, links: Links, dimension: int) -> Array:
@@ -121,27 +139,30 @@ def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer
     return layers
 
 
-def _trace(one: LinkClass, links: Links, time: Time) -> Trace:
+def _trace(one: LinkClass, links: Links, rows: Mask, time: Time) -> tuple[Trace, list[Finding]]:
     file = Path(one.losses(impairments.Traced).file)
     try:
-        ticks, availability = (_flown if file.is_dir() else _measured)(file, links, one, time)
+        if file.is_dir():
+            measured, notes = recordings.trace(file, links, rows, time, sensing=one.sensing)
+        else:
+            measured = trace.from_csv(file, links)
+            notes = _on_measured(measured, rows, time)
+        held = trace.table(measured, links, rows, time.dt, time.ticks)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: no such file") from error
     except (OSError, ValueError) as error:
         raise ScenarioError(f"network.profiles.{one.name}: trace {file}: {error}") from error
-    return Trace(ticks, availability, one.sensing, one.comms)
+    said = [Finding("trace", "note", f"profile {one.name!r}: {file.name}: {note}") for note in notes]
+    return Trace(*held, one.sensing, one.comms), said
 
 
-def _measured(file: Path, links: Links, one: LinkClass, time: Time) -> tuple[Integers, Array]:
-    with file.open(encoding="utf-8", newline="") as lines:
-        return trace.read(lines, links, one.rows, time.dt)
-
-
-def _flown(run: Path, links: Links, one: LinkClass, time: Time) -> tuple[Integers, Array]:
-    from netem import journal  # pyarrow takes a while to import
-
-    passed = journal.availability(journal.read(run / journal.FILE), links, channels.SENSE if one.sensing else None)
-    if len(passed) < time.ticks:
-        raise ValueError(f"the run has {len(passed)} ticks, this one {time.ticks}; shorten time.duration")
-    return np.arange(len(passed)), np.where(one.rows, passed, 1.0)
+def _on_measured(measured: Measured, rows: Mask, time: Time) -> list[str]:
+    moments, notes = measured.time[rows[measured.link]], []
+    if len(moments) and (last := float(moments.max())) < time.duration - time.dt:
+        notes.append(f"its last row is of {last:g} s, and each value holds to the end of the run ({time.duration:g} s)")
+    if measured.splits_ticks(time.dt, time.ticks):
+        notes.append(f"it changes within ticks of {time.dt:g} s: each tick has its mean over time")
+    return notes
 
 
 def _reach(one: LinkClass, dt: float) -> Reach:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import json
 import operator
-import os
 import sys
 import tempfile
 import time
@@ -25,7 +24,7 @@ from affinet.inject import Access, NotFlying, Wish
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
-from affinet.sections import ScenarioError
+from affinet.sections import Scenario, ScenarioError
 from world import history
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ PASS, FAIL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    sys.path.append(os.getcwd())  # so that "module:Class" finds what lies beside the scenario
     parsed = options.parser().parse_args(arguments)
     try:
         status = _COMMANDS[parsed.command](parsed)
@@ -60,9 +58,13 @@ def _overrides(parsed: argparse.Namespace) -> list[str]:
     return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
 
 
+def _scenario(parsed: argparse.Namespace) -> Scenario:
+    return scenario.load(parsed.scenario, _overrides(parsed), Path.cwd())
+
+
 def _check(parsed: argparse.Namespace) -> int:
     try:
-        findings: Sequence[Finding] = planning.make(scenario.load(parsed.scenario, _overrides(parsed))).findings
+        findings: Sequence[Finding] = planning.make(_scenario(parsed)).findings
     except PlanError as error:
         findings = error.findings
     flies = not any(finding.fatal for finding in findings)
@@ -75,7 +77,7 @@ def _check(parsed: argparse.Namespace) -> int:
 
 
 def _run(parsed: argparse.Namespace) -> int:
-    plan = planning.make(scenario.load(parsed.scenario, _overrides(parsed)))
+    plan = planning.make(_scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed)
 
 
@@ -83,7 +85,10 @@ def _replay(parsed: argparse.Namespace) -> int:
     overrides = _overrides(parsed)
     from netem.journal import JournalError  # pyarrow takes a while to import
 
-    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts)
+    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=Path.cwd())
+    for finding in plan.findings:
+        if finding.check == "inputs":
+            print(f"note: {finding.says}", file=sys.stderr)  # noqa: T201
     try:
         status = _fly(plan, "replay", parsed)
     except JournalError as error:
@@ -98,7 +103,7 @@ def _replay(parsed: argparse.Namespace) -> int:
 
 
 def _check_determinism(parsed: argparse.Namespace) -> int:
-    plan = planning.make(scenario.load(parsed.scenario, _overrides(parsed)))
+    plan = planning.make(_scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
     with tempfile.TemporaryDirectory(prefix="affinet-") as folder:
         flown = []
@@ -142,7 +147,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
     from affinet import hunt, invariants  # hypothesis takes a while to import
     from affinet.testing import strategies
 
-    given = scenario.load(parsed.scenario, _overrides(parsed))
+    given = _scenario(parsed)
     invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
     verbs = parsed.verbs or list(strategies.VERBS)
     if strangers := sorted(set(verbs) - set(strategies.VERBS)):
@@ -150,6 +155,9 @@ def _hunt(parsed: argparse.Namespace) -> int:
     file = parsed.out or Path(f"hunted-{Path(parsed.scenario).stem}.toml")
     if not file.parent.is_dir():
         raise ScenarioError(f"--out {file}: there is no directory {file.parent}")
+    for name, folder in given.own_modules.items():
+        if file.parent.absolute() != folder:
+            raise ScenarioError(f"--out {file}: {name} lies in {folder}: write the file there")
     with show.Chase(parsed.budget) as chase:
         quarry, coverage = hunt.hunt(
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see

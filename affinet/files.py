@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -11,11 +12,12 @@ from affinet.sections import ScenarioError
 
 
 class Read(NamedTuple):
-    """A file: its name, its text, and what it says."""
+    """A file: its name, its text, what it says, and the folder that paths in it are relative to."""
 
     name: str
     text: str
     says: dict[str, Any]
+    folder: Path
 
 
 def shipped(folder: str) -> list[str]:
@@ -39,11 +41,11 @@ def read(name: str, folder: str, what: str) -> Read:
         except UnicodeDecodeError as error:
             raise ScenarioError(f"{path.name}: not UTF-8, as TOML must be: {error}") from error
     elif name in shipped(folder):
-        path = Path(f"{name}.toml")
-        text = (resources.files("affinet") / folder / path.name).read_text(encoding="utf-8")
+        path = Path(str(resources.files("affinet") / folder)) / f"{name}.toml"
+        text = path.read_text(encoding="utf-8")
     else:
         raise ScenarioError(f"{name}: no such file, and no such {what}; shipped are {', '.join(shipped(folder))}")
     try:
-        return Read(path.name, text, tomllib.loads(text))
+        return Read(path.name, text, tomllib.loads(text), Path(os.path.abspath(path)).parent)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path.name}: not TOML: {error}") from error

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import resources
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
 
 from netem import text
 
@@ -16,6 +16,8 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Step = Literal["time", "packet"]
 Steps = Annotated[int, Field(ge=1)]
+
+_ENDLESS = 1e300  # s: beyond, a whole number is no float
 
 
 class Section(BaseModel):
@@ -177,13 +179,24 @@ LOSSES: dict[str, type[Section]] = {
 }
 
 
+def _delays(given: Any) -> list[float] | str | None:
+    if given is None or isinstance(given, str):
+        return given
+    if isinstance(given, list) and given and all(type(one) in (int, float) and 0 <= one < _ENDLESS for one in given):
+        return list(map(float, given))
+    raise ValueError("give delays in seconds, at least 0, like [0.010, 0.012], or the name of a file with one a line")
+
+
 class DelayModel(Section):
-    """One-way delay in seconds; `jitter` is a half-width (uniform) or a standard deviation (normal, pareto)."""
+    """One-way delay in seconds; `jitter` is a half-width (uniform) or a standard deviation (normal, pareto).
+
+    `table` holds measured delays, or names a file of them.
+    """
 
     model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"]
     mean: NotNegative | None = None
     jitter: NotNegative | None = None
-    table: list[NotNegative] | None = None
+    table: Annotated[list[float] | str | None, PlainValidator(_delays)] = None
     correlation: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     order: Literal["free", "kept"] = "free"
 
@@ -193,8 +206,6 @@ class DelayModel(Section):
         given = {name for name in ("mean", "jitter", "table") if getattr(self, name) is not None}
         if given != needs:
             raise ValueError(f"the model {self.model!r} is given by {' and '.join(sorted(needs))}")
-        if self.table is not None and (len(self.table) < 2 or sorted(self.table) != self.table):
-            raise ValueError("table needs at least two delays, in ascending order")
         if self.model == "pareto" and not (self.mean and self.jitter):
             raise ValueError("a Pareto delay needs a mean and a jitter above 0")
         return self

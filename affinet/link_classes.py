@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy as np
 from affinet import impairments, selectors
 from affinet.impairments import LinkProfile
 from affinet.sections import Network, ScenarioError, said_at
-from netem import delay, loss
+from netem import delay, loss, measured
 from netem import schedule as turns
 from netem.chain import Chain
 from netem.delay import Delay
+from netem.draws import Array
 from netem.links import Links, Mask
 from netem.schedule import Schedule
 from world.formation import Formation
@@ -23,6 +25,7 @@ SCHEDULES = (impairments.RoundRobin, impairments.Slotted, impairments.DutyCycle)
 REACHES = (impairments.Disk, impairments.Ramp, impairments.LogDistance)
 
 _NEVER = 1e-12
+_NOTHING = np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class LinkClass:
         The links, shape (L,).
     sensing, comms
         The channel classes.
+    measured
+        The delays that the profile draws from, in seconds, ascending; empty where it draws from none.
     """
 
     name: str
@@ -50,6 +55,7 @@ class LinkClass:
     rows: Mask
     sensing: bool
     comms: bool
+    measured: Array
 
     @cached_property
     def chains(self) -> list[tuple[Chain, bool]]:
@@ -65,14 +71,13 @@ class LinkClass:
 
     def delays(self, dt: float) -> list[Delay]:
         """What its messages wait, in sum."""
-        nothing, laws = np.empty(0), []
+        laws = []
         if self.delay_ticks:
-            laws.append(Delay(delay.Law.CONSTANT, self.rows, self.delay_ticks * dt, 0.0, nothing, 0.0, False))
+            laws.append(Delay(delay.Law.CONSTANT, self.rows, self.delay_ticks * dt, 0.0, _NOTHING, 0.0, False))
         if (model := self.profile.delay) is not None:
-            table = nothing if model.table is None else np.array(model.table)
             spread, kept = model.jitter or 0.0, model.order == "kept"
             law = delay.Law(model.model)
-            laws.append(Delay(law, self.rows, model.mean or 0.0, spread, table, model.correlation, kept))
+            laws.append(Delay(law, self.rows, model.mean or 0.0, spread, self.measured, model.correlation, kept))
         return laws
 
     def schedule(self, links: Links) -> Schedule:
@@ -126,9 +131,22 @@ def classes(network: Network, formation: Formation, links: Links) -> list[LinkCl
         for name, availability, ticks in dict.fromkeys(settings):
             rows = np.array([setting == (name, availability, ticks) for setting in settings])
             profile = _resolve(name, network, "network.profile")
-            one = LinkClass(name, profile, availability, ticks, rows, "sensing" in group, "comms" in group)
+            drawn_from = _measured(name, profile)
+            one = LinkClass(name, profile, availability, ticks, rows, "sensing" in group, "comms" in group, drawn_from)
             found.append(_possible(one))
     return found
+
+
+def _measured(name: str, profile: LinkProfile) -> Array:
+    table = None if profile.delay is None else profile.delay.table
+    if not isinstance(table, str):
+        return _NOTHING if table is None else np.sort(np.array(table))
+    try:
+        return measured.delays(Path(table))
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{name}: delays {table}: no such file") from error
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{name}: delays {table}: {error}") from error
 
 
 def _possible(one: LinkClass) -> LinkClass:

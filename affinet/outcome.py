@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from affinet import scenario
+from affinet import inputs, scenario
 from affinet.bites import Bite, bites
 from affinet.plan import Plan
 from netem.fate import Ledger
@@ -120,7 +120,7 @@ def judge(
 
 
 def prepare(plan: Plan, out: Path) -> None:
-    """Make the run directory, and write down what is about to be flown.
+    """Make the run directory, and write down what is about to be flown, with a copy of all it reads.
 
     Raises
     ------
@@ -130,7 +130,8 @@ def prepare(plan: Plan, out: Path) -> None:
     if (out / scenario.FILE).exists():
         raise FileExistsError(f"{out} holds a run already; name another directory with --out")
     out.mkdir(parents=True, exist_ok=True)
-    (out / scenario.FILE).write_text(plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n")
+    flown = inputs.keep(plan.scenario, plan.journal, out)
+    (out / scenario.FILE).write_text(flown.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from affinet import air, checks, registry, scenario, script, sections
+from affinet import air, checks, inputs, recordings, registry, scenario, script, sections
 from affinet.blueprint import brief_of, formation_of, world_of
 from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
@@ -26,6 +26,7 @@ from analysis.information import reported
 from analysis.pursuit import Sighting
 from netem import channels
 from netem.fault import Fault, Verb
+from netem.links import Links
 from netem.medium import Verdicted, recorded
 from netem.profile import Profile
 from netem.timeline import Timeline
@@ -164,38 +165,40 @@ def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | Non
         raise given.locate(error) from error
 
 
-def again(out: Path, overrides: Sequence[str], *, verdicts: bool) -> Plan:
+def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path | None = None) -> Plan:
     """The plan of a run directory, with the faults that were injected while it flew.
 
     Parameters
     ----------
     out
         The run directory.
-    overrides
-        Changes to its scenario.
+    overrides, folder
+        Changes to its scenario, and what paths in them are relative to, by default the run directory.
     verdicts
-        Whether its journal is to be judge, in place of the models.
+        Whether its journal is to be judge, in place of the models. Where an earlier one was, that one is anyway.
 
     Raises
     ------
     ScenarioError
-        When it holds no run, or no journal.
+        When it holds no run, or no journal, or its verdicts are of other ticks or links.
     """
     from netem import journal  # pyarrow takes a while to import, and only a replay reads journals
 
-    file = (out / journal.FILE).resolve()
+    file, judge = (out / journal.FILE).resolve(), inputs.kept(out).verdicts
+    given = scenario.resolved(out, overrides, folder)
+    if verdicts:
+        judged_by: Path | None = file
+    else:
+        judged_by = None if judge is None else (out / inputs.FOLDER / judge).resolve()
+    if judged_by is not None:
+        recordings.refuse_to_judge(scenario.resolved(out), given)
     try:
-        table = journal.read(file)
-        plan = make(
-            scenario.resolved(out, overrides),
-            injected=journal.injected(table),
-            journal=file if verdicts else None,
-        )
-        if verdicts:
-            journal.check(table, plan.channels, plan.world.ticks)
+        plan = make(given, injected=journal.injected(journal.read(file)), journal=judged_by)
+        if judged_by is not None:
+            journal.check(journal.read(judged_by), plan.channels, plan.world.ticks)
     except journal.JournalError as error:
         raise ScenarioError(f"{out}: {error}") from error
-    return plan
+    return replace(plan, findings=(*plan.findings, *inputs.changed(out)))
 
 
 def _make(given: Scenario) -> Plan:
@@ -220,11 +223,14 @@ def _make(given: Scenario) -> Plan:
     names = (channels.SENSE, *sorted(map(channels.check, [channels.MEASUREMENT, *spoken])))
     bits = air.message_bits(names, spoken, world.links, brief.dimension)
     own, aired = air.plan(given, formation, world.links, bits)
-    degraded = tuple(air.degraded(given, formation, world.links, bits, *named) for named in played.profiles)
+    degraded = [
+        air.degraded(given, formation, world.links, bits, *named, _ruled(played.faults, number, world.links))
+        for number, named in enumerate(played.profiles, start=1)
+    ]
     return Plan(
         scenario=given,
         world=world,
-        profiles=(own, *degraded),
+        profiles=(own, *(profile for profile, _ in degraded)),
         faults=played.faults,
         triggers=played.triggers,
         channels=names,
@@ -232,8 +238,21 @@ def _make(given: Scenario) -> Plan:
         estimator=estimator,
         law=law,
         reports=reports,
-        findings=(*findings, *aired, *checks.timeline(played.faults, given.time.ticks, given.time.dt)),
+        findings=(
+            *findings,
+            *aired,
+            *(note for _, said in degraded for note in said),
+            *checks.timeline(played.faults, given.time.ticks, given.time.dt),
+        ),
     )
+
+
+def _ruled(faults: Sequence[Fault], number: int, links: Links) -> Mask:
+    """Links that a fault ever gives the profile of this number."""
+    ruled = np.zeros(len(links), dtype=bool)
+    degrading = [fault for fault in faults if fault.verb is Verb.DEGRADE and fault.profile == number]
+    ruled[[links.index[pair] for fault in degrading for pair in fault.pairs]] = True
+    return ruled
 
 
 def _framework(given: Scenario, formation: Formation, law: Law[Any], estimator: Any) -> tuple[list[Finding], Array]:
@@ -263,7 +282,9 @@ def _refuse_fatal(findings: Sequence[Finding]) -> None:
 
 
 def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
-    choice = registry.choose(group, f"agents.{key}", name, given.agents.parameters.get(name, {}))
+    folder = given.own_modules.get(name)
+    parameters, lies_in = given.agents.parameters.get(name, {}), None if folder is None else str(folder)
+    choice = registry.choose(group, f"agents.{key}", name, parameters, lies_in)
     with sections.said_at(f"agents.parameters.{name}"):
         choice.build()
     return choice

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from importlib.metadata import entry_points
@@ -11,6 +10,7 @@ from typing import Any, get_type_hints
 from pydantic import ConfigDict, ValidationError, create_model
 
 from affinet.sections import ScenarioError
+from agents import modules
 from agents.process import Choice
 
 ESTIMATORS = "affinet.estimators"
@@ -22,7 +22,7 @@ def names(group: str) -> list[str]:
     return sorted(point.name for point in entry_points(group=group))
 
 
-def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choice:
+def choose(group: str, key: str, name: str, parameters: dict[str, Any], folder: str | None = None) -> Choice:
     """The algorithm of this name with these parameters, checked against its fields.
 
     Parameters
@@ -35,6 +35,8 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         An entry point, or "module:Class".
     parameters
         Keyword arguments; those not given keep their defaults.
+    folder
+        In which the module lies, if that is the user's own.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         When there is no such algorithm, or it has no such parameter, or a value does not fit.
     """
     path = _path(group, key, name)
-    algorithm = _load(key, path)
+    algorithm = _load(key, path, folder)
     if not is_dataclass(algorithm):
         raise ScenarioError(f"{key}: {path} is not a dataclass of its parameters")
     hints = get_type_hints(algorithm)
@@ -55,7 +57,7 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         where = f"agents.parameters.{name}.{'.'.join(map(str, first['loc']))}"
         wrong = "unknown" if first["type"] == "extra_forbidden" else f"{first['msg']}, got {first['input']!r}"
         raise ScenarioError(f"{where}: {wrong}; {name} has {', '.join(known) or 'no parameters'}") from error
-    return Choice(path, checked.model_dump())
+    return Choice(path, checked.model_dump(), folder)
 
 
 def check_names(key: str, given: Iterable[str]) -> None:
@@ -81,9 +83,8 @@ def _path(group: str, key: str, name: str) -> str:
     return offered[name]
 
 
-def _load(key: str, path: str) -> Any:
-    module, _, attribute = path.partition(":")
+def _load(key: str, path: str, folder: str | None) -> Any:
     try:
-        return getattr(importlib.import_module(module), attribute)
+        return modules.algorithm(path, folder)
     except (ImportError, AttributeError) as error:
         raise ScenarioError(f"{key}: cannot load {path}: {error}") from error

@@ -7,18 +7,19 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from pydantic import ValidationError
 
-from affinet import events, files, impairments, sections
+from affinet import events, files, impairments, inputs, sections
 from affinet.impairments import Section
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
 
-FILE = "scenario.json"  # in a run directory, as resolved
+FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
 
 
@@ -27,8 +28,17 @@ def shipped() -> list[str]:
     return files.shipped(_FOLDER)
 
 
-def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
+def load(name: str, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
     """The scenario in a file, or one that is shipped, with `a.b=c` overrides applied.
+
+    Parameters
+    ----------
+    name
+        Of the scenario, or the path of its file. Paths in the file, and modules it names, are relative to its folder.
+    overrides
+        Changes to it.
+    folder
+        What paths and modules in the overrides are relative to; by default the scenario's own folder.
 
     Raises
     ------
@@ -36,11 +46,21 @@ def load(name: str, overrides: Sequence[str] = ()) -> Scenario:
         When there is no such scenario, or something in it is wrong.
     """
     file = files.read(name, _FOLDER, "scenario")
-    return _validated(file.says, Source(file.name, file.text, tuple(overrides)))
+    source, asked_from = Source(file.name, file.text, tuple(overrides)), folder or file.folder
+    scenario = _validated(inputs.anchored(file.says, file.folder), source, asked_from)
+    scenario._own = inputs.own(scenario, lambda key, _: _folders(source, key, asked_from, file.folder))
+    return scenario
 
 
-def resolved(out: Path, overrides: Sequence[str] = ()) -> Scenario:
+def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
     """The scenario of a run directory, as it was flown, with overrides applied.
+
+    Parameters
+    ----------
+    out
+        The run directory. What the run read is taken from the copies in there.
+    overrides, folder
+        Changes to it, and what paths and modules in them are relative to, by default the run directory.
 
     Raises
     ------
@@ -52,7 +72,15 @@ def resolved(out: Path, overrides: Sequence[str] = ()) -> Scenario:
         raw = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ScenarioError(f"{out}: no run directory: {error}") from error
-    return _validated(raw, Source(str(file), "", tuple(overrides)))
+    source, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
+    scenario = _validated(inputs.anchored(raw, out.absolute()), source, asked_from)
+    shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}
+
+    def folders(key: str, name: str) -> Sequence[Path]:
+        return _folders(source, key, asked_from, *([shelves[name]] if name in shelves else []))
+
+    scenario._own = inputs.own(scenario, folders)
+    return scenario
 
 
 def extended(given: Scenario, entries: Sequence[Mapping[str, Any]]) -> Scenario:
@@ -65,7 +93,9 @@ def extended(given: Scenario, entries: Sequence[Mapping[str, Any]]) -> Scenario:
     """
     raw = given.model_dump(mode="json", exclude_none=True)
     raw["timeline"] += entries
-    return _validated(raw, Source("in code", "", ()))
+    scenario = _validated(raw, Source("in code", "", ()), Path())
+    scenario._own = given.own_modules
+    return scenario
 
 
 def to_toml(given: Scenario) -> str:
@@ -82,9 +112,14 @@ def _verbs(given: Scenario) -> dict[str, Any]:
     return {"timeline": entries} if entries else {}
 
 
-def _validated(raw: dict[str, Any], source: Source) -> Scenario:
+def _folders(source: Source, key: str, asked_from: Path, *folders: Path) -> Sequence[Path]:
+    """Where the module lies that a key names: beside who named it; overrides may name one that lies beside the file, too."""
+    return (asked_from, *folders) if source.overrides_say(key) else folders
+
+
+def _validated(raw: dict[str, Any], source: Source, folder: Path) -> Scenario:
     for override in source.overrides:
-        _override(raw, override)
+        _override(raw, override, folder)
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
@@ -93,7 +128,7 @@ def _validated(raw: dict[str, Any], source: Source) -> Scenario:
     return scenario
 
 
-def _override(raw: dict[str, Any], override: str) -> None:
+def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
     key, equals, text = override.partition("=")
     *tables, name = key.strip().split(".")
     if not equals or not name:
@@ -107,7 +142,8 @@ def _override(raw: dict[str, Any], override: str) -> None:
         table = table.setdefault(step, {})
         if not isinstance(table, dict):
             raise ScenarioError(f"--set {override}: {step} is not a table")
-    table[name] = value
+    said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)
+    table[name] = reduce(lambda outer, step: outer[step], [*tables, name], inputs.anchored(said, folder))
 
 
 def _explain(source: Source, problem: Mapping[str, Any]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -282,6 +283,12 @@ class Scenario(Section):
     timeline: list[AnyEvent] = Field(default_factory=list)
     record: Record = Record()
     _source: Source | None = PrivateAttr(default=None)
+    _own: dict[str, Path] = PrivateAttr(default_factory=dict)
+
+    @property
+    def own_modules(self) -> dict[str, Path]:
+        """The folders of the user's own in which modules of its algorithms lie, by "module:Class"."""
+        return self._own
 
     def locate(self, error: ScenarioError) -> ScenarioError:
         """The same error, whose text begins with a key, with the place where that key was given."""

@@ -17,12 +17,16 @@ class Source:
 
     def place(self, key: str) -> str:
         """Where a key was given: --set, or the file with the line of the key."""
-        given = [override.partition("=")[0].strip() for override in self.overrides]
-        if any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given):
+        if self.overrides_say(key):
             return "--set"
         steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
         line = _line_of(self.text, steps)
         return f"{self.file}:{line}" if line else self.file
+
+    def overrides_say(self, key: str) -> bool:
+        """Whether a key was given by --set, or a part of it, or a table that it is part of."""
+        given = [override.partition("=")[0].strip() for override in self.overrides]
+        return any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given)
 
 
 def _line_of(text: str, steps: Sequence[str | int]) -> int | None:

@@ -11,10 +11,11 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from affinet import files
 from affinet import plan as planning
@@ -131,6 +132,12 @@ class Study(Section):
     since: float = 0.0
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path | None:
+        """Of the file that says it: paths in it, and modules it names, are relative to that."""
+        return self._folder
 
     @model_validator(mode="after")
     def _drawn(self) -> Study:
@@ -198,10 +205,12 @@ def load(name: str) -> Study:
     """
     file = files.read(name, _FOLDER, "study")
     try:
-        return Study.model_validate(file.says)
+        study = Study.model_validate(file.says)
     except ValidationError as error:
         wrong = [f"{file.name}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
         raise ScenarioError("\n".join(wrong)) from error
+    study._folder = file.folder
+    return study
 
 
 def cases(study: Study, *, quick: bool) -> Iterator[Case]:
@@ -225,7 +234,7 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     """
     size = study.quick if quick else study.full
     todo = list(cases(study, quick=quick))
-    plans = [_planned(study.scenario, case) for case in todo]  # what cannot fly is found before any has flown
+    plans = [_planned(study, case) for case in todo]  # what cannot fly is found before any has flown
     context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
     with ProcessPoolExecutor(mp_context=context) as pool:
         waiting = [pool.submit(_fly, plan, size.runs) for plan in plans]
@@ -236,9 +245,11 @@ def run(study: Study, *, quick: bool, watch: Callable[[Result], None]) -> list[R
     return results
 
 
-def _planned(name: str, case: Case) -> Plan:
+def _planned(study: Study, case: Case) -> Plan:
+    folder = study.folder or Path()
+    name = str(folder / study.scenario) if study.scenario.endswith(".toml") else study.scenario
     try:
-        return planning.make(scenarios.load(name, case.overrides))
+        return planning.make(scenarios.load(name, case.overrides, study.folder))
     except (ScenarioError, PlanError) as error:
         raise ScenarioError(f"case {case.labels}: {error}") from error
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import zenoh
 
-from agents import checkpoint
+from agents import checkpoint, modules
 from agents.agent import Agent, AgentState
 from agents.brief import Array, Brief
 from agents.estimators.base import Heard
@@ -26,15 +25,15 @@ from netem.supervised import Supervisor
 
 @dataclass(frozen=True)
 class Choice:
-    """An algorithm to run: "module:Class", and its parameters."""
+    """An algorithm to run: "module:Class", its parameters, and the folder in which it lies if that is the user's own."""
 
     path: str
     parameters: dict[str, Any]
+    folder: str | None = None
 
     def build(self) -> Any:
         """The algorithm."""
-        module, _, name = self.path.partition(":")
-        return getattr(importlib.import_module(module), name)(**self.parameters)
+        return modules.algorithm(self.path, self.folder)(**self.parameters)
 
 
 @dataclass(frozen=True)

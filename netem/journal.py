@@ -190,10 +190,27 @@ def check(table: Any, channels: Sequence[str], ticks: int) -> None:
         raise JournalError(f"the journal has no verdicts on {', '.join(missing)}: it is of a run without such agents")
 
 
-def availability(table: Any, links: Links, channel: str | None) -> Array:
-    """1 where a link carried its message, 0 where the air lost it, shape (T, L).
+class Carried(NamedTuple):
+    """What the air carried in an earlier run.
 
-    Scripted faults, and agents that were silent, count as carrying: they are not the air.
+    Parameters
+    ----------
+    share
+        Of the channels' messages, shape (T, L): 0 where the air lost them. Scripted faults, and agents that were silent, are
+        not the air: there it is 1.
+    known
+        Links of which the journal says anything, shape (L,).
+    untold
+        Ticks and links where nothing was offered, or a fault held all of it, shape (T, L).
+    """
+
+    share: Array
+    known: Mask
+    untold: Mask
+
+
+def carried(table: Any, links: Links, *, sensing: bool) -> Carried:
+    """What the air carried.
 
     Parameters
     ----------
@@ -201,16 +218,22 @@ def availability(table: Any, links: Links, channel: str | None) -> Array:
         The journal of a run.
     links
         Of the run that will meet this air.
-    channel
-        Whose verdicts to take; None takes those of communication.
+    sensing
+        Whether to take the verdicts on measurements, or on all that was communicated.
+
+    Raises
+    ------
+    JournalError
+        When it has none of them.
     """
-    names = table["channel"].unique().to_pylist()
-    recorded = Recorded(table, links, names)
-    rows = [row for row, name in enumerate(names) if (name == channel if channel else name != SENSE)]
-    if not rows:
-        raise JournalError("the journal has no such channel")
-    lost = recorded.fate[:, rows[0]] >= Fate.CLOSED
-    return np.where(lost, 0.0, 1.0)
+    names = [name for name in table["channel"].unique().to_pylist() if (name == SENSE) is sensing]
+    if not names:
+        raise JournalError(f"the journal has no verdicts on {'sensing' if sensing else 'communication'}")
+    fate = Recorded(table, links, names).fate
+    offered, lost = fate != Fate.SILENT, fate >= Fate.CLOSED
+    by_air = lost | (fate == Fate.DELIVERED) | (fate == Fate.DELAYED)
+    share = 1.0 - lost.sum(axis=1) / np.maximum(offered.sum(axis=1), 1)
+    return Carried(share, offered.any(axis=(0, 1)), ~by_air.any(axis=1))
 
 
 class Recorded:
@@ -233,7 +256,8 @@ class Recorded:
         size = links.agents + 1
         row_of = np.full((size, size), -1)
         row_of[links.src, links.dst] = np.arange(len(links))
-        link = row_of[src, dst] if len(src) and max(src.max(), dst.max()) < size else np.full(len(src), -1)
+        here = (src < size) & (dst < size)
+        link = np.where(here, row_of[np.where(here, src, 0), np.where(here, dst, 0)], -1)
         shape = (int(tick.max(initial=-1)) + 1, len(channels), len(links))
         self.fate = np.zeros(shape, dtype=np.uint8)
         self.due = np.broadcast_to(np.arange(shape[0])[:, None, None], shape).copy()

@@ -78,9 +78,7 @@ def _delay(line: int, text: str) -> float:
             "give delays of one way, in seconds, one a line"
         )
     if seconds is None or not 0.0 <= seconds < np.inf:
-        raise MeasuredError(
-            f"line {line}: one delay in seconds is due, at least 0, like 0.012; got {shown(text)}"
-        )
+        raise MeasuredError(f"line {line}: one delay in seconds is due, at least 0, like 0.012; got {shown(text)}")
     return seconds
 
 

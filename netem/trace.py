@@ -77,14 +77,21 @@ class Measured(NamedTuple):
             Clock of the run, in seconds, and its length: what was measured after it is left out.
         """
         order = np.lexsort((self.time, self.link))
-        time = np.minimum(self.time[order], dt * (ticks + 1))
-        begin, link, value = time / dt, self.link[order], self.availability[order]
-        whole = np.round(begin)
-        begin = np.where(np.abs(begin - whole) <= _SLACK, whole, begin)
+        begin, link, value = self._in_ticks(dt, ticks)[order], self.link[order], self.availability[order]
         last = np.append(link[1:] != link[:-1], np.ones(min(1, len(link)), dtype=bool))
         end = np.minimum(np.where(last, np.inf, np.append(begin[1:], np.inf)), ticks)
         reached = begin < end
         return _by_tick(begin[reached], end[reached], link[reached], value[reached], links)
+
+    def splits_ticks(self, dt: float, ticks: int) -> bool:
+        """Whether anything changes within a tick of a run of this clock (s) and length."""
+        begin = self._in_ticks(dt, ticks)
+        return bool((begin != np.round(begin)).any())
+
+    def _in_ticks(self, dt: float, ticks: int) -> Array:
+        begin = np.minimum(self.time, dt * (ticks + 1)) / dt
+        whole = np.round(begin)
+        return np.where(np.abs(begin - whole) <= _SLACK, whole, begin)
 
 
 def from_csv(file: Path, links: Links) -> Measured:
@@ -143,7 +150,8 @@ def table(measured: Measured, links: Links, rows: Mask, dt: float, ticks: int) -
     TraceError
         When a link that needs a trace has none from the start.
     """
-    needed = Measured(*(field[rows[measured.link]] for field in measured))
+    needs = rows[measured.link]
+    needed = Measured(measured.time[needs], measured.link[needs], measured.availability[needs])
     changes, availability = needed.over(len(links), dt, ticks)
     if not len(changes) or changes[0] != 0:
         raise TraceError("the trace must begin at time 0")
@@ -158,7 +166,9 @@ def _heading(lines: Lines) -> tuple[list[str], str]:
     delimiter = next((one for one in _DELIMITERS if one in first), ",")
     heading = [name.strip().strip('"').strip().lower() for name in first.split(delimiter)]
     if sorted(heading) != sorted(_COLUMNS):
-        raise TraceError(f"line {line}: the columns must be {','.join(_COLUMNS)}, got {shown(first) if first else 'none'}")
+        raise TraceError(
+            f"line {line}: the columns must be {','.join(_COLUMNS)}, got {shown(first) if first else 'none'}"
+        )
     return heading, delimiter
 
 

@@ -42,7 +42,7 @@ class Censor:
         """The verbs a test asked for, with the one of this number left out."""
         self.asked, self.without = [], without
         seeds = [mark.args[0] for mark in getattr(test, "pytestmark", []) if mark.name == "affinet_seeds"]
-        test(Hangar("inprocess", next(iter(seeds), None), pytest.fail))
+        test(Hangar("inprocess", next(iter(seeds), None), pytest.fail, Path(__file__).parent))
         return self.asked
 
 

@@ -110,7 +110,9 @@ LAST = "give delays of one way, in seconds, one a line"
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        pytest.param("time,src,dst,loss\n", r"line 1: the columns must be time,src,dst,availability, got 'time,src,dst,loss'"),
+        pytest.param(
+            "time,src,dst,loss\n", r"line 1: the columns must be time,src,dst,availability, got 'time,src,dst,loss'"
+        ),
         pytest.param("time,src,dst,availability,rssi\n", "line 1: the columns must be"),
         pytest.param("", "line 1: the columns must be .*, got none"),
         pytest.param(HEADER, "must begin at time 0"),

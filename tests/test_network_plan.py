@@ -105,7 +105,20 @@ def test_a_profile_takes_from_another_what_it_does_not_say():
         (('network.profiles.x.loss=[{model="ramp",inner=3.0,outer=1.0}]',), "beyond outer"),
         (('network.profiles.x.loss=[{model="disk",range=1.0},{model="ramp",inner=1.0,outer=2.0}]',), "at most one of"),
         (('network.profiles.x.delay={model="normal",mean=0.1}',), "is given by jitter and mean"),
-        (('network.profiles.x.delay={model="table",table=[0.2,0.1]}',), "ascending"),
+        (
+            ('network.profiles.x.delay={model="table",table=[0.2,-0.1]}',),
+            "x.delay.table: give delays in seconds, at least 0",
+        ),
+        (('network.profiles.x.delay={model="table",table=[]}',), "x.delay.table: give delays in seconds, at least 0"),
+        (
+            ('network.profiles.x.delay={model="table",table=[inf]}',),
+            "x.delay.table: give delays in seconds, at least 0",
+        ),
+        (
+            ('network.profiles.x.delay={model="table",table=[true]}',),
+            "x.delay.table: give delays in seconds, at least 0",
+        ),
+        (('network.profiles.x.delay={model="table",table=3}',), "x.delay.table: give delays in seconds, at least 0"),
         (('network.profiles.x.delay={model="constant",mean=-1.0}',), "greater than or equal to 0"),
         (('network.profiles.x.corrupt=[{kind="bias",p=0.1}]',), "give `by`"),
         (('network.profiles.x.corrupt=[{kind="nan",p=0.7},{kind="stale",p=0.7}]',), "add up to at most 1"),
@@ -174,7 +187,9 @@ def test_the_losses_of_an_earlier_run_are_a_trace(tmp_path):
 
 def test_a_run_shorter_than_this_one_is_no_trace(tmp_path):
     fly(planned("time.duration=0.5"), "inprocess", tmp_path / "before", lambda *_: None)
-    assert "the run has 50 ticks, this one 100" in complaint(*traced(tmp_path / "before"))
+    assert "the run ends after 0.5 s, this one after 1 s; shorten time.duration" in complaint(
+        *traced(tmp_path / "before")
+    )
 
 
 def test_a_resolved_scenario_flies_the_same_air(tmp_path):

@@ -48,7 +48,7 @@ def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     mark = request.node.get_closest_marker(_RUNTIME)
     runtime = mark.args[0] if mark else request.config.getoption("--affinet-runtime")
     seed = getattr(request, "param", None)
-    hangar = Hangar(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"))
+    hangar = Hangar(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"), request.path.parent)
     request.node.stash[_HANGAR] = hangar
     yield hangar
     if not hangar.failed:

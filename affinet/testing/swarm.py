@@ -103,18 +103,21 @@ class Hangar:
         For all of them; None leaves each scenario's own.
     room
         Makes a new, empty directory.
+    folder
+        Of the test: paths in it, and modules it names, are relative to that.
     """
 
-    def __init__(self, runtime: Runtime, seed: int | None, room: Callable[[], Path]) -> None:
+    def __init__(self, runtime: Runtime, seed: int | None, room: Callable[[], Path], folder: Path) -> None:
         self.runtime = runtime
         self._seed = seed
         self._room = room
+        self._folder = folder
         self._flown: deque[tuple[Plan, Path | None]] = deque(maxlen=_KEPT)
         self._rooms: list[Path] = []
         self.failed = False
 
     def __call__(self, scenario: str | Path, *overrides: str) -> Swarm:
-        """A run of a scenario, shipped or a file, with `key=value` overrides.
+        """A run of a scenario, shipped or a file, with `key=value` overrides; paths are relative to the test's folder.
 
         Raises
         ------
@@ -122,7 +125,8 @@ class Hangar:
             When there is none, or something in it is wrong.
         """
         seed = () if self._seed is None else (f"seed={self._seed}",)
-        return Swarm(scenarios.load(str(scenario), (*seed, *overrides)), self._launch)
+        name = str(self._folder / scenario) if str(scenario).endswith(".toml") else str(scenario)
+        return Swarm(scenarios.load(name, (*seed, *overrides), self._folder), self._launch)
 
     def keep(self) -> list[tuple[Plan, Path]]:
         """The last runs, each with a directory that holds all of it; those flown in process are flown again to record them."""
