@@ -4,7 +4,7 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test test-all lint types imports bench clean
+.PHONY: demo test test-all test-pythons lint types imports bench clean
 
 demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
@@ -14,6 +14,9 @@ test: lint types imports ## everything that must hold, in minutes
 
 test-all: lint types imports ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
+
+test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every Python from 3.11 on that is found
+	$(BIN)/python tests/programs/pythons.py
 
 lint: $(READY)
 	$(BIN)/ruff check
@@ -35,4 +38,4 @@ $(READY): pyproject.toml uv.lock
 	touch $@
 
 clean:
-	rm -rf .venv runs
+	rm -rf .venv .venv-3.* runs

@@ -32,6 +32,7 @@ class Bar:
     ) -> None:
         self._title, self._total, self._done, self._says = title, total, 0, says
         self._console = Console(stderr=True)
+        self._is_terminal = self._console.file.isatty() and not self._console.is_dumb_terminal
         self._bar = progress.Progress(
             progress.TextColumn("{task.description}", markup=False), *columns, console=self._console, transient=True
         )
@@ -40,11 +41,11 @@ class Bar:
         self._lines = threading.Thread(target=self._say, daemon=True)
 
     def __enter__(self) -> Bar:
-        (self._bar if self._console.is_terminal else self._lines).start()
+        (self._bar if self._is_terminal else self._lines).start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._console.is_terminal:
+        if self._is_terminal:
             self._bar.stop()
         else:
             self._over.set()

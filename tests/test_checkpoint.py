@@ -1,13 +1,16 @@
 """An agent's state on disk: every estimator and law goes on from it bit for bit, whenever its process dies."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
-from importlib.metadata import entry_points
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from flying import plan_of
+from offered import by_affinet
 
 from affinet.sections import INTEGRATORS
 from agents import checkpoint
@@ -16,7 +19,7 @@ from agents.estimators.base import Heard
 from analysis.pursuit import Sighting
 from netem.channels import CENTRE
 
-ESTIMATORS, LAWS = (entry_points(group=f"affinet.{what}") for what in ("estimators", "controllers"))
+ESTIMATORS, LAWS = by_affinet("estimators"), by_affinet("controllers")
 SINGLE = {"edge-kf", "joint-kf", "silent-kf", "crkf"}  # they predict by inputs that are velocities
 PAIRS = [
     (estimator, law)
@@ -164,3 +167,29 @@ def test_a_death_while_the_first_is_written_leaves_none(two_states, tmp_path, mo
         checkpoint.save(tmp_path / "agent.npz", first)
     with pytest.raises(FileNotFoundError):
         checkpoint.load(tmp_path / "agent.npz", like=agent.init(()))
+
+
+def test_estimators_of_other_packages_are_not_tested_as_ours(tmp_path):
+    # Every package that offers one made tests of ours fail.
+    module = "from agents.estimators.none import NoEstimator\n"
+    (tmp_path / "stranger.py").write_text(module)
+    metadata = tmp_path / "stranger-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: stranger\nVersion: 1.0\n")
+    offers = "".join(f"[affinet.{what}]\nstranger = stranger:NoEstimator\n" for what in ("estimators", "controllers"))
+    (metadata / "entry_points.txt").write_text(offers)
+    program = (
+        "from affinet.registry import ESTIMATORS, LAWS, names\n"
+        "from offered import by_affinet\n"
+        "for group, what in ((ESTIMATORS, 'estimators'), (LAWS, 'controllers')):\n"
+        "    assert set(names(group)) - by_affinet(what).names == {'stranger'}\n"
+    )
+    beside = os.pathsep.join([str(tmp_path), str(Path(__file__).parent)])
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {"PYTHONPATH": beside},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

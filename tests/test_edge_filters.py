@@ -1,13 +1,13 @@
 """Filters of edges that move as inputs say, and filters without a model, against filterpy, textbooks and cases by hand."""
 
 from dataclasses import replace
-from importlib.metadata import entry_points
 
 import numpy as np
 import pytest
 from briefs import HEXA4, REST, brief, hears, only
 from filterpy.kalman import KalmanFilter
 from flying import plan_of
+from offered import by_affinet
 
 from affinet import scenario
 from affinet.inprocess import Swarm
@@ -373,7 +373,7 @@ def test_mmse_is_surer_than_the_measurement_by_the_sign_of_eq_4_21():
 
 
 def test_the_mle_is_the_mean_of_the_measurements_of_the_tick():
-    (mle,) = entry_points(group="affinet.estimators", name="mle")
+    mle = by_affinet("estimators")["mle"]
     assert mle.load() is NoEstimator
     short = ("time.dt=0.05", "time.duration=1", 'agents.estimator="mle"')
     ten, forty = (make(scenario.load("rigid", [*short, f"sensing.samples={number}"])) for number in (10, 40))

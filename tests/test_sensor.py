@@ -1,12 +1,12 @@
 """Range and bearing (paper 004, section 4.1.1): as printed, as drawn, and as flown."""
 
 from dataclasses import replace
-from importlib.metadata import entry_points
 
 import numpy as np
 import pytest
 from briefs import brief, hears
 from flying import PROCESSES, plan_of
+from offered import by_affinet
 
 from affinet.batch import fly_all
 from affinet.inprocess import Swarm
@@ -240,7 +240,7 @@ def test_estimators_fly_with_ranges_and_bearings(estimator):
 @SPACES
 @pytest.mark.parametrize("name", [name for name in FILTERS if name != "crkf"])
 def test_estimators_trust_every_measurement_by_its_own_covariance(name, dimension):
-    (found,) = entry_points(group="affinet.estimators", name=name)
+    found = by_affinet("estimators")[name]
     estimator, rng = found.load()(), np.random.default_rng(9)
     sensor = ranging(*[0.1, 0.2, 0.3][:dimension])
     told = replace(brief(np.ones((1, dimension))), sensor=sensor)

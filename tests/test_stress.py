@@ -1,7 +1,11 @@
 """A stress balances its framework, and stabilises it when the framework is universally rigid."""
 
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import combinations
 
+import cvxpy
 import numpy as np
 import pytest
 from scipy.linalg import null_space
@@ -169,3 +173,38 @@ def test_a_formation_on_a_line_of_the_plane_has_no_stress_of_rank_n_minus_3():
     nodes = np.array([[0.0, 0], [1, 0], [2, 0], [4, 0]])
     with pytest.raises(NotRigid, match=r"line|span|rigid"):
         solve(Formation(nodes, tuple(combinations((1, 2, 3, 4), 2)), (1, 2, 3)))
+
+
+def complaining(monkeypatch, solves):
+    """The modeller warns as it does of a problem that is hard, in words that may change."""
+    real = cvxpy.Problem.solve
+
+    def solve(problem, *arguments, **options):
+        warnings.warn("Solution may be inaccurate. Try another solver.", UserWarning, stacklevel=2)
+        solves.append(problem)
+        return real(problem, *arguments, **options)
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", solve)
+
+
+def test_what_the_modeller_warns_of_reaches_nobody_in_any_thread(monkeypatch):
+    # A UserWarning with a line of a library's source, or a traceback under -W error.
+    complaining(monkeypatch, solves := [])
+    before = list(warnings.filters)
+    sizes = [replace(ZHAO7, nominal=ZHAO7.nominal * scale) for scale in (1.25, 1.5, 1.75, 2.25)]
+    with ThreadPoolExecutor(len(sizes)) as pool:
+        found = list(pool.map(solve, sizes))
+    assert len(solves) == len(sizes)
+    assert warnings.filters == before
+    for formation, weights in zip(sizes, found, strict=True):
+        balance = laplacian(formation, weights) @ formation.nominal
+        np.testing.assert_allclose(balance, 0.0, atol=1e-9)
+
+
+def test_a_solver_that_gives_up_is_said_in_one_line(monkeypatch):
+    def give_up(*_, **__):
+        raise cvxpy.SolverError("Solver 'CLARABEL' failed.")
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", give_up)
+    with pytest.raises(NotRigid, match=r"^the solver found no stress .*: Solver 'CLARABEL' failed\.$"):
+        solve(replace(ZHAO7, nominal=ZHAO7.nominal * 1.125))

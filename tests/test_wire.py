@@ -8,6 +8,7 @@ import pytest
 from airs import IMPAIRMENTS, mixture
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from agents.brief import Brief
 from agents.process import AgentBrief, Choice
@@ -474,3 +475,12 @@ def test_an_unknown_word_in_a_brief_is_named_with_those_there_are():
 def test_what_has_no_plain_form_is_not_packed():
     with pytest.raises(TypeError, match="object has no plain form"):
         wire.pack(MESSAGES[2]._replace(payload={"thing": object()}))
+
+
+def test_a_record_of_what_has_no_plain_form_is_refused_with_what_there_is():
+    # KeyError: NDArray[numpy.float64], on every Python for which NumPy defines NDArray by another means.
+    with pytest.raises(
+        TypeError, match=r"float32.* has no plain form: records are made of int, float, str, bool, .*float64"
+    ):
+        from_plain(NDArray[np.float32], [1.0])
+    assert from_plain(NDArray[np.float64], [1, 2]).dtype == np.float64

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 
@@ -13,6 +17,7 @@ from world.formation import Array, Edges, Formation
 
 # The smallest nonzero eigenvalue of a stress of unit norm below which the solver cannot tell it from zero.
 _RIGID = 1e-6
+_ONE_AT_A_TIME = threading.Lock()  # filters of warnings are global: of two that overlap, one would never be undone
 
 
 class NotRigid(ValueError):
@@ -58,11 +63,17 @@ def solve(formation: Formation) -> Array:
     return weights.copy()
 
 
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """What the modeller warns of, like an inaccurate solution or a solver it cannot import, is judged here, by the answer."""
+    with _ONE_AT_A_TIME, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
 @cache
 def _solved(nominal: bytes, shape: tuple[int, int], edges: Edges) -> tuple[Array | None, str]:
     """The weights, or why there are none; a framework is solved once, however often it is planned."""
-    import cvxpy as cp  # takes seconds to import, and only planning needs it
-
     formation = Formation(np.frombuffer(nominal).reshape(shape), edges, ())
     basis = equilibrium(formation)
     affine = np.column_stack([formation.nominal, np.ones(formation.agents)])
@@ -71,12 +82,22 @@ def _solved(nominal: bytes, shape: tuple[int, int], edges: Edges) -> tuple[Array
     Q = null_space(affine.T).T
     if not basis.shape[1] or not len(Q):
         return None, "no stress but zero balances the framework"
+    with _without_warnings():
+        return _optimised(formation, basis, Q)
+
+
+def _optimised(formation: Formation, basis: Array, Q: Array) -> tuple[Array | None, str]:
+    import cvxpy as cp  # takes seconds to import, and only planning needs it
+
     B = incidence(formation.agents, formation.edges)
     coordinates, least = cp.Variable(basis.shape[1]), cp.Variable()
     reduced = Q @ B @ cp.diag(basis @ coordinates) @ B.T @ Q.T
     reduced = (reduced + reduced.T) / 2
     problem = cp.Problem(cp.Maximize(least), [reduced >> least * np.eye(len(Q)), cp.norm(coordinates, 2) <= 1.0])
-    problem.solve(solver=cp.CLARABEL)
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.SolverError as error:
+        return None, f"the solver found no stress that stabilises the framework: {error}"
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE) or least.value < _RIGID:
         return None, (
             "the framework is not universally rigid: no stress is positive semidefinite of rank "
