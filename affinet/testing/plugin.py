@@ -37,8 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """One test for each seed asked for; marks that say what cannot be fail when tests are collected."""
-    for mark in metafunc.definition.iter_markers():
-        if (wrong := _wrong(mark)) is not None:
+    for one in metafunc.definition.iter_markers():
+        if (wrong := _wrong(one)) is not None:
             pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     mark = metafunc.definition.get_closest_marker(_SEEDS)
     if mark and "swarm" in metafunc.fixturenames:
@@ -52,7 +52,11 @@ def _wrong(mark: pytest.Mark) -> str | None:
     if mark.kwargs:
         return f"{mark.name} has no keyword {next(iter(mark.kwargs))!r}: {_right(mark.name)}"
     if mark.name == _RUNTIME:
-        return None if mark.args in [(one,) for one in _RUNTIMES] else f"{_RUNTIME}({', '.join(map(repr, mark.args))}): {_right(_RUNTIME)}"
+        return (
+            None
+            if mark.args in [(one,) for one in _RUNTIMES]
+            else f"{_RUNTIME}({', '.join(map(repr, mark.args))}): {_right(_RUNTIME)}"
+        )
     if not mark.args:
         return f"{_SEEDS} has no seed: {_right(_SEEDS)}"
     if odd := [seed for seed in mark.args if type(seed) is not int or not 0 <= seed < _MOST]:
