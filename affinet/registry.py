@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
-from affinet import explain
+from affinet import explain, forms
 from affinet.sections import ScenarioError
 from affinet.words import among, hint
 from agents.process import Choice
@@ -54,7 +54,7 @@ def choose(group: str, key: str, name: str, parameters: dict[str, Any]) -> Choic
         checked = model.model_validate(parameters)
     except ValidationError as error:
         (first, *_) = error.errors()
-        where = f"agents.parameters.{name}.{'.'.join(map(str, first['loc']))}"
+        where = f"agents.parameters.{name}.{forms.place(model, first['loc']).key}"
         wrong = explain.wrong(first, model)
         if first["type"] == "extra_forbidden":
             wrong = f"unknown; {hint(first['loc'][0], known)}".rstrip("; ")
