@@ -127,9 +127,7 @@ def _study(parsed: argparse.Namespace) -> int:
 
     study = studies.load(parsed.study)
     out = parsed.out or Path("studies") / f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}"
-    planned = studies.plans(
-        study, quick=parsed.quick
-    )  # what cannot fly, be drawn or be judged is found before any has flown
+    planned = studies.plans(study, quick=parsed.quick)  # whatever cannot fly, be drawn or be judged is found here
     out.mkdir(parents=True, exist_ok=True)
     results: list[Result] = []
     try:
