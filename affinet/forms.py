@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -83,6 +83,7 @@ EXAMPLES: Mapping[str, Any] = {
     "claims.levels": {"static": 0.5},
     "claims.between": [0.9, 1.1],
 }
+_LISTS = (list, tuple, Sequence)
 _NUMBERS = (1.0, 0.5, 2.0, 0.0)
 
 
@@ -122,7 +123,7 @@ def place(model: type[BaseModel], loc: tuple[str | int, ...]) -> Place:
             kind = Any if field is None else annotated(field)
         else:
             names += ["*"] * (get_origin(kind) is dict)
-            kind = (get_args(kind) or (Any,))[-1]
+            kind = next((one for one in reversed(get_args(kind)) if one is not ...), Any)
     return Place(".".join(keys), ".".join(names), kind)
 
 
@@ -183,7 +184,7 @@ def example(kind: Any, path: str) -> Any:
             for name, field in first.model_fields.items()
             if field.is_required()
         }
-    if get_origin(first) is list:
+    if get_origin(first) in _LISTS:
         inner = get_args(first)[0]
         if get_origin(bare(inner)) is list:
             return [[1.0, 0.0], [0.0, 1.0]]
@@ -223,7 +224,7 @@ def _what(kind: Any) -> str:
         return "one of"
     if _is_model(kind) or get_origin(kind) is dict:
         return "a table"
-    if get_origin(kind) in (list, tuple):
+    if get_origin(kind) in _LISTS:
         return "a list"
     return {float: "a number", int: "a whole number", bool: "true or false", str: "text in quotes"}.get(
         kind, "something else"

@@ -68,10 +68,7 @@ def of_plans(study: Study, planned: Sequence[Planned], every: Sequence[int]) -> 
             side_by_side(plan, [0])
         except NotABatch as error:
             yield "scenario", f"case {named(case.labels)}: {error}"
-    spans = {
-        id(plan): (len(range(0, plan.world.ticks, step)), step) for (_, plan), step in zip(planned, every, strict=True)
-    }
-    moments = {key: [tick * step for tick in range(number)] for key, (number, step) in spans.items()}
+    moments = {id(plan): range(0, plan.world.ticks, step) for (_, plan), step in zip(planned, every, strict=True)}
     yield from _quantity("quantity", study.quantity, planned)
     yield from _span("since", (study.since, None), planned, moments)
     if study.figure == "curves" and len({plan.world.formation.dimension for _, plan in planned}) > 1:
@@ -220,7 +217,7 @@ def _maps(key: str, planned: Sequence[Planned]) -> Iterator[Wrong]:
             yield key, f"the indicator is bounded for a sensor of coordinates; case {named(case.labels)} has another"
 
 
-def _span(key: str, span: Span, planned: Sequence[Planned], moments: Mapping[int, Sequence[int]]) -> Iterator[Wrong]:
+def _span(key: str, span: Span, planned: Sequence[Planned], moments: Mapping[int, range]) -> Iterator[Wrong]:
     since, until = span
     for case, plan in planned:
         seconds = [tick * plan.world.dt for tick in moments[id(plan)]]

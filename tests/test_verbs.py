@@ -290,6 +290,54 @@ def test_what_touches_nothing_makes_the_run_vacuous(name, flown):
     assert reason.startswith(f"'{outcome.faults[-1].fault.describe()}' touched no ")
 
 
+WHY = {
+    "cut of a dead agent": "it changed nothing of the 40 messages on 2->4 meanwhile (40 dead)",
+    "partition of agents without a link": "its links carried nothing while it lasted",
+    "lose under a cut": "it changed nothing of the 40 messages on 2->4 meanwhile (40 cut)",
+    "lose by no chance": "its probability is 0",
+    "degrade to what is no worse": "it changed nothing of the 40 messages on 2->4 meanwhile (40 delivered)",
+    "clock of who does not know the mission": "its agents do not fly by their clocks: leaders do, and followers that feed "
+    "the manoeuvre forward",
+    "clock of a dead leader": "its agents were dead or paused while it lasted",
+    "clock that has not lost a tick yet": "its clocks gained less than a tick, 0.05 s, while it lasted",
+    "gust on who holds, departed": "its agents held still, dead or departed, while it lasted",
+    "outlier of no chance": "its probability, 1e-12, struck none of the 10 measurements on 2->4 meanwhile (10 delivered)",
+    "lie of who tells no map": "nobody tells a Theta: the estimator 'rkf' has none to tell",
+    "lie of a dead agent": "its links carried nothing while it lasted",
+}
+NEVER_BEGAN = {
+    "it starts at 3 s, and the run ends at 2 s": scripted("cut", 3.0),
+    "it is over before the next tick: it lasts less than dt, 0.05 s": [SEVERED | {"at": 1.0, "until": 1.01}],
+    "its condition never came: the tracking error was never above 1e+09 m², at the most 0.": scripted(
+        "cut", 0.0, when=NEVER
+    ),
+    "its condition never came: the tracking error was never below 1e-30 m², at the least 0.": scripted(
+        "cut", 0.0, when={"tracking_error_below": 1e-30}
+    ),
+    "its condition never came: the tracking error was never above 0 m² for 60 s in a row": scripted(
+        "cut", 0.0, when={"tracking_error_above": 0.0, "lasting": 60.0}
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("says", "given"),
+    [
+        *((says, VACUOUS[name]) for name, says in WHY.items()),
+        *((says, (entries, ())) for says, entries in NEVER_BEGAN.items()),
+    ],
+    ids=[*WHY, *(says[:40] for says in NEVER_BEGAN)],
+)
+def test_what_touches_nothing_says_why(says, given, flown):
+    entries, over = given
+    outcome = flown(*entries, over=over).outcome
+    bite, (reason,) = outcome.faults[-1], outcome.reasons
+    assert says in reason
+    assert reason == f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}"
+    assert str(bite).endswith(f" touched 0 {bite.what}: {bite.why}")
+    assert outcome.to_json()["faults"][-1]["why"] == bite.why
+
+
 # ---- conditions
 
 

@@ -19,8 +19,9 @@ RAW = re.compile(
 
 def refused(*overrides):
     """What is said of the corridor with these overrides."""
+    flown = "target" if "parameters.target" in overrides[0] else "corridor"
     with pytest.raises(ScenarioError) as error:
-        plan.make(scenario.load("corridor", overrides))
+        plan.make(scenario.load(flown, overrides))
     (line,) = str(error.value).splitlines()
     assert not RAW.search(line)
     return line.removeprefix("--set: ")
@@ -102,6 +103,8 @@ WRONG_FORMS = [
     ),
     pytest.param("agents.parameters.rkf=0.5", "should be a table, like { sigma_w = 0.5 }, got 0.5", id="p"),
     pytest.param("agents.parameters.ga-rkf.sigma_w='a'", 'should be a number, like 1.0, got "a"; ga-rkf has', id="parameter"),
+    pytest.param("agents.parameters.target.k=3", "parameters.target.k: should be a list, like [1.0], got 3", id="k"),
+    pytest.param("agents.parameters.target.k=['a']", 'parameters.target.k.1: should be a number, like 1.0, got "a"', id="k.1"),
     pytest.param("dynamics.kernel={}", "dynamics.kernel.length: is missing; it has no default: give a number", id="missing"),
     pytest.param(
         "manoeuvre={ keyframes = [{ time = 0 }, { time = 1 }] }",

@@ -37,8 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """One test for each seed asked for; marks that say what cannot be fail when tests are collected."""
-    for mark in metafunc.definition.iter_markers():
-        if (wrong := _wrong(mark)) is not None:
+    for one in metafunc.definition.iter_markers():
+        if (wrong := _wrong(one)) is not None:
             pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     mark = metafunc.definition.get_closest_marker(_SEEDS)
     if mark and "swarm" in metafunc.fixturenames:
