@@ -19,7 +19,7 @@ from affinet.checks import Finding
 from affinet.sections import Scenario, ScenarioError
 from agents.agent import Agent
 from agents.brief import Brief, Mask
-from agents.calling import Calling
+from agents.calling import Calling, name_of
 from agents.centre import Centre
 from agents.controllers import Law, needs_mission
 from agents.estimators.centralized import CentralizedFilter
@@ -34,6 +34,7 @@ from netem.medium import Verdicted, recorded
 from netem.profile import Profile
 from netem.timeline import Timeline
 from netem.trigger import Trigger
+from netem.user_code import UserCodeError, definition
 from world import stress
 from world.brief import Books
 from world.formation import Array, Formation
@@ -317,19 +318,9 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
 
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
-    with Calling(law, "order"):
-        order = getattr(law, "order", None)
-    if order not in range(1, len(sections.INTEGRATORS) + 1):
-        raise ScenarioError(
-            f"agents.law: {given.agents.law} has no 'order': 1 if it steers velocities, 2 if accelerations, 3 if jerks, "
-            "4 if snaps"
-        )
-    for name, what in (
-        ("by_stress", "it weighs edges by the stress"),
-        ("by_position", "it needs the agent's position"),
-    ):
-        if getattr(law, name, None) not in (True, False):
-            raise ScenarioError(f"agents.law: {given.agents.law} has no {name!r}: whether {what}")
+    _check_says(law, "order", (1, 2, 3, 4), "1 if it steers velocities, 2 if accelerations, 3 if jerks, 4 if snaps")
+    _check_says(law, "by_stress", (True, False), "whether it weighs edges by the stress")
+    _check_says(law, "by_position", (True, False), "whether it needs the agent's position")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if given.formation.leaders and law.order > 2:
@@ -341,6 +332,14 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
             f"dynamics.model: {given.agents.law} steers {steers}, and bodies are {given.dynamics.model}s; "
             f"set it to {fits!r}, or choose another law"
         )
+
+
+def _check_says(law: Law[Any], name: str, values: tuple[int, ...], what: str) -> None:
+    with Calling(law, name):
+        said = getattr(law, name, None)
+    if said not in values:
+        has_none = f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
+        raise UserCodeError(name_of(type(law)), has_none, definition(type(law)))
 
 
 def _agents(

@@ -307,7 +307,7 @@ class Scenario(Section):
 
     def locate(self, error: ScenarioError) -> ScenarioError:
         """The same error, whose text begins with a key, with the place where that key was given."""
-        key = str(error).partition(":")[0]
+        key = str(error).partition(": ")[0]  # "module:Class" may be part of it
         return ScenarioError(f"{self._source.place(key)}: {error}") if self._source else error
 
 

@@ -18,6 +18,7 @@ from agents.estimators.none import NoEstimator
 from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity, pilot
 from analysis.affine import Manoeuvre
 from netem.channels import INPUT
+from netem.user_code import UserCodeError
 from world.dynamics import carried
 from world.maneuver import hover, ravine
 
@@ -66,9 +67,11 @@ def test_varying_velocity_accelerates_as_the_neighbours_say_falls_and_is_damped(
 class Orderless:
     """A law that does not say whether it steers velocities or accelerations; nobody gets as far as to call it."""
 
+    init = command = lambda *_: None
+
 
 def test_a_law_that_does_not_say_its_order_is_refused():
-    with pytest.raises(ScenarioError, match=r"agents.law: .*Orderless has no 'order'"):
+    with pytest.raises(UserCodeError, match=r"Orderless: has no 'order': 1 if it steers velocities"):
         plan_of("corridor", f'agents.law="{__name__}:Orderless"')
 
 

@@ -317,6 +317,15 @@ LACKING = [
 ]
 
 
+ORDER = "    order: ClassVar[int] = 1\n"
+LACKING += [
+    pytest.param("law", broken(LAW, (ORDER, "")), "has no 'order': 1 if it steers velocities, 2 if acc", id="order"),
+    pytest.param("law", broken(LAW, (ORDER, ORDER.replace("1", "7"))), "'order' is 7: 1 if it steers", id="order-7"),
+    pytest.param("law", broken(LAW, ("by_stress", "stress")), "has no 'by_stress': whether it weighs", id="by-stress"),
+    pytest.param("law", broken(LAW, ("by_position", "at")), "has no 'by_position': whether it needs", id="by-position"),
+]
+
+
 @pytest.mark.parametrize(("key", "text", "says"), LACKING)
 def test_what_is_no_algorithm_says_what_it_lacks(key, text, says, folder):
     name = write(folder, text)
