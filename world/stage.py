@@ -8,7 +8,15 @@ import rerun as rr
 from world.formation import Array
 
 TIMELINE = "sim_time"
+# Recordings hold single floats, which tell millimetres apart up to this distance from their origin, in metres.
+_FAR = 1000.0
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
+
+
+def origin(position: Array) -> Array:
+    """The origin of a recording of a swarm that begins here (N, D), shape (D,), in metres: that of space, unless it is far."""
+    rounded: Array = _FAR * np.trunc(position.mean(axis=0) / _FAR)
+    return rounded
 
 
 def spatial(position: Array) -> Array:
