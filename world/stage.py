@@ -14,8 +14,8 @@ _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
 
 
 def origin(position: Array) -> Array:
-    """The origin of a recording of a swarm that begins here (N, D), shape (D,), in metres: that of space, unless it is far."""
-    rounded: Array = _FAR * np.trunc(position.mean(axis=0) / _FAR)
+    """The origin of a recording of agents that begin here (N, D), shape (D,), in metres: that of space, unless it is far."""
+    rounded: Array = _FAR * np.trunc(position[0] / _FAR)
     return rounded
 
 
