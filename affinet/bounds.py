@@ -34,6 +34,7 @@ Positive = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False), Afte
 NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Bearing = Annotated[float, Field(gt=0.0, le=pi, allow_inf_nan=False), AfterValidator(_not_tiny)]
 ShareOfDistance = Annotated[float, Field(gt=0.0, le=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+BitsPerSecond = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False), AfterValidator(_not_tiny)]
 AtLeast1 = Annotated[float, Field(ge=1.0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]

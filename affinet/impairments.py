@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from affinet.bounds import AtLeast1, Below1, Finite, NotNegative, Positive, Probability, Steps, Ticks
+from affinet.bounds import AtLeast1, Below1, BitsPerSecond, Finite, NotNegative, Positive, Probability, Steps, Ticks
 from netem import text
 
 Step = Literal["time", "packet"]
@@ -214,7 +214,7 @@ class Corruption(Section):
 class RateLimit(Section):
     """A token bucket: rate in bits per second, burst and queue in bytes."""
 
-    rate: Positive
+    rate: BitsPerSecond
     queue: Steps = 10_000
     burst: Ticks = 0
 

@@ -92,7 +92,8 @@ def test_any_parameter_is_refused_in_one_line_that_names_its_key_or_flies(group,
         flown_or_refused(file, {**base, "agents": agents}, (name, parameter))
 
 
-TIMES = "manoeuvre={keyframes=[{time=1.0,theta=[[1,0],[0,1]],offset=[0,0]},{time=1.0000000000000002,theta=[[1,0],[0,1]],offset=[1,0]}]}"
+FRAME = "{time=%s,theta=[[1,0],[0,1]],offset=[%s,0]}"
+TIMES = f"manoeuvre={{keyframes=[{FRAME % (1.0, 0)},{FRAME % (1.0000000000000002, 1)}]}}"
 SLOW_PROFILE = 'network={profile="slow",profiles={slow={delay={model="constant",mean=%s}}}}'
 PIT = 'timeline=[{verb="cut",at=0,every=%s,lasts=%s,links=["1-2"]}]'
 

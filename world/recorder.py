@@ -90,7 +90,7 @@ class Recorder:
         self._stream.set_sinks(
             *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
         )
-        self._origin = origin(world.begin().position)
+        self._origin = origin(world)
         self._log_static()
         kinds = ((Places, localizes), (Pursued, pursues))
         self._layers = [layer(self._stream, world, self._origin) for layer, wanted in kinds if wanted]
