@@ -118,8 +118,8 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
     for number, (earlier, later) in enumerate(pairwise(frames.times), start=2):
         if later - earlier < given.time.dt:
             raise ScenarioError(
-                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after the one before; "
-                "move it, or lower time.dt"
+                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after "
+                "the one before; move it, or lower time.dt"
             )
     return maneuver.keyframes(seconds, *frames)
 

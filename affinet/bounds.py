@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field
 
 SMALLEST, LARGEST = 1e-9, 1e9
 MOST = 10**9
+_SHORTEST_TICK = 1e-6
 
 
 def _not_tiny(value: float) -> float:
@@ -21,15 +22,22 @@ def _not_tiny(value: float) -> float:
     return value
 
 
+def _long_enough(tick: float) -> float:
+    if tick < _SHORTEST_TICK:
+        raise ValueError(f"should be at least {_SHORTEST_TICK:g}, got {tick:g}")
+    return tick
+
+
 Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Below1 = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Bearing = Annotated[float, Field(gt=0.0, le=pi, allow_inf_nan=False), AfterValidator(_not_tiny)]
 ShareOfDistance = Annotated[float, Field(gt=0.0, le=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
+BitsPerSecond = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False), AfterValidator(_not_tiny)]
 AtLeast1 = Annotated[float, Field(ge=1.0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
-Tick = Annotated[float, Field(ge=1e-6, le=100.0, allow_inf_nan=False)]
+Tick = Annotated[float, Field(gt=0.0, le=100.0, allow_inf_nan=False), AfterValidator(_long_enough)]
 Steps = Annotated[int, Field(ge=1, le=MOST)]
 Ticks = Annotated[int, Field(ge=0, le=MOST)]

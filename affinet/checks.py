@@ -54,6 +54,8 @@ class Finding:
 
 def graph(formation: Formation) -> list[Finding]:
     """Whether the graph joins all agents."""
+    if formation.agents < 2:
+        return [Finding("graph", "error", "one agent has nobody to see or hear: give a second node, and an edge to it")]
     return [_connected(formation), _edges(formation)]
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
 
-from affinet.bounds import AtLeast1, Below1, Finite, NotNegative, Positive, Probability, Steps, Ticks
+from affinet.bounds import AtLeast1, Below1, BitsPerSecond, Finite, NotNegative, Positive, Probability, Steps, Ticks
 from affinet.words import among
 from netem import text
 
@@ -226,7 +226,7 @@ class Corruption(Section):
 class RateLimit(Section):
     """A token bucket: rate in bits per second, burst and queue in bytes."""
 
-    rate: Positive
+    rate: BitsPerSecond
     queue: Steps = 10_000
     burst: Ticks = 0
 

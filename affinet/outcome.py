@@ -130,10 +130,10 @@ def judge(
     if not failure:
         wrong += _what_is_wrong(arrays, messages)
     idle = [bite for bite in faults if not bite.touched]
-    verdict: Verdict = "fail" if wrong else "vacuous" if idle else "pass"
-    reasons = wrong or [
-        f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle
-    ]
+    empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
+    empty += _untracked(arrays)
+    verdict: Verdict = "fail" if wrong else "vacuous" if empty else "pass"
+    reasons = wrong or empty
     return Outcome(
         verdict=verdict,
         reasons=tuple(reasons),
@@ -207,6 +207,8 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
     wrong = []
     if arrays is None or not np.isfinite(arrays["position"]).all():
         wrong.append("the swarm diverged: a position is not a number any more")
+    elif np.isinf(arrays["error"]).any():
+        wrong.append("the swarm diverged: its tracking error is too large for a number")
     elif not np.isfinite(arrays["estimate"][arrays["known"]]).all():
         wrong.append("an estimate is not a number any more")
     if messages["uninstructed"]:
@@ -216,6 +218,17 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
         offered = f"{messages['offered']} messages offered and {messages['copies']} doubled"
         wrong.append(f"the accounts do not close: {offered}, {booked} accounted for")
     return wrong
+
+
+def _untracked(arrays: Arrays | None) -> list[str]:
+    if arrays is None or not len(arrays["error"]):
+        return ["no tick was flown: it proved nothing"]
+    nobody = int(np.isnan(arrays["error"]).sum())
+    if not nobody:
+        return []
+    return [
+        f"nobody took part in {nobody} of {len(arrays['error'])} ticks: there is no tracking error, and it proved nothing"
+    ]
 
 
 def _tracking(arrays: Arrays | None) -> Figures:

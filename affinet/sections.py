@@ -83,7 +83,7 @@ class Formation(Section):
 
 
 class Keyframe(Section):
-    """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i, turned by an angle in radians, + offset."""
+    """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i turned by an angle (rad), + offset."""
 
     time: NotNegative
     theta: Matrix

@@ -109,7 +109,7 @@ def age(sent: Integers, ticks: Integers | None = None) -> Array:
 
 
 def algebraic_connectivity(adjacency: Mask, present: Mask | None = None) -> Array:
-    """Second smallest eigenvalue of the unweighted Laplacian of the mutual graph (N, N), N > 1, shape (...).
+    """Second smallest eigenvalue of the unweighted Laplacian of the mutual graph (N, N), shape (...); 0 for one agent.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def algebraic_connectivity(adjacency: Mask, present: Mask | None = None) -> Arra
     if present is not None:
         degree = np.where(present, degree, agents + 1.0)  # above every eigenvalue of the others
     laplacian = degree[..., None] * np.eye(agents) - edges
-    return np.maximum(np.linalg.eigvalsh(laplacian)[..., 1], 0.0)
+    second: Array = np.linalg.eigvalsh(laplacian)[..., :2][..., -1]
+    return np.maximum(second, 0.0) if agents > 1 else np.zeros(edges.shape[:-2])
 
 
 def connected(adjacency: Mask) -> Mask:

@@ -84,7 +84,14 @@ def test_check_prints_a_table():
 
 
 def test_a_diverged_swarm_fails(out):
-    absurd = ("--set", "formation.spread=1e308", "--duration", "1", "--runtime", "inprocess")
+    absurd = (
+        "--set",
+        "timeline=[{verb='lie',at=0,agents=['all'],matrix=[[1e9,0],[0,1e9]]}]",
+        "--duration",
+        "1",
+        "--runtime",
+        "inprocess",
+    )
     done = affinet("run", "corridor", *absurd, "--out", str(out), "--json")
     assert done.returncode == 1
     summary = json.loads(done.stdout.splitlines()[-1])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from analysis.affine import Manoeuvre
 from world.formation import PRESETS
-from world.maneuver import corridor, hover, keyframes, ravine
+from world.maneuver import corridor, hover, keyframes, narrowest, ravine, turned
 
 NOMINAL = 2.0 * PRESETS["zhao7"].nominal
 OCTA10 = PRESETS["octa10"].nominal
@@ -149,6 +149,52 @@ def test_keyframes_leave_rest_and_come_to_rest_at_a_continuous_velocity():
     dt = 1e-3
     velocity = np.diff(keyframes(np.arange(0.0, 25.0, dt), TIMES, THETA, OFFSET).offset, axis=0) / dt
     assert np.abs(np.diff(velocity, axis=0)).max() < 0.05
+
+
+IDENTITY, STILL = np.repeat(np.eye(2)[None], 2, axis=0), np.zeros((2, 2))
+HALF_A_TURN = np.array([np.eye(2), -np.eye(2)])
+QUARTER_TURN = np.array([np.eye(2), [[0.0, -1.0], [1.0, 0.0]]])
+
+
+@pytest.mark.parametrize("turns", [0.5, 1.0, -1.0, 3.0])
+def test_an_angle_turns_the_formation_which_keeps_its_shape_on_the_way(turns):
+    angle = np.array([0.0, turns * 2.0 * np.pi])
+    flown = keyframes(np.linspace(0.0, 10.0, 101), [0.0, 10.0], IDENTITY, STILL, angle)
+    np.testing.assert_allclose(np.linalg.svd(flown.theta, compute_uv=False), 1.0, atol=1e-12)
+    heading = np.unwrap(np.arctan2(flown.theta[:, 1, 0], flown.theta[:, 0, 0]))
+    assert heading[-1] - heading[0] == pytest.approx(angle[1])
+    assert heading[50] == pytest.approx(angle[1] / 2)
+    assert (np.diff(heading) * np.sign(turns) >= 0.0).all()
+    # A Hermite cubic from rest to rest is fastest in the middle, at 3/2 of its mean speed.
+    speed = np.linalg.norm(flown.velocity(50, np.array([1.0, 0.0]), 0.1))
+    assert speed == pytest.approx(1.5 * abs(angle[1]) / 10.0, rel=0.02)
+
+
+def test_an_angle_turns_about_the_vertical_what_theta_makes():
+    theta = np.repeat(np.diag([2.0, 1.0, 0.5])[None], 2, axis=0)
+    flown = keyframes(np.array([0.0, 4.0]), [0.0, 4.0], theta, np.zeros((2, 3)), np.array([0.0, np.pi / 2]))
+    np.testing.assert_allclose(flown.theta[1], [[0, -1, 0], [2, 0, 0], [0, 0, 0.5]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("theta", "share"),
+    [
+        (HALF_A_TURN, 0.0),
+        (QUARTER_TURN, np.sqrt(0.5)),
+        (IDENTITY, 1.0),
+        (np.array([np.eye(2), np.diag([1.0, 0.5])]), 1.0),
+        (np.array([np.eye(2), np.diag([1.0, 0.0])]), 1.0),  # a line is what was asked for
+    ],
+)
+def test_entries_that_go_straight_narrow_a_formation_that_turns(theta, share):
+    assert narrowest([0.0, 1.0], theta) == pytest.approx(share, abs=1e-9)
+
+
+def test_turns_are_told_from_keyframe_to_keyframe():
+    assert turned(QUARTER_TURN, np.zeros(2)) == pytest.approx(np.pi / 2)
+    assert turned(IDENTITY, np.array([0.0, 2 * np.pi])) == pytest.approx(2 * np.pi)
+    about_x = np.array([np.eye(3), [[1, 0, 0], [0, 0, -1], [0, 1, 0]]])
+    assert turned(about_x, np.zeros(2)) == pytest.approx(np.pi / 2)
 
 
 def test_target_of_many_ticks_is_the_target_of_each():

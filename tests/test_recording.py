@@ -1,5 +1,7 @@
 """What a recording holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flying import plan_of
@@ -112,8 +114,9 @@ def test_where_nothing_is_estimated_there_is_no_consistency_but_a_band(out):
     ("estimator", "sensing"), [("imm", "{sigma=0.1}"), ("rkf", "{sigma_range=0.05, sigma_bearing=0.02}")]
 )
 def test_a_swarm_that_diverges_in_space_is_recorded_to_the_end(estimator, sensing, out):
-    far = ("formation.spread=1e308", f'agents.estimator="{estimator}"', f"sensing={sensing}", "time.duration=0.2")
-    done = fly(plan_of("ravine", *far), "inprocess", out, lambda *_: None)
+    plan = plan_of("ravine", f'agents.estimator="{estimator}"', f"sensing={sensing}", "time.duration=0.2")
+    far = replace(plan, world=replace(plan.world, spread=1e308))
+    done = fly(far, "inprocess", out, lambda *_: None)
     assert done.verdict == "fail"
     assert "diverged" in done.reasons[0]
 
@@ -167,3 +170,16 @@ def test_an_estimator_without_maps_and_a_dead_agent_tell_none():
     assert (mute == UNTOLD).all()
     assert (killed[:, 4] == UNTOLD).tolist() == [False] * 10 + [True] * 10
     assert (np.delete(killed, 4, axis=1) != UNTOLD).all()
+
+
+def test_positions_far_from_the_origin_keep_their_millimetres(tmp_path):
+    # Single floats tell half a metre apart at 4,649,776 m.
+    frames = ",".join(f"{{time={x},theta=[[1,0],[0,1]],offset=[{500_000 + x},4649776]}}" for x in (0, 1))
+    home = f"manoeuvre={{keyframes=[{frames}]}}"
+    fly(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", home), "inprocess", tmp_path / "utm", lambda *_: None)
+    far = RrdReader(str(tmp_path / "utm" / "run.rrd")).stream().to_chunks()
+    recorded = np.array(column(far, "/swarm/agents", "Points3D:positions"))
+    position = np.load(tmp_path / "utm" / "arrays.npz")["position"][:-1:5]
+    assert np.abs(recorded[..., :2] + [500_000.0, 4_649_000.0] - position).max() < 1e-3
+    (said,) = (chunk.to_record_batch() for chunk in far if str(chunk.entity_path) == "/origin")
+    assert said.column("TextDocument:text").to_pylist() == [["positions are relative to (500000, 4649000) m"]]

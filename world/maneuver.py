@@ -128,9 +128,9 @@ def narrowest(times: Sequence[float], theta: Array) -> Array:
 
 
 def turned(theta: Array, angle: Array) -> Array:
-    """How far a formation turns from each keyframe to the next, shape (F - 1,), in radians: by theta the shortest way, and by angle.
+    """How far a formation turns from each keyframe to the next, shape (F - 1,), in radians.
 
-    In three dimensions theta turns it about an axis of its own, and has no sign.
+    By theta it turns the shortest way, by angle as far as that says. In three dimensions a turn by theta has no sign.
     """
     U, _, Vt = np.linalg.svd(theta)
     rotation = U @ Vt

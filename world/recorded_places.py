@@ -27,10 +27,13 @@ class Places:
         The recording.
     world
         What is flown.
+    origin
+        Of the recording, shape (D,), in metres.
     """
 
-    def __init__(self, stream: rr.RecordingStream, world: World) -> None:
+    def __init__(self, stream: rr.RecordingStream, world: World, origin: Array) -> None:
         self._stream = stream
+        self._origin = origin
         self._dt = world.dt
         self._links = world.links
         self._first = FirstMeasurements(world.links, world.sensor, ())
@@ -46,7 +49,7 @@ class Places:
         known = self._first.seen.sum()
         for tick, measured, fates in zip(moments.ticks.tolist(), moments.measured, moments.fates[:, 0], strict=True):
             self._first.tick(timeline, tick, measured, fates)
-        place, position = moments.reports[PLACE][kept], moments.position[kept]
+        place, position = moments.reports[PLACE][kept], moments.position[kept] - self._origin
         edges = self._first.edges()
         here = localization.centroid(position, localization.weights(edges))[:, None]
         best = localization.optimal(edges) + here

@@ -25,10 +25,13 @@ class Pursued:
         The recording.
     world
         What is flown.
+    origin
+        Of the recording, shape (D,), in metres.
     """
 
-    def __init__(self, stream: rr.RecordingStream, world: World) -> None:
+    def __init__(self, stream: rr.RecordingStream, world: World, origin: Array) -> None:
         self._stream = stream
+        self._origin = origin
         self._nominal = world.formation.nominal
         reach = float(np.ptp(world.formation.nominal, axis=0).max())
         for path, colour, size in (("target", _TARGET, 0.03), ("found", _FOUND, 0.01), ("agreed", _AGREED, 0.015)):
@@ -43,13 +46,15 @@ class Pursued:
         target = (moments.target[kept] - self._nominal)[:, :1]
         found, agreed = moments.reports["found"][kept], moments.reports["reference"][kept][:, :, 0]
         for path, positions in (("target", target), ("found", found), ("agreed", agreed)):
-            points(self._stream, f"swarm/{path}/at", time, positions)
+            points(self._stream, f"swarm/{path}/at", time, positions - self._origin)
         off = [_over_agents(each - target) for each in (found, agreed)]
         scalars(self._stream, "metrics/target", time, np.stack(off, axis=-1))
         variance = moments.reports["variance"][kept][..., None, None] * np.eye(target.shape[-1])
         known = np.asarray(np.isfinite(variance).all(axis=(-2, -1)) & np.isfinite(agreed).all(axis=-1))
         lines = ellipses(
-            np.where(known[..., None], agreed, 0.0), np.where(known[..., None, None], variance, 0.0), _DEVIATIONS
+            np.where(known[..., None], agreed - self._origin, 0.0),
+            np.where(known[..., None, None], variance, 0.0),
+            _DEVIATIONS,
         )
         strips = lines.reshape(len(lines), -1, *lines.shape[-2:])
         columns = rr.LineStrips3D.columns(strips=strips.reshape(-1, *strips.shape[-2:]))

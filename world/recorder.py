@@ -26,7 +26,7 @@ from world.realised import Realised
 from world.recorded_places import Places
 from world.recorded_target import Pursued
 from world.recording import NotRecorded, writing, wrong_with
-from world.stage import TIMELINE, scalars, spatial
+from world.stage import TIMELINE, origin, scalars, spatial
 from world.world import World
 
 _LEADER, _FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
@@ -110,9 +110,10 @@ class Recorder:
                 *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
             )
         self._stream.send_recording_name(name)
+        self._origin = origin(world)
         self._log_static()
         kinds = ((Places, localizes), (Pursued, pursues))
-        self._layers = [layer(self._stream, world) for layer, wanted in kinds if wanted]
+        self._layers = [layer(self._stream, world, self._origin) for layer, wanted in kinds if wanted]
         self._flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
@@ -121,8 +122,9 @@ class Recorder:
             self._log_events(tick, timeline)
         kept = slice(None, None, self._every)
         time = [rr.TimeColumn(TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
-        self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], moments.position[kept])
-        self._log_graph(time, moments.position[kept], moments.target[kept], moments.fates[kept, 0])
+        position, target = moments.position[kept] - self._origin, moments.target[kept] - self._origin
+        self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], position)
+        self._log_graph(time, position, target, moments.fates[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
         present = timeline.present(moments.ticks[kept].tolist())
         shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
@@ -156,7 +158,9 @@ class Recorder:
     def _log_static(self) -> None:
         numbers = [str(agent) for agent in range(1, self._formation.agents + 1)]
         reach = float(np.ptp(self._formation.nominal, axis=0).max())
+        here = f"({', '.join(f'{axis:.0f}' for axis in self._origin)})"
         static = [
+            ("origin", rr.TextDocument(f"positions are relative to {here} m")),
             ("swarm/agents", rr.Points3D.from_fields(radii=0.03 * reach, labels=numbers)),
             ("swarm/trail", rr.Points3D.from_fields(radii=rr.Radius.ui_points(1.0))),
             ("swarm/target", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.7), colors=0x8888AA60)),

@@ -6,9 +6,19 @@ import numpy as np
 import rerun as rr
 
 from world.formation import Array
+from world.world import World
 
 TIMELINE = "sim_time"
+# Recordings hold single floats, which tell millimetres apart up to this distance from their origin, in metres.
+_FAR = 1000.0
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 25)
+
+
+def origin(world: World) -> Array:
+    """The origin of a recording, shape (D,), in metres: that of space, unless the swarm begins far from it."""
+    begins = world.target(0)[0] if world.start == "targets" else np.zeros(world.formation.dimension)
+    rounded: Array = _FAR * np.trunc(begins / _FAR)
+    return rounded
 
 
 def spatial(position: Array) -> Array:
