@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import resource
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,18 +28,15 @@ SHORT = ("time.dt=0.05", "time.duration=0.5")
 RUN = ["run", "corridor", "--set", "time.dt=0.05", "--duration", "0.5", "--runtime", "inprocess"]
 
 
-@pytest.fixture
-def limit():
-    """Sets a limit of this process and its children for the length of a test."""
-    before = []
-
-    def set_limit(kind, value):
-        before.append((kind, resource.getrlimit(kind)))
-        resource.setrlimit(kind, (value, before[-1][1][1]))
-
-    yield set_limit
-    for kind, limits in before:
-        resource.setrlimit(kind, limits)
+@contextmanager
+def limit(kind, value):
+    """A limit of this process and its children for as long as the block lasts: pytest itself may write to a file."""
+    before = resource.getrlimit(kind)
+    resource.setrlimit(kind, (value, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(kind, before)
 
 
 def in_one_line(capsys):
@@ -147,9 +145,15 @@ def test_a_system_without_threads_for_the_display_is_bad_input(monkeypatch, caps
 # ---- a run that could not be written down
 
 
-def test_a_recording_that_breaks_off_fails_the_run(limit, out):
-    limit(resource.RLIMIT_FSIZE, 40_000)  # it hung for good, or passed
-    done = fly(plan_of("corridor", *SHORT, "record.every=1"), "inprocess", out, lambda *_: None)
+@pytest.mark.parametrize(
+    ("size", "seconds"),
+    [(40_000, 0.5), (2**18 + 5000, 10)],  # the first hung for good, the second passed
+    ids=["at the start", "on the way"],
+)
+def test_a_recording_that_breaks_off_fails_the_run(size, seconds, out):
+    plan = plan_of("corridor", "time.dt=0.05", f"time.duration={seconds}", "record.every=1")
+    with limit(resource.RLIMIT_FSIZE, size):
+        done = fly(plan, "inprocess", out, lambda *_: None)
     assert done.verdict == "fail"
     (reason,) = done.reasons
     assert "run.rrd" in reason
@@ -157,9 +161,10 @@ def test_a_recording_that_breaks_off_fails_the_run(limit, out):
     assert summary(out)["reasons"] == [reason]
 
 
-def test_a_recording_that_breaks_off_fails_a_run_over_processes(limit, out):
-    limit(resource.RLIMIT_FSIZE, 40_000)
-    done = fly(plan_of("corridor", *SHORT, "record.every=1"), "processes", out, lambda *_: None)
+def test_a_recording_that_breaks_off_fails_a_run_over_processes(out):
+    plan = plan_of("corridor", *SHORT, "record.every=1")
+    with limit(resource.RLIMIT_FSIZE, 40_000):
+        done = fly(plan, "processes", out, lambda *_: None)
     assert done.verdict == "fail"
     assert done.reasons[0].startswith("world: ")
     assert "run.rrd" in done.reasons[0]
@@ -168,12 +173,12 @@ def test_a_recording_that_breaks_off_fails_a_run_over_processes(limit, out):
 
 
 @pytest.mark.parametrize("size", [0, 3000, 9000])
-def test_tables_and_arrays_that_do_not_fit_fail_the_run(size, limit, out):
+def test_tables_and_arrays_that_do_not_fit_fail_the_run(size, out, monkeypatch):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
-    (out / "logs").mkdir(parents=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(running.outcome, "prepare", lambda *_: limit(resource.RLIMIT_FSIZE, size))
-        patch.setattr(running.outcome.Outcome, "save", lambda _: None)
+    out.mkdir()
+    monkeypatch.setattr(running.outcome, "prepare", lambda *_: None)
+    monkeypatch.setattr(running.outcome.Outcome, "save", lambda _: None)
+    with limit(resource.RLIMIT_FSIZE, size):
         done = fly(plan, "inprocess", out, lambda *_: None)
     assert done.verdict == "fail"
     (reason,) = done.reasons
@@ -265,10 +270,10 @@ def test_a_swarm_that_cannot_be_launched_fails_and_says_why(refused, out, monkey
     assert summary(out)["verdict"] == "fail"
 
 
-def test_too_few_files_for_a_swarm_fail_it(limit, out):
+def test_too_few_files_for_a_swarm_fail_it(out):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
-    limit(resource.RLIMIT_NOFILE, len(os.listdir("/proc/self/fd")) + 6)
-    done = fly(plan, "processes", out, lambda *_: None)
+    with limit(resource.RLIMIT_NOFILE, len(os.listdir("/proc/self/fd")) + 6):
+        done = fly(plan, "processes", out, lambda *_: None)
     assert done.verdict == "fail"
     assert done.reasons[0].endswith("Too many open files; raise the limit of open files (ulimit -n)")
 
