@@ -185,9 +185,8 @@ def _study(parsed: argparse.Namespace) -> int:
                     results.append(result)
                     grid.see(result)
         except BrokenExecutor:
-            print(
-                f"a process that flew cases is gone, for want of memory perhaps; {out} has those done", file=sys.stderr
-            )  # noqa: T201
+            gone = f"a process that flew cases is gone, for want of memory perhaps; {out} has those done"
+            print(gone, file=sys.stderr)  # noqa: T201
             return FAIL
         finally:
             if results:  # whatever happened meanwhile, what was flown is kept

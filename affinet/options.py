@@ -126,7 +126,7 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
     study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
-    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME")
+    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
 
 
 def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

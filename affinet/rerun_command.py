@@ -62,7 +62,7 @@ def open_viewer() -> str:
     deadline = time.monotonic() + _START_S
     while not _listens(port):
         if viewer.poll() is not None:
-            why = _last_line(viewer.stderr.read() if viewer.stderr else b"")
+            why = _last_line(viewer.communicate()[1])
             raise NoViewer(f"the Rerun viewer ended at once: {why}; fly without --view, and open run.rrd later")
         if time.monotonic() > deadline:
             viewer.terminate()

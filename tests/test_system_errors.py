@@ -4,6 +4,8 @@ import errno
 import json
 import os
 import resource
+import subprocess
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,18 +29,15 @@ SHORT = ("time.dt=0.05", "time.duration=0.5")
 RUN = ["run", "corridor", "--set", "time.dt=0.05", "--duration", "0.5", "--runtime", "inprocess"]
 
 
-@pytest.fixture
-def limit():
-    """Sets a limit of this process and its children for the length of a test."""
-    before = []
-
-    def set_limit(kind, value):
-        before.append((kind, resource.getrlimit(kind)))
-        resource.setrlimit(kind, (value, before[-1][1][1]))
-
-    yield set_limit
-    for kind, limits in before:
-        resource.setrlimit(kind, limits)
+@contextmanager
+def limit(kind, value):
+    """A limit of this process and its children for as long as the block lasts: pytest itself may write to a file."""
+    before = resource.getrlimit(kind)
+    resource.setrlimit(kind, (value, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(kind, before)
 
 
 def in_one_line(capsys):
@@ -147,9 +146,15 @@ def test_a_system_without_threads_for_the_display_is_bad_input(monkeypatch, caps
 # ---- a run that could not be written down
 
 
-def test_a_recording_that_breaks_off_fails_the_run(limit, out):
-    limit(resource.RLIMIT_FSIZE, 40_000)  # it hung for good, or passed
-    done = fly(plan_of("corridor", *SHORT, "record.every=1"), "inprocess", out, lambda *_: None)
+@pytest.mark.parametrize(
+    ("size", "seconds"),
+    [(40_000, 0.5), (2**18 + 5000, 10)],  # the first hung for good, the second passed
+    ids=["at the start", "on the way"],
+)
+def test_a_recording_that_breaks_off_fails_the_run(size, seconds, out):
+    plan = plan_of("corridor", "time.dt=0.05", f"time.duration={seconds}", "record.every=1")
+    with limit(resource.RLIMIT_FSIZE, size):
+        done = fly(plan, "inprocess", out, lambda *_: None)
     assert done.verdict == "fail"
     (reason,) = done.reasons
     assert "run.rrd" in reason
@@ -157,9 +162,10 @@ def test_a_recording_that_breaks_off_fails_the_run(limit, out):
     assert summary(out)["reasons"] == [reason]
 
 
-def test_a_recording_that_breaks_off_fails_a_run_over_processes(limit, out):
-    limit(resource.RLIMIT_FSIZE, 40_000)
-    done = fly(plan_of("corridor", *SHORT, "record.every=1"), "processes", out, lambda *_: None)
+def test_a_recording_that_breaks_off_fails_a_run_over_processes(out):
+    plan = plan_of("corridor", *SHORT, "record.every=1")
+    with limit(resource.RLIMIT_FSIZE, 40_000):
+        done = fly(plan, "processes", out, lambda *_: None)
     assert done.verdict == "fail"
     assert done.reasons[0].startswith("world: ")
     assert "run.rrd" in done.reasons[0]
@@ -168,12 +174,12 @@ def test_a_recording_that_breaks_off_fails_a_run_over_processes(limit, out):
 
 
 @pytest.mark.parametrize("size", [0, 3000, 9000])
-def test_tables_and_arrays_that_do_not_fit_fail_the_run(size, limit, out):
+def test_tables_and_arrays_that_do_not_fit_fail_the_run(size, out, monkeypatch):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
-    (out / "logs").mkdir(parents=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(running.outcome, "prepare", lambda *_: limit(resource.RLIMIT_FSIZE, size))
-        patch.setattr(running.outcome.Outcome, "save", lambda _: None)
+    out.mkdir()
+    monkeypatch.setattr(running.outcome, "prepare", lambda *_: None)
+    monkeypatch.setattr(running.outcome.Outcome, "save", lambda _: None)
+    with limit(resource.RLIMIT_FSIZE, size):
         done = fly(plan, "inprocess", out, lambda *_: None)
     assert done.verdict == "fail"
     (reason,) = done.reasons
@@ -265,14 +271,22 @@ def test_a_swarm_that_cannot_be_launched_fails_and_says_why(refused, out, monkey
     assert summary(out)["verdict"] == "fail"
 
 
-def test_too_few_files_for_a_swarm_fail_it(limit, out):
+def test_too_few_files_for_a_swarm_fail_it(out):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
-    limit(resource.RLIMIT_NOFILE, len(os.listdir("/proc/self/fd")) + 6)
-    done = fly(plan, "processes", out, lambda *_: None)
+    with limit(resource.RLIMIT_NOFILE, len(os.listdir("/proc/self/fd")) + 6):
+        done = fly(plan, "processes", out, lambda *_: None)
     assert done.verdict == "fail"
     assert done.reasons[0].endswith("Too many open files; raise the limit of open files (ulimit -n)")
 
 
+@pytest.fixture
+def unmendable(monkeypatch):
+    """The command of Rerun cannot mend anything."""
+    done = subprocess.CompletedProcess([], 1, b"", b"it tried\nno such luck\n")
+    monkeypatch.setattr(rerun_command, "_rrd", lambda *_: done)
+
+
+@pytest.mark.usefixtures("unmendable")
 def test_a_recording_that_cannot_be_mended_does_not_hide_why_the_run_failed(out, monkeypatch):
     def crash(launcher):
         (out / "run.rrd").write_bytes(b"RRF2")
@@ -281,8 +295,7 @@ def test_a_recording_that_cannot_be_mended_does_not_hide_why_the_run_failed(out,
     monkeypatch.setattr(running.Launcher, "fly", crash)
     done = fly(plan_of("corridor", *SHORT), "processes", out, lambda *_: None)
     (reason,) = done.reasons
-    assert reason.startswith("the first failure; ")
-    assert "cannot be mended" in reason
+    assert reason == f"the first failure; {out / 'run.rrd'} breaks off, and cannot be mended: no such luck"
 
 
 def test_a_journal_that_cannot_be_read_does_not_hide_why_the_run_failed(out, monkeypatch):
@@ -375,6 +388,7 @@ def test_a_viewer_that_cannot_start_is_bad_input(script, line, tmp_path, monkeyp
     assert line in in_one_line(capsys)
 
 
+@pytest.mark.usefixtures("unmendable")
 def test_what_cannot_be_mended_stays_as_it_was(tmp_path):
     (tmp_path / "run.rrd").write_bytes(b"RRF2")
     with pytest.raises(NotMended, match="breaks off, and cannot be mended"):

@@ -25,7 +25,7 @@ from world.history import Moments
 from world.realised import Realised
 from world.recorded_places import Places
 from world.recorded_target import Pursued
-from world.recording import NotRecorded, writing, wrong_with
+from world.recording import NotRecorded, make_room, writing, wrong_with
 from world.stage import TIMELINE, origin, scalars, spatial
 from world.world import World
 
@@ -104,6 +104,7 @@ class Recorder:
                 f"{path} cannot be written: RERUN={os.environ.get('RERUN')} in the environment turns the recording off; "
                 "unset it, or set record.enabled=false"
             )
+        make_room(path)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
         with writing(path):
             self._stream.set_sinks(

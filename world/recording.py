@@ -13,6 +13,7 @@ from netem import system_errors
 
 # A whole file ends with where its footer begins, how long that is, a checksum, this word, and that there is one footer.
 _ENDING = struct.Struct("<QQI8sI")
+_BEGINNING = 2**18  # bytes: the blueprint, and what does not change
 _WORD = b"RRF2FOOT"
 _SYSTEM_ERROR = re.compile(r"\(os error (\d+)\)")
 
@@ -37,6 +38,23 @@ def wrong_with(path: Path) -> str | None:
         if word == _WORD and footers == 1 and start + length + _ENDING.size == size:
             return None
     return f"{path} breaks off after {size} bytes: was the disk full, or ulimit -f too low?"
+
+
+def make_room(path: Path) -> None:
+    """See that the beginning of a recording fits: the library waits for good for a writer that cannot write it.
+
+    Raises
+    ------
+    OSError
+        When it does not fit.
+    """
+    with system_errors.about(path):
+        try:
+            path.write_bytes(bytes(_BEGINNING))
+        except OSError:
+            if path.is_file():  # and no device
+                path.unlink()
+            raise
 
 
 @contextmanager
