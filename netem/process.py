@@ -24,8 +24,8 @@ from netem.links import Integers, Links, Mask
 from netem.medium import Medium, recorded
 from netem.profile import Profile
 from netem.sequence import Numbering, Sequences
-from netem.session import HUB, Login, await_subscribers, hub
-from netem.supervised import Supervisor, patience
+from netem.session import HUB, WORLD, Login, await_subscribers, hub
+from netem.supervised import Supervisor, called
 from netem.timeline import Timeline
 from netem.trigger import Trigger
 
@@ -48,8 +48,6 @@ class MediumBrief:
         The journal of an earlier run that is to be judge of this one.
     positioned
         Agents that have positioning, shape (N,).
-    patience_s
-        How long to wait for a broadcast before the run is stalled, in seconds.
     """
 
     run: str
@@ -64,7 +62,6 @@ class MediumBrief:
     injected: tuple[Fault, ...]
     recorded: str | None
     positioned: Mask
-    patience_s: float
 
 
 @dataclass(frozen=True)
@@ -106,10 +103,12 @@ class Sentence:
 class Relay:
     """The medium of a run over Zenoh: one tick is sense, collect, deliver."""
 
-    def __init__(self, session: zenoh.Session, brief: MediumBrief) -> None:
+    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: MediumBrief) -> None:
         keys = self._keys = Keys(brief.run)
         agents = range(1, brief.links.agents + 1)
         self._brief = brief
+        self._supervisor = supervisor
+        self._awaited: set[tuple[int, str]] = set()
         self._links = brief.links
         self._injected = brief.injected
         self._scripted = Timeline(brief.links, brief.faults, brief.triggers)
@@ -142,9 +141,12 @@ class Relay:
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
         sentence = self._judge(0, None) if self._medium.ahead else None
+        tick = 0
         while True:
+            self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
             sense = wire.unpack(wire.Sense, self._sense.recv().payload.to_bytes())
             self._from_world.check("sense", sense.seq)
+            self._supervisor.works(sense.k)
             if sense.last:
                 self._end(sense.k)
                 return
@@ -161,7 +163,8 @@ class Relay:
             # The agents now work on what they heard: time to decide the next tick, where that needs no positions.
             self._air = self._ahead
             self._forget(sense.k)
-            sentence = self._judge(sense.k + 1, None) if self._medium.ahead else None
+            tick = sense.k + 1
+            sentence = self._judge(tick, None) if self._medium.ahead else None
 
     def _judge(self, tick: int, position: Array | None) -> Sentence:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
@@ -257,20 +260,34 @@ class Relay:
             self._inboxes[agent].put(wire.pack(inbox))
 
     def _collect(self, sentence: Sentence) -> None:
-        tick = sentence.tick
-        awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
-        with patience(self._brief.patience_s, lambda: _missing(tick, awaited)):
-            while awaited:
-                sample = self._broadcasts.recv()
-                key, data = str(sample.key_expr), sample.payload.to_bytes()
-                said = wire.unpack(wire.Broadcast, data)
-                if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
-                    raise wire.WireError(
-                        f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}"
-                    )
-                self._from_agents.check(f"{said.src} {said.channel}", said.seq)
-                self._said[tick, said.src, said.channel] = self._as_told(said, data)
-                awaited.remove((said.src, said.channel))
+        self._awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
+        self._supervisor.waits(sentence.tick, "what it broadcasts", self._silent)
+        while self._awaited:
+            sample = self._broadcasts.recv()
+            said, data = self._broadcast(str(sample.key_expr), sample.payload.to_bytes(), sentence.tick)
+            self._said[said.k, said.src, said.channel] = self._as_told(said, data)
+            self._awaited.remove((said.src, said.channel))
+        self._supervisor.works(sentence.tick)
+
+    def _silent(self) -> list[str]:
+        return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
+
+    def _broadcast(self, key: str, data: bytes, tick: int) -> tuple[wire.Broadcast, bytes]:
+        """What an agent broadcast; on its own keys alone, as access control has it."""
+        _, agent, _, channel = key.rsplit("/", 3)
+        try:
+            said = wire.unpack_relayed(data)
+        except wire.WireError as error:
+            raise wire.WireError(f"agent {agent} on {channel!r}: {error}") from error
+        if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
+            raise wire.WireError(
+                f"agent {agent} on {channel!r} in tick {tick}: it speaks as agent {said.src}, on {said.channel[:40]!r}, "
+                f"of tick {said.k}; channels here are {self._spoken}"
+            )
+        self._from_agents.check(f"{said.src} {said.channel}", said.seq)
+        if (said.src, said.channel) not in self._awaited:
+            raise wire.WireError(f"agent {agent} on {channel!r}: it speaks twice in tick {tick}")
+        return said, data
 
     def _hand_out_broadcasts(self, sentence: Sentence) -> None:
         for agent in sentence.awake:
@@ -281,8 +298,7 @@ class Relay:
     def _as_told(self, said: wire.Broadcast, data: bytes) -> bytes:
         for liar in self._timeline.at(said.k).liars:
             if said.src in liar.agents and said.channel == lie.CHANNEL:
-                fields = {name: np.array(field) for name, field in said.payload.items()}
-                said = said._replace(payload=lie.told(fields, liar))
+                said = said._replace(payload=lie.told(_fields(said), liar))
                 data = wire.pack(said)
         return data
 
@@ -296,7 +312,7 @@ class Relay:
             self._medium.bias(np.array([said.content]), np.array([said.link])),
         )
         broadcast = wire.unpack(wire.Broadcast, data)
-        fields = {name: np.array([field]) for name, field in broadcast.payload.items()}
+        fields = {name: field[None] for name, field in _fields(broadcast).items()}
         wrong = {name: field[0] for name, field in corrupted_fields(fields, kind, bias, draw).items()}
         return wire.pack(broadcast._replace(payload=wrong))
 
@@ -310,9 +326,10 @@ class Relay:
             inbox.put(wire.pack(wire.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), wire.Phase.END)))
 
 
-def _missing(tick: int, awaited: set[tuple[int, str]]) -> str:
-    shown = ", ".join(f"agent {agent}'s {channel}" for agent, channel in sorted(awaited)[:6])
-    return f"{shown} of tick {tick}{' and more' if len(awaited) > 6 else ''}"
+def _fields(said: wire.Broadcast) -> dict[str, Array]:
+    """What a broadcast says, where the medium has to change it."""
+    whose = f"agent {said.src} on {said.channel!r}"
+    return {name: wire.numbers(field, f"{whose}: {name!r}", None, "iufb") for name, field in said.payload.items()}
 
 
 def main() -> None:
@@ -321,7 +338,7 @@ def main() -> None:
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
     with zenoh.open(config) as session:
-        relay = Relay(session, brief)
+        relay = Relay(session, supervisor, brief)
         relay.await_everybody()
         supervisor.tell("ready")
         with supervisor.confessing():

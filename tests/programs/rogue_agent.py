@@ -18,7 +18,7 @@ def main() -> None:
     brief = supervisor.brief(AgentBrief)
     keys = Keys(brief.run)
     with zenoh.open(client(brief.login)) as session, zenoh.open(client(brief.login)) as side:
-        node = Node(session, brief)
+        node = Node(session, supervisor, brief)
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
         inboxes = [side.declare_subscriber(keys.inbox(peer), zenoh.handlers.FifoChannel(10_000)) for peer in PEERS]
         node.await_everybody()
