@@ -1,6 +1,6 @@
 """The `affinet` command.
 
-Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 130 interrupted.
+Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 130 interrupted; 143 or 129 where SIGTERM or SIGHUP ended a run.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from affinet import compare, fit, options, scenario, show
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
+from affinet.interruption import Interrupted
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
@@ -44,6 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ScenarioError, PlanError, NoViewer, NotFlying, FileExistsError) as error:
         print(error, file=sys.stderr)  # noqa: T201
         return BAD_INPUT
+    except Interrupted as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return error.status
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
         return INTERRUPTED

@@ -23,17 +23,8 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass
 class Interruption:
-    """Whether a signal has come: its number.
+    """Whether a signal has come: the number of the first; others are ignored, since the run is ending already."""
 
-    Parameters
-    ----------
-    at_once
-        Whether it is heeded wherever the program is, or when it is asked for.
-    number
-        Of the first that came; others are ignored, since the run is ending already.
-    """
-
-    at_once: bool
     number: int | None = None
 
     def heed(self) -> None:
@@ -49,16 +40,13 @@ class Interruption:
 
     def note(self, number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
-        if self.number is None:
-            self.number = number
-            if self.at_once:
-                self.heed()
+        self.number = self.number or number
 
 
 @contextmanager
-def interruptible(*, at_once: bool) -> Iterator[Interruption]:
+def interruptible() -> Iterator[Interruption]:
     """Note the signals that come while the block runs; those that are ignored, as under nohup, stay ignored."""
-    interruption = Interruption(at_once)
+    interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
         yield interruption
         return

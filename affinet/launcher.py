@@ -84,7 +84,7 @@ class Launcher:
         self._viewer = viewer
         self._watch = watch
         self._programs = programs or {}
-        self._interruption = interruption or Interruption(at_once=False)
+        self._interruption = interruption or Interruption()
         self._run = f"{out.name}-{secrets.token_hex(4)}"
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}

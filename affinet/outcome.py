@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from affinet import scenario
+from affinet.accounts import Accounts
 from affinet.bites import Bite, bites
 from affinet.plan import Plan
 from netem.fate import Ledger
@@ -71,6 +72,7 @@ def judge(
     in_flight: int | None,
     uninstructed: int | None,
     failure: str | None,
+    accounts: Accounts | None = None,
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
@@ -84,18 +86,20 @@ def judge(
     timeline
         Its faults, where they came to lie.
     arrays
-        What happened; None when the run left nothing.
+        What happened; None when the run left no arrays.
     in_flight, uninstructed
         Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
     failure
         Why the run ended early, if it did.
+    accounts
+        What the journal says where there are no arrays.
     wall_s
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
     """
-    ticks = 0 if arrays is None else len(arrays["error"])
-    messages = _messages(arrays, in_flight, uninstructed)
+    ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
+    messages = _messages(arrays, accounts, in_flight, uninstructed)
     faults = [] if arrays is None else bites(plan, timeline, arrays)
     wrong = [failure] if failure else []
     if not failure:
@@ -133,23 +137,22 @@ def prepare(plan: Plan, out: Path) -> None:
     (out / scenario.FILE).write_text(plan.scenario.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
-def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:
-    if arrays is None:
-        return {
-            "offered": 0,
-            "copies": 0,
-            "delivered": 0,
-            "dropped": {},
-            "in_flight": in_flight,
-            "uninstructed": uninstructed,
-        }
-    ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+def _messages(
+    arrays: Arrays | None, accounts: Accounts | None, in_flight: int | None, uninstructed: int | None
+) -> dict[str, Any]:
+    if arrays is not None:
+        ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+        in_flight = ledger.outstanding if in_flight is None else in_flight
+    elif accounts is not None:
+        ledger, in_flight = accounts.ledger, accounts.in_flight
+    else:
+        ledger = Ledger(offered=0, copies=0, delivered=0, dropped={})
     return {
         "offered": ledger.offered,
         "copies": ledger.copies,
         "delivered": ledger.delivered,
         "dropped": ledger.dropped,
-        "in_flight": ledger.outstanding if in_flight is None else in_flight,
+        "in_flight": in_flight,
         "uninstructed": uninstructed,
     }
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from affinet import outcome
+from affinet import accounts, outcome
 from affinet.evidence import Evidence
 from affinet.inprocess import Swarm
+from affinet.interruption import Interrupted, Interruption, interruptible
 from affinet.launcher import Launcher
 from affinet.outcome import Outcome
 from affinet.plan import Plan
@@ -42,10 +43,15 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     ------
     FileExistsError
         When `out` holds a run already.
+    Interrupted
+        When a signal asked the run to end; its outcome is written down all the same.
     """
     outcome.prepare(plan, out)
-    done = (_over_processes if runtime == "processes" else _in_process)(plan, out, watch, viewer)
-    done.save()
+    fly_in = _over_processes if runtime == "processes" else _in_process
+    with interruptible() as interruption:
+        done = fly_in(plan, out, watch, viewer, interruption)
+        done.save()
+    interruption.heed()
     return done
 
 
@@ -54,7 +60,7 @@ def rehearse(plan: Plan) -> Evidence:
     swarm, flown = Swarm(plan), History(plan.world, len(plan.channels), plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
-    return _judged(plan, swarm, flown, time.perf_counter() - started, Path())
+    return _judged(plan, swarm, flown, None, time.perf_counter() - started, Path())
 
 
 def evidence(plan: Plan, done: Outcome) -> Evidence | None:
@@ -63,10 +69,10 @@ def evidence(plan: Plan, done: Outcome) -> Evidence | None:
     return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
-def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
     from netem import journal  # pyarrow takes a while to import, and the start should not wait for it
 
-    flight = Launcher(plan, out, watch=watch, viewer=viewer).fly()
+    flight = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption).fly()
     path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
     timeline = (plan.facing(journal.injected(journal.read(book))) if book.exists() else plan).timeline
     for trigger, tick in flight.fired.items():
@@ -80,39 +86,44 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
         in_flight=flight.in_flight,
         uninstructed=flight.uninstructed,
         failure=flight.failure,
+        accounts=None if path.exists() or not book.exists() else accounts.of_journal(plan, timeline, book),
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
     )
 
 
-def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
     swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels), plan.reports)
-    started = time.perf_counter()
+    started, failure = time.perf_counter(), None
     with Logbook(out, out.name, plan.world, plan.channels, books) as logbook:
 
         def see(moments: Moments, next_position: Array) -> None:
             flown.extend(moments, next_position)
             logbook.write(moments, swarm.timeline)
             watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+            interruption.heed()
 
-        swarm.fly(see, books.batch)
+        try:
+            swarm.fly(see, books.batch)
+        except Interrupted as error:
+            failure = str(error)
     wall_s = time.perf_counter() - started
     flown.save(out / history.FILE)
-    return _judged(plan, swarm, flown, wall_s, out).outcome
+    return _judged(plan, swarm, flown, failure, wall_s, out).outcome
 
 
-def _judged(plan: Plan, swarm: Swarm, flown: History, wall_s: float, out: Path) -> Evidence:
+def _judged(plan: Plan, swarm: Swarm, flown: History, failure: str | None, wall_s: float, out: Path) -> Evidence:
     arrays = flown.arrays()
     done = outcome.judge(
         plan,
         swarm.timeline,
         arrays,
-        in_flight=swarm.in_flight,
+        in_flight=None if failure else swarm.in_flight,
         uninstructed=0,
-        failure=None,
+        failure=failure,
         wall_s=wall_s,
         processes=[],
         out=out,
