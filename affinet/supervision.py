@@ -38,8 +38,8 @@ def module(package: str) -> list[str]:
 class Crew:
     """All children of a run; leaving the block leaves none behind.
 
-    Its clock runs only while it listens, and never faster than that: time in which the launcher itself was stopped, or did
-    not come to look, is nobody's silence.
+    Its clock, `now_s`, runs only while it listens, and never for longer than it meant to: time in which the launcher itself
+    was stopped, or did not come to look, is nobody's silence.
     """
 
     def __init__(self, logs: Path, patience_s: float, interruption: Interruption) -> None:
@@ -58,7 +58,7 @@ class Crew:
         self._patience_s = patience_s
         self._interruption = interruption
         self._selector = selectors.DefaultSelector()
-        self._now_s = self._moved_s = self._looked_s = 0.0
+        self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
 
     def __enter__(self) -> Crew:
@@ -97,24 +97,22 @@ class Crew:
         """
         patience_s = _START_S + _START_EACH_S * len(self.children)
         waiting, stopped_s = list(children), dict[str, float]()
-        self._moved_s = self._now_s
+        self._moved_s = self.now_s
         while waiting:
             self.listen()
             waiting = [child for child in waiting if not child.is_ready]
-            if self._now_s - self._looked_s < BEAT_S:
+            if self.now_s - self._looked_s < BEAT_S:
                 continue
-            self._looked_s = self._now_s
-            stopped_s = {
-                child.name: stopped_s.get(child.name, self._now_s) for child in waiting if child.look().stopped
-            }
-            late = self._now_s - self._moved_s >= patience_s
-            if late or any(self._now_s - since_s >= self._patience_s for since_s in stopped_s.values()):
+            self._looked_s = self.now_s
+            stopped_s = {child.name: stopped_s.get(child.name, self.now_s) for child in waiting if child.look().stopped}
+            late = self.now_s - self._moved_s >= patience_s
+            if late or any(self.now_s - since_s >= self._patience_s for since_s in stopped_s.values()):
                 blamed = [child for child in waiting if late or child.name in stopped_s]
-                raise RunFailed(f"{_said_of(blamed)}, and not ready: waited {self._now_s - self._moved_s:.1f} s for it")
+                raise RunFailed(f"{_said_of(blamed)}, and not ready: waited {self.now_s - self._moved_s:.1f} s for it")
         for child in children:
             child.measure()
             child.looks = None
-        self._moved_s = self._now_s
+        self._moved_s = self.now_s
 
     def listen(self) -> list[tuple[Child, Event]]:
         """What the children tell until the next beat is due; it may be nothing.
@@ -129,7 +127,7 @@ class Crew:
         self._interruption.heed()
         began_s = time.monotonic()
         ready = self._selector.select(BEAT_S)
-        self._now_s += min(time.monotonic() - began_s, BEAT_S)
+        self.now_s += min(time.monotonic() - began_s, BEAT_S)
         return [(key.data, event) for key, _ in ready for event in self._hear(key.data)]
 
     def blame_the_silent(self, awaited: Collection[Child]) -> None:
@@ -145,10 +143,10 @@ class Crew:
         RunFailed
             When nothing moves: who is to blame.
         """
-        quiet_s = self._now_s - self._moved_s
-        if quiet_s < self._patience_s / 2 or self._now_s - self._looked_s < BEAT_S:
+        quiet_s = self.now_s - self._moved_s
+        if quiet_s < self._patience_s / 2 or self.now_s - self._looked_s < BEAT_S:
             return
-        self._looked_s = self._now_s
+        self._looked_s = self.now_s
         alive = {child.name: child for child in self.children if not (child.killed or child.is_done)}
         beats = {name: self._lately(child) for name, child in alive.items()}
         culprits = [alive[name] for name in holding_up(beats, [child.name for child in awaited])]
@@ -187,13 +185,13 @@ class Crew:
         RunFailed
             When one does not leave, or left with an error.
         """
-        self._moved_s = self._now_s
+        self._moved_s = self.now_s
         staying = [child for child in self.children if child.process.poll() is None]
         while staying:
             self._await_end(staying[0])
             if len(staying) > len(staying := [child for child in staying if child.process.poll() is None]):
-                self._moved_s = self._now_s
-            if self._now_s - self._moved_s >= self._patience_s:
+                self._moved_s = self.now_s
+            if self.now_s - self._moved_s >= self._patience_s:
                 self._blame_those_who_stay(staying)
         for child in self.children:
             if child.process.returncode and not child.killed:
@@ -207,7 +205,7 @@ class Crew:
         with suppress(subprocess.TimeoutExpired):
             child.process.wait(BEAT_S)
             return
-        self._now_s += BEAT_S
+        self.now_s += BEAT_S
 
     def _blame_those_who_stay(self, staying: Sequence[Child]) -> None:
         for child in staying:
@@ -217,11 +215,11 @@ class Crew:
         trusted = [child.name for child in staying if child.role != "agent"]
         if blamed := stalled(looks, self._patience_s, trusted):
             said = _said_of([child for child in staying if child.name in blamed])
-            raise RunFailed(f"{said}, and had not left {self._now_s - self._moved_s:.1f} s after the end of the run")
+            raise RunFailed(f"{said}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run")
 
     def _lately(self, child: Child) -> Beat | None:
         """What a child does, unless it has not said so for a while, or never does."""
-        return child.doing if self._now_s - child.beat_s <= _LATE_BEATS * BEAT_S else None
+        return child.doing if self.now_s - child.beat_s <= _LATE_BEATS * BEAT_S else None
 
     def _hear(self, child: Child) -> list[Event]:
         before = child.doing
@@ -232,9 +230,9 @@ class Crew:
                 raise RunFailed(child.obituary())
             return []
         if events or child.doing != before:
-            self._moved_s = self._now_s
+            self._moved_s = self.now_s
             self._forget_looks()
-        child.beat_s = self._now_s
+        child.beat_s = self.now_s
         return events
 
     def _forget_looks(self) -> None:

@@ -11,9 +11,10 @@ import zenoh
 
 from agents.centre import Centre, Told
 from netem import wire
+from netem.broadcasts import Broadcasts
 from netem.channels import INPUT, MEASUREMENT
 from netem.keys import Keys
-from netem.sequence import Numbering, Sequences
+from netem.sequence import Numbering
 from netem.session import CENTRE, Login, await_subscribers, client
 from netem.supervised import Supervisor, called
 
@@ -49,7 +50,7 @@ class Listener:
             for channel in (MEASUREMENT, INPUT)
         }
         self._told = {agent: session.declare_publisher(keys.told(agent)) for agent in self._agents}
-        self._streams, self._numbers = Sequences("agent"), Numbering()
+        self._reader, self._numbers = Broadcasts(keys, self._agents, (MEASUREMENT, INPUT)), Numbering()
         self._dimension = len(brief.centre.process) // len(brief.centre.neighbours)
         slots = zip(brief.centre.neighbours.tolist(), brief.centre.present.tolist(), strict=True)
         self._slots = [
@@ -75,19 +76,12 @@ class Listener:
     def _hear(self, channel: str, tick: int) -> dict[int, dict[str, Any]]:
         said: dict[int, dict[str, Any]] = {}
         self._supervisor.waits(tick, "what it broadcasts", partial(_silent, self._agents, said))
-        while len(said) < len(self._agents):
+        awaited = {(agent, channel) for agent in self._agents}
+        while awaited:
             sample = self._ears[channel].recv()
-            agent = int(str(sample.key_expr).rsplit("/", 3)[1])
-            try:
-                broadcast = wire.unpack(wire.Broadcast, sample.payload.to_bytes())
-            except wire.WireError as error:
-                raise wire.WireError(f"agent {agent} on {channel!r}: {error}") from error
-            if broadcast.k != tick or broadcast.src != agent or agent in said:
-                raise wire.WireError(
-                    f"agent {agent} on {channel!r} in tick {tick}: it speaks as agent {broadcast.src}, of tick {broadcast.k}"
-                )
-            self._streams.check(f"{agent} {channel}", broadcast.seq)
-            said[agent] = broadcast.payload
+            broadcast = self._reader.read(str(sample.key_expr), sample.payload.to_bytes(), tick, awaited)
+            awaited.remove((broadcast.src, channel))
+            said[broadcast.src] = broadcast.payload
         return said
 
     def _input(self, agent: int, said: dict[str, Any]) -> Any:

@@ -14,6 +14,7 @@ import zenoh
 
 from netem import channels, lie, wire
 from netem.air import Delivery, out_of_the_ordinary
+from netem.broadcasts import Broadcasts, fields
 from netem.control import Order, obey
 from netem.corrupt import Mark, corrupted_fields
 from netem.draws import Array
@@ -120,11 +121,10 @@ class Relay:
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
         self._said: dict[tuple[int, int, str], bytes] = {}
         self._from_world = Sequences("world")
-        self._from_agents = Sequences("agent")
+        self._reader = Broadcasts(keys, agents, self._spoken)
         self._numbers = Numbering()
         self._sense = session.declare_subscriber(keys.sense, zenoh.handlers.FifoChannel(16))
         self._broadcasts = session.declare_subscriber(keys.broadcast("*", "*"), zenoh.handlers.FifoChannel(4096))
-        self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in self._spoken}
         self._journal = session.declare_publisher(keys.journal)
         self._control = session.declare_queryable(keys.control, zenoh.handlers.FifoChannel(16))
         self._inboxes = {agent: session.declare_publisher(keys.inbox(agent)) for agent in agents}
@@ -238,8 +238,7 @@ class Relay:
     def _welcome_back(self, tick: int) -> None:
         for agent in self._timeline.restarted(tick):
             self._numbers.restart(f"inbox {agent}")
-            for name in self._spoken:
-                self._from_agents.restart(f"{agent} {name}")
+            self._reader.restart(agent)
 
     def _hand_out_measurements(self, sense: wire.Sense, sentence: Sentence) -> None:
         clock = self._timeline.clock(sense.k).tolist()
@@ -264,30 +263,14 @@ class Relay:
         self._supervisor.waits(sentence.tick, "what it broadcasts", self._silent)
         while self._awaited:
             sample = self._broadcasts.recv()
-            said, data = self._broadcast(str(sample.key_expr), sample.payload.to_bytes(), sentence.tick)
+            data = sample.payload.to_bytes()
+            said = self._reader.read(str(sample.key_expr), data, sentence.tick, self._awaited)
             self._said[said.k, said.src, said.channel] = self._as_told(said, data)
             self._awaited.remove((said.src, said.channel))
         self._supervisor.works(sentence.tick)
 
     def _silent(self) -> list[str]:
         return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
-
-    def _broadcast(self, key: str, data: bytes, tick: int) -> tuple[wire.Broadcast, bytes]:
-        """What an agent broadcast; on its own keys alone, as access control has it."""
-        _, agent, _, channel = key.rsplit("/", 3)
-        try:
-            said = wire.unpack_relayed(data)
-        except wire.WireError as error:
-            raise wire.WireError(f"agent {agent} on {channel!r}: {error}") from error
-        if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
-            raise wire.WireError(
-                f"agent {agent} on {channel!r} in tick {tick}: it speaks as agent {said.src}, on {said.channel[:40]!r}, "
-                f"of tick {said.k}; channels here are {self._spoken}"
-            )
-        self._from_agents.check(f"{said.src} {said.channel}", said.seq)
-        if (said.src, said.channel) not in self._awaited:
-            raise wire.WireError(f"agent {agent} on {channel!r}: it speaks twice in tick {tick}")
-        return said, data
 
     def _hand_out_broadcasts(self, sentence: Sentence) -> None:
         for agent in sentence.awake:
@@ -298,22 +281,22 @@ class Relay:
     def _as_told(self, said: wire.Broadcast, data: bytes) -> bytes:
         for liar in self._timeline.at(said.k).liars:
             if said.src in liar.agents and said.channel == lie.CHANNEL:
-                said = said._replace(payload=lie.told(_fields(said), liar))
+                said = said._replace(payload=lie.told(fields(said), liar))
                 data = wire.pack(said)
         return data
 
-    def _as_it_arrives(self, said: Arriving) -> bytes:
-        data = self._said[said.content, said.src, self._brief.channels[said.channel]]
-        if said.mark in (Mark.NONE, Mark.STALE):
+    def _as_it_arrives(self, arriving: Arriving) -> bytes:
+        data = self._said[arriving.content, arriving.src, self._brief.channels[arriving.channel]]
+        if arriving.mark in (Mark.NONE, Mark.STALE):
             return data
-        draw = self._medium.bit_draws(*(np.array([n]) for n in (said.content, said.channel, said.link)))
+        draw = self._medium.bit_draws(*(np.array([n]) for n in (arriving.content, arriving.channel, arriving.link)))
         kind, bias = (
-            np.array([said.mark], dtype=np.uint8),
-            self._medium.bias(np.array([said.content]), np.array([said.link])),
+            np.array([arriving.mark], dtype=np.uint8),
+            self._medium.bias(np.array([arriving.content]), np.array([arriving.link])),
         )
         broadcast = wire.unpack(wire.Broadcast, data)
-        fields = {name: field[None] for name, field in _fields(broadcast).items()}
-        wrong = {name: field[0] for name, field in corrupted_fields(fields, kind, bias, draw).items()}
+        said = {name: field[None] for name, field in fields(broadcast).items()}
+        wrong = {name: field[0] for name, field in corrupted_fields(said, kind, bias, draw).items()}
         return wire.pack(broadcast._replace(payload=wrong))
 
     def _forget(self, tick: int) -> None:
@@ -324,12 +307,6 @@ class Relay:
     def _end(self, tick: int) -> None:
         for agent, inbox in self._inboxes.items():
             inbox.put(wire.pack(wire.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), wire.Phase.END)))
-
-
-def _fields(said: wire.Broadcast) -> dict[str, Array]:
-    """What a broadcast says, where the medium has to change it."""
-    whose = f"agent {said.src} on {said.channel!r}"
-    return {name: wire.numbers(field, f"{whose}: {name!r}", None, "iufb") for name, field in said.payload.items()}
 
 
 def main() -> None:

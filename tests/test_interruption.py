@@ -38,7 +38,9 @@ def interrupted(number, runtime, out, private, monkeypatch, again=False):
     monkeypatch.setenv("TMPDIR", str(private))
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has its children ignore it
     command = [sys.executable, "-m", "affinet.cli", "run", "corridor", "--duration", "600", "--runtime", runtime]
-    launcher = subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    launcher = subprocess.Popen(
+        [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     book, children = out / "journal.arrows", []
     try:
         await_true(lambda: book.exists() and book.stat().st_size > 20_000, "the run never got going")
