@@ -8,10 +8,13 @@ import sys
 import time
 from importlib import resources
 
+import numpy as np
 import psutil
 import pytest
 from flying import PROCESSES
 from rerun.chunk import RrdReader
+
+from netem import journal
 
 pytestmark = PROCESSES
 
@@ -102,17 +105,55 @@ def test_a_death_ends_the_run_with_its_reason(package, out):
     assert summary["verdict"] == "fail"
     assert f"(pid {victim.pid}) was killed by SIGKILL" in summary["reasons"][0]
     assert moments(out / "run.rrd") > 10
+    # Whoever died, the accounts say what became of everything up to the last tick that was written down.
+    table = journal.read(out / journal.FILE)
+    counts = dict(zip(*np.unique(table["verdict"].to_numpy(), return_counts=True), strict=True))
+    messages = summary["messages"]
+    assert summary["ticks"] == table["tick"].to_numpy().max() + 1 >= 50
+    assert messages["offered"] == summary["ticks"] * 24 * 4
+    assert messages["delivered"] == counts["delivered"]
+    assert messages["dropped"] == {"lost": counts["dropped"]}
+    assert messages["in_flight"] == 0
 
 
-def test_a_frozen_agent_ends_the_run_and_is_named(out):
+@pytest.mark.parametrize(
+    ("package", "name"),
+    [
+        ("agents", "agent"),
+        pytest.param("netem", "netem", marks=pytest.mark.slow),
+        pytest.param("world", "world", marks=pytest.mark.slow),
+    ],
+)
+def test_who_is_frozen_ends_the_run_and_is_named_with_its_state(package, name, out):
     with Running(out) as run:
-        frozen = run.child("agents")
+        frozen = run.child(package)
         frozen.suspend()
         took, said, _ = run.ends()
     reason = json.loads(said.splitlines()[-1])["reasons"][0]
-    assert took < 6  # 3 to 3.3 s of patience, 1.2 s of grace for a process that cannot even be asked to leave
-    assert "waited" in reason
-    assert "agent" in reason
+    assert took < 10  # 3 s of patience, a beat, 1.2 s of grace for a process that cannot even be asked to leave
+    assert reason.startswith(name)
+    assert f"(pid {frozen.pid}) is stopped (state T): nothing moved for 3." in reason
+
+
+@pytest.mark.slow
+def test_time_in_which_everybody_was_stopped_is_nobodys_silence(out):
+    with Running(out) as run:
+        everybody = [psutil.Process(run.launcher.pid), *run.children]
+        for process in everybody:
+            process.suspend()
+        time.sleep(6)  # twice the patience
+        for process in everybody:
+            process.resume()
+        recorded = run.recorded()
+        await_true(lambda: run.recorded() > recorded + 50_000, "it did not fly on")
+        run.launcher.send_signal(signal.SIGSTOP)  # and the launcher alone
+        time.sleep(6)
+        run.launcher.send_signal(signal.SIGCONT)
+        recorded = run.recorded()
+        await_true(lambda: run.recorded() > recorded + 50_000, "it did not fly on")
+        run.launcher.send_signal(signal.SIGINT)
+        run.ends()
+    assert json.loads((out / "summary.json").read_text())["reasons"] == ["interrupted by SIGINT"]
 
 
 def test_a_killed_launcher_leaves_no_orphan_and_a_readable_recording(out):
