@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from flying import PROCESSES, plan_of
+from flying import PROCESSES, TRIANGLE, plan_of
 
 from affinet import accounts, cli, launcher, outcome
 from affinet.inject import Access
@@ -19,24 +19,6 @@ from netem.fate import Ledger
 from netem.session import Login
 
 PROGRAMS = Path(__file__).parent / "programs"
-TRIANGLE = """
-[formation]
-nodes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
-edges = ["1-2", "2-3", "1-3"]
-leaders = [1, 2, 3]
-[manoeuvre]
-preset = "hover"
-[time]
-dt = 0.05
-duration = 0.5
-[sensing]
-sigma = 0.1
-[agents]
-estimator = "none"
-law = "rest"
-[record]
-enabled = false
-"""
 OFFERED = 10 * 6 * 3  # ticks, links, channels
 
 # All that accounts have to follow: delays, copies, losses, queues, a kill, a partition that holds what is under way.

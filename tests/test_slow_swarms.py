@@ -1,16 +1,15 @@
 """A slow swarm is not a stalled one: a hundred processes on two cores, batches of five hundred ticks, agents that think."""
 
-import json
 import sys
 from pathlib import Path
 
 import pytest
-from flying import PROCESSES, plan_of
+import tomli_w
+from flying import PROCESSES, TRIANGLE, plan_of
 
-from affinet import scenario
 from affinet.launcher import Launcher
-from affinet.plan import make
 from affinet.run import fly
+from world import history
 
 pytestmark = PROCESSES
 
@@ -46,11 +45,25 @@ def grid():
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_a_hundred_processes_take_off_and_pass_however_slowly(tmp_path):
-    path = tmp_path / "grid.json"
-    path.write_text(json.dumps(grid()))
-    plan = make(scenario.resolved_from(path))
+    path = tmp_path / "grid.toml"
+    path.write_text(tomli_w.dumps(grid()))
+    plan = plan_of(str(path))
     outcome = fly(plan, "processes", tmp_path / "run", lambda *_: None)
     assert outcome.verdict == "pass", outcome.reasons
     assert outcome.ticks == 100
     assert len(outcome.processes) == 102
     assert outcome.digest == fly(plan, "inprocess", tmp_path / "again", lambda *_: None).digest
+
+
+@pytest.mark.slow
+def test_agents_that_think_and_batches_that_take_longer_than_patience_pass(tmp_path):
+    path = tmp_path / "triangle.toml"
+    path.write_text(TRIANGLE)
+    plan = plan_of(str(path), "time.duration=3", "time.patience=2", "record.enabled=true", "record.every=500")
+    thinking = [sys.executable, "-P", str(PROGRAMS / "wayward_agent.py"), "thinks"]
+    out = tmp_path / "run"
+    out.mkdir()
+    flight = Launcher(plan, out, watch=lambda *_: None, programs=dict.fromkeys((1, 2, 3), thinking)).fly()
+    assert flight.failure is None, flight.failure
+    assert flight.wall_s > 60 * 0.1
+    assert len(history.load(out / history.FILE)["error"]) == 60

@@ -1,7 +1,8 @@
-"""An agent that flies as it should, but for one thing that it does wrong, if it is agent 2."""
+"""An agent that flies as it should, but that it takes its time, or for one thing that it does wrong, if it is agent 2."""
 
 import os
 import sys
+import time
 
 import zenoh
 
@@ -18,6 +19,8 @@ class Wayward(Node):
         self.wrong = wrong
 
     def _exchange(self, inbox, sensed):
+        if self.wrong == "thinks":
+            time.sleep(0.1)
         if inbox.k == TICK:
             match self.wrong:
                 case "loses":
@@ -32,7 +35,7 @@ class Wayward(Node):
 def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
-    wrong = sys.argv[1] if brief.agent == 2 else ""
+    wrong = sys.argv[1] if brief.agent == 2 or sys.argv[1] == "thinks" else ""
     with zenoh.open(client(brief.login)) as session:
         node = Wayward(session, supervisor, brief, wrong)
         node.await_everybody()
