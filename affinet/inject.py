@@ -124,7 +124,7 @@ class Access:
             When nobody answers, or the medium could not read the order.
         """
         try:
-            with zenoh.open(client(self.login)) as session:
+            with zenoh.open(client(self.login, _PATIENCE_S)) as session:
                 replies = session.get(Keys(self.run).control, payload=wire.pack_record(order), timeout=_PATIENCE_S)
                 for reply in replies:
                     if reply.err is not None:

@@ -53,7 +53,7 @@ def test_a_wrong_password_is_refused(out):
     def intrude(_tick, _error):
         if not refused:
             try:
-                zenoh.open(client(Login(launcher.endpoint, "agent-1", "guess"))).close()
+                zenoh.open(client(Login(launcher.endpoint, "agent-1", "guess"), patience_s=2.0)).close()
                 refused.append(False)
             except zenoh.ZError:
                 refused.append(True)
