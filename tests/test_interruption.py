@@ -11,13 +11,9 @@ import pytest
 from flying import PROCESSES
 
 from affinet.interruption import Interrupted, Interruption, interruptible
+from netem import journal
 
-PATIENCE = 60.0
-SIGNALS = [
-    pytest.param(signal.SIGTERM, 143, id="SIGTERM"),
-    pytest.param(signal.SIGHUP, 129, id="SIGHUP"),
-    pytest.param(signal.SIGINT, 130, id="ctrl-c"),
-]
+PATIENCE = 180.0
 
 
 def await_true(condition, otherwise):
@@ -25,6 +21,13 @@ def await_true(condition, otherwise):
     while not condition():
         assert time.monotonic() < deadline, otherwise
         time.sleep(0.02)
+
+
+def rows(book):
+    try:
+        return journal.read(book).num_rows
+    except journal.JournalError:  # it has not even begun
+        return 0
 
 
 @pytest.fixture
@@ -37,13 +40,14 @@ def private(tmp_path):
 def interrupted(number, runtime, out, private, monkeypatch, again=False):
     monkeypatch.setenv("TMPDIR", str(private))
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has its children ignore it
-    command = [sys.executable, "-m", "affinet.cli", "run", "corridor", "--duration", "600", "--runtime", runtime]
+    command = [sys.executable, "-m", "affinet.cli", "run", "corridor", "--duration", "600", "--estimator", "none"]
+    command += ["--runtime", runtime, "--set", "record.enabled=false"]
     launcher = subprocess.Popen(
         [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     book, children = out / "journal.arrows", []
     try:
-        await_true(lambda: book.exists() and book.stat().st_size > 20_000, "the run never got going")
+        await_true(lambda: rows(book), "the run never got going")
         children = psutil.Process(launcher.pid).children()
         for _ in range(3 if again else 1):
             launcher.send_signal(number)
@@ -57,10 +61,16 @@ def interrupted(number, runtime, out, private, monkeypatch, again=False):
     return launcher.returncode, complained
 
 
-@pytest.mark.parametrize(("number", "status"), SIGNALS)
 @pytest.mark.parametrize(
-    "runtime",
-    [pytest.param("processes", marks=PROCESSES), "inprocess"],
+    ("runtime", "number", "status"),
+    [
+        pytest.param("processes", signal.SIGTERM, 143, marks=PROCESSES),
+        pytest.param("processes", signal.SIGHUP, 129, marks=[PROCESSES, pytest.mark.slow]),
+        pytest.param("processes", signal.SIGINT, 130, marks=[PROCESSES, pytest.mark.slow]),
+        pytest.param("inprocess", signal.SIGTERM, 143, marks=pytest.mark.slow),
+        pytest.param("inprocess", signal.SIGHUP, 129),
+        pytest.param("inprocess", signal.SIGINT, 130, marks=pytest.mark.slow),
+    ],
 )
 def test_a_run_asked_to_end_leaves_a_summary_and_no_secrets(runtime, number, status, out, private, monkeypatch):
     left, complained = interrupted(number, runtime, out, private, monkeypatch, again=number == signal.SIGINT)
@@ -71,7 +81,7 @@ def test_a_run_asked_to_end_leaves_a_summary_and_no_secrets(runtime, number, sta
     summary = json.loads((out / "summary.json").read_text())
     assert summary["verdict"] == "fail"
     assert summary["reasons"] == [f"interrupted by {name}"]
-    assert summary["messages"]["offered"] >= 50 * 24 * 4  # zhao7 has 24 links, ga-rkf 3 channels beside sensing
+    assert summary["messages"]["offered"] >= 50 * 24 * 3  # ticks, links, and at least sensing, inputs and measurements
     assert not list(private.iterdir())  # passwords, socket, checkpoints
     assert not (out / "control.json").exists()
 
