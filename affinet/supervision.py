@@ -11,8 +11,9 @@ import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -154,14 +155,13 @@ class Crew:
             child.look()
         if quiet_s < self._patience_s:
             return
-        waiting = "; ".join(f"{name} waits for {_of_whom(beat)}" for name, beat in beats.items() if beat and beat.waits)
         if not culprits:
-            raise RunFailed(f"nothing moved for {quiet_s:.1f} s, and nobody is to blame: {waiting}")
+            raise RunFailed(f"nothing moved for {quiet_s:.1f} s, and nobody is to blame: {_who_waits(beats, beats)}")
         looks = {child.name: child.looks for child in culprits if child.looks is not None}
         trusted = [child.name for child in culprits if child.role != "agent"]
         if blamed := stalled(looks, self._patience_s, trusted):
-            what = f"; {waiting}" if waiting else ""
-            raise RunFailed(f"{_said_of([alive[name] for name in blamed])}: nothing moved for {quiet_s:.1f} s{what}")
+            said = _said_of([alive[name] for name in blamed])
+            raise RunFailed(f"{said}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}")
 
     def kill(self, child: Child) -> None:
         """Kill a child as the script says, wait until it is gone, and keep nothing of it but its report."""
@@ -264,6 +264,13 @@ class Crew:
 def _said_of(children: Sequence[Child]) -> str:
     said = ", ".join(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children[:_NAMED])
     return f"{said} and {len(children) - _NAMED} more" if len(children) > _NAMED else said
+
+
+def _who_waits(beats: Mapping[str, Beat | None], whom: Collection[str]) -> str:
+    waiting = {name: beat for name, beat in beats.items() if beat and not set(whom).isdisjoint(beat.waits)}
+    said = [f"{name} waits for {_of_whom(beat)}" for name, beat in islice(waiting.items(), _NAMED)]
+    more = [f"and {len(waiting) - _NAMED} more"] if len(waiting) > _NAMED else []
+    return "; ".join([*said, *more]) or "the launcher waits for it"
 
 
 def _of_whom(beat: Beat) -> str:
