@@ -220,7 +220,7 @@ def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds:
     whose
         Who said it, and where: how the error begins.
     shape
-        What it has to be, any length where it has None; None for any shape.
+        What it has to be, any length where it begins with None; None for any shape.
     kinds
         Of NumPy's data types, those that will do.
 
@@ -296,7 +296,7 @@ def _read(kind: type[T], plain: Any) -> T:
 
 
 def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(wanted) and all(want in (None, length) for length, want in zip(shape, wanted, strict=True))
+    return shape == wanted or (wanted[:1] == (None,) and len(shape) == len(wanted) and shape[1:] == wanted[1:])
 
 
 def _load(data: bytes) -> Any:

@@ -41,6 +41,10 @@ class Acts:
         self._dimension = dimension
         self._reports = reports
         self._streams = Sequences("agent")
+        fields = ("input", "known", "estimate", "covariance")
+        self._whose = {
+            agent: {name: f"agent {agent}: Act: {name}" for name in fields} for agent in range(1, links.agents + 1)
+        }
 
     def restart(self, agent: int) -> None:
         """Expect the acts of a new process."""
@@ -65,7 +69,7 @@ class Acts:
             raise wire.WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
         self._streams.check(f"{agent} act", act.seq)
         return act._replace(
-            input=wire.numbers(act.input, f"agent {agent}: Act: input", (self._dimension,)),
+            input=wire.numbers(act.input, self._whose[agent]["input"], (self._dimension,)),
             known=self._edges(agent, "known", act.known, (None,), "b"),
             estimate=self._edges(agent, "estimate", act.estimate, (None, self._rows["estimate"])),
             covariance=self._edges(agent, "covariance", act.covariance, (None, self._rows["covariance"])),
@@ -89,7 +93,7 @@ class Acts:
         return believed
 
     def _edges(self, agent: int, name: str, given: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> Any:
-        rows = wire.numbers(given, f"agent {agent}: Act: {name}", shape, kinds)
+        rows = wire.numbers(given, self._whose[agent][name], shape, kinds)
         if len(rows) not in (0, self._degree[agent - 1]):
             raise wire.WireError(
                 f"agent {agent}: Act: {name}: expected one for each of its {self._degree[agent - 1]} neighbours, or none, "
