@@ -1,6 +1,7 @@
 """The `affinet` command.
 
-Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 3 a user's own code failed (estimator, law or module), 130 interrupted.
+Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 3 a user's own code failed (estimator, law or module), 130 interrupted;
+143 or 129 where SIGTERM or SIGHUP ended a run.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from affinet import compare, directories, fit, options, scenario, show, terminal
 from affinet import plan as planning
 from affinet.checks import Finding
 from affinet.inject import Access, NotFlying, Wish
+from affinet.interruption import Interrupted
 from affinet.plan import Plan, PlanError
 from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
@@ -66,6 +68,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(one_line(refused), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
+    except Interrupted as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return error.status
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)  # noqa: T201
         return INTERRUPTED

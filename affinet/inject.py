@@ -24,6 +24,7 @@ from netem.system_errors import about, afterwards
 
 _FILE = "control.json"
 _PATIENCE_S = 5.0
+_CONNECT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class Access:
             When nobody answers, or the medium could not read the order.
         """
         try:
-            with zenoh.open(client(self.login)) as session:
+            with zenoh.open(client(self.login, _CONNECT_S)) as session:
                 replies = session.get(Keys(self.run).control, payload=wire.pack_record(order), timeout=_PATIENCE_S)
                 for reply in replies:
                     if reply.err is not None:

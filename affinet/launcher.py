@@ -5,14 +5,17 @@ from __future__ import annotations
 import secrets
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from affinet.child import Child, RunFailed, UserCodeFailed
 from affinet.inject import Access
+from affinet.interruption import Interrupted, Interruption
 from affinet.plan import Plan
-from affinet.supervision import Child, Crew, RunFailed, UserCodeFailed, module
+from affinet.supervision import Crew, module
+from affinet.told import Event
 from agents.centre import Centre
 from agents.centre_process import CentreBrief
 from agents.process import AgentBrief
@@ -21,10 +24,6 @@ from netem.process import MediumBrief
 from netem.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
 from netem.system_errors import said
 from world.brief import WorldBrief
-
-# The medium notices first that an agent is silent, then the world, then the launcher that nothing moves at all.
-_MEDIUM_PATIENCE_S, _WORLD_PATIENCE_S, _LAUNCHER_PATIENCE_S = 3.0, 3.3, 3.6
-_START_S = 30.0
 
 
 @dataclass
@@ -66,6 +65,7 @@ class Launcher:
         watch: Callable[[int, float], None],
         viewer: str | None = None,
         programs: Mapping[int, Sequence[str]] | None = None,
+        interruption: Interruption | None = None,
     ) -> None:
         """Nothing is started yet.
 
@@ -79,22 +79,25 @@ class Launcher:
             URL of a Rerun viewer that is listening.
         programs
             Command lines that fly some agents in place of `python -m agents` (docs/protocol.md).
+        interruption
+            What may ask the run to end.
         """
         self._plan = plan
         self._out = out
         self._viewer = viewer
         self._watch = watch
         self._programs = programs or {}
+        self._interruption = interruption or Interruption()
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}
         self.flight = Flight()
 
     def fly(self) -> Flight:
-        """Run to the end, or to the first thing that goes wrong."""
+        """Run to the end, to the first thing that goes wrong, or until the run is asked to end."""
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
-        crew = Crew(logs)
+        crew = Crew(logs, self._plan.scenario.time.patience, self._interruption)
         launched = time.perf_counter()
         with tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private:
             self._private = Path(private)
@@ -103,7 +106,7 @@ class Launcher:
                     self._start(crew)
                     with Access(self._run, self._logins[CONTROL]).granted(self._out):
                         self._fly(crew, launched)
-            except RunFailed as failure:
+            except (RunFailed, Interrupted) as failure:
                 self.flight.failure = str(failure)
                 self.flight.user_code = isinstance(failure, UserCodeFailed)
             except OSError as error:
@@ -122,7 +125,8 @@ class Launcher:
             crew.start("centre", module("agents.centre_process"), self._centre_brief(self._plan.centre, login))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(crew, number)
-        self._await_ready(crew, crew.children)
+        crew.await_ready(crew.children)
+        (private / "users").unlink()  # the medium knows them now, and nobody else has to
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
         endpoint = f"unixsock-stream/{private}/z.sock"
@@ -144,56 +148,50 @@ class Launcher:
         world.order("go")
         first_tick = time.perf_counter()
         self.flight.start_s = first_tick - launched
-        rota = 0
-        for child, event in crew.events(_LAUNCHER_PATIENCE_S, "the world to move on"):
-            match event["event"]:
-                case "tick":
-                    self._watch(event["k"], event["error"])
-                    crew.children[rota % len(crew.children)].measure()
-                    rota += 1
-                case "kill":
-                    for number in event["agents"]:
-                        crew.kill(self._agents[number])
-                    world.order("kill")
-                case "restart":
-                    new = [self._start_agent(crew, agent, agent in event["remembering"]) for agent in event["agents"]]
-                    self._await_ready(crew, new)
-                    world.order("restart")
-                case "pause":
-                    for number in event["agents"]:
-                        self._agents[number].pause()
-                    world.order("pause")
-                case "resume":
-                    for number in event["agents"]:
-                        self._agents[number].resume()
-                    world.order("resume")
-                case "fired":
-                    self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
-                case "done" if child is world:
-                    self.flight.uninstructed = event["uninstructed"]
-                case "done" if child is medium:
-                    self.flight.in_flight = event["in_flight"]
-            self.flight.wall_s = time.perf_counter() - first_tick
-            if self.flight.uninstructed is not None and self.flight.in_flight is not None:
-                break
+        while awaited := [child for child in (world, medium) if not child.is_done]:
+            for child, event in crew.listen():
+                self._heed(crew, child, event)
+                self.flight.wall_s = time.perf_counter() - first_tick
+            crew.blame_the_silent(awaited)
         crew.release()
         medium.order("leave")
-        crew.await_all_gone(_LAUNCHER_PATIENCE_S)
+        crew.await_all_gone()
+
+    def _heed(self, crew: Crew, child: Child, event: Event) -> None:
+        match event["event"]:
+            case "tick":
+                self._watch(event["k"], event["error"])
+                crew.children[event["k"] % len(crew.children)].measure()
+            case "kill" | "restart" | "pause" | "resume" as order:
+                self._move(crew, order, event)
+                child.order(order)
+            case "fired":
+                self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
+            case "done" if child.role == WORLD:
+                self.flight.uninstructed = event["uninstructed"]
+            case "done" if child.role == HUB:
+                self.flight.in_flight = event["in_flight"]
+
+    def _move(self, crew: Crew, order: str, event: Event) -> None:
+        match order:
+            case "kill":
+                for number in event["agents"]:
+                    crew.kill(self._agents[number])
+            case "restart":
+                remembering = event["remembering"]
+                crew.await_ready([self._start_agent(crew, number, number in remembering) for number in event["agents"]])
+            case "pause":
+                for number in event["agents"]:
+                    self._agents[number].pause()
+            case "resume":
+                for number in event["agents"]:
+                    self._agents[number].resume()
 
     def _start_agent(self, crew: Crew, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         program = self._programs.get(number) or module("agents")
         self._agents[number] = crew.start("agent", program, self._agent_brief(number, login, remembers), number)
         return self._agents[number]
-
-    def _await_ready(self, crew: Crew, children: Iterable[Child]) -> None:
-        waiting = {child.name for child in children}
-        for child, event in crew.events(_START_S, "everybody to be ready"):
-            if event["event"] == "ready":
-                child.measure()
-                waiting.discard(child.name)
-            if not waiting:
-                return
 
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(
@@ -206,7 +204,6 @@ class Launcher:
             triggers=self._plan.triggers,
             reports=self._plan.reports,
             books=self._plan.books(self._viewer),
-            patience_s=_WORLD_PATIENCE_S,
         )
 
     def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
@@ -223,11 +220,10 @@ class Launcher:
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
             positioned=self._plan.positioned,
-            patience_s=_MEDIUM_PATIENCE_S,
         )
 
     def _centre_brief(self, centre: Centre, login: Login) -> CentreBrief:
-        return CentreBrief(self._run, login, self._plan.world.ticks, centre, _MEDIUM_PATIENCE_S)
+        return CentreBrief(self._run, login, self._plan.world.ticks, centre)
 
     def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
         plan, row = self._plan, number - 1

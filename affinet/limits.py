@@ -94,8 +94,9 @@ def delays(classes: Iterable[LinkClass], message_bits: np.ndarray[Any, np.dtype[
         if (model := profile.delay) is not None:
             for name in ("mean", "jitter"):
                 delay(f"{key}.delay.{name}", getattr(model, name) or 0.0, time)
-            for number, seconds in enumerate(model.table or [], start=1):
-                delay(f"{key}.delay.table.{number}", seconds, time)
+            if model.model == "table":
+                for seconds in (one.measured.min(), one.measured.max()):
+                    delay(f"{key}.delay.table", float(seconds), time)
         if profile.rate is not None:
             least = float(message_bits[1:].max()) / time.duration
             if profile.rate.rate < least:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from affinet import inputs, measures, scenario
+from affinet.accounts import Accounts
 from affinet.bites import Bite, bites
 from affinet.measures import Figures
 from affinet.plan import Plan
@@ -100,6 +101,7 @@ def judge(
     uninstructed: int | None,
     failure: str | None,
     user_code: bool,
+    accounts: Accounts | None = None,
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
@@ -113,18 +115,20 @@ def judge(
     timeline
         Its faults, where they came to lie.
     arrays
-        What happened; None when the run left nothing.
+        What happened; None when the run left no arrays.
     in_flight, uninstructed
         Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
     failure, user_code
         Why the run ended early, if it did, and whether a user's own code is why.
+    accounts
+        What the journal says where there are no arrays.
     wall_s
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
     """
-    ticks = 0 if arrays is None else len(arrays["error"])
-    messages = _messages(arrays, in_flight, uninstructed)
+    ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
+    messages = _messages(arrays, accounts, in_flight, uninstructed)
     faults = [] if arrays is None else bites(plan, timeline, arrays)
     wrong = [failure] if failure else []
     if not failure:
@@ -182,23 +186,22 @@ def prepare(plan: Plan, out: Path) -> None:
             file.write(text)
 
 
-def _messages(arrays: Arrays | None, in_flight: int | None, uninstructed: int | None) -> dict[str, Any]:
-    if arrays is None:
-        return {
-            "offered": 0,
-            "copies": 0,
-            "delivered": 0,
-            "dropped": {},
-            "in_flight": in_flight,
-            "uninstructed": uninstructed,
-        }
-    ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+def _messages(
+    arrays: Arrays | None, accounts: Accounts | None, in_flight: int | None, uninstructed: int | None
+) -> dict[str, Any]:
+    if arrays is not None:
+        ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+        in_flight = ledger.outstanding if in_flight is None else in_flight
+    elif accounts is not None:
+        ledger, in_flight = accounts.ledger, accounts.in_flight
+    else:
+        ledger = Ledger(offered=0, copies=0, delivered=0, dropped={})
     return {
         "offered": ledger.offered,
         "copies": ledger.copies,
         "delivered": ledger.delivered,
         "dropped": ledger.dropped,
-        "in_flight": ledger.outstanding if in_flight is None else in_flight,
+        "in_flight": in_flight,
         "uninstructed": uninstructed,
     }
 

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from affinet import outcome
+from affinet import accounts, outcome
 from affinet.evidence import Evidence
 from affinet.inprocess import Swarm
+from affinet.interruption import Interrupted, Interruption, interruptible
 from affinet.launcher import Launcher
 from affinet.outcome import Outcome
 from affinet.plan import Plan
@@ -49,13 +50,18 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
         When `out` holds a run already.
     OSError
         When `out` cannot be made or written to. What the system refuses later fails the run, and is told in its outcome.
+    Interrupted
+        When a signal asked the run to end; its outcome is written down all the same.
     """
     outcome.prepare(plan, out)
-    done = (_over_processes if runtime == "processes" else _in_process)(plan, out, watch, viewer)
-    try:
-        done.save()
-    except OSError as error:
-        return done.failing(f"the summary is not written: {said(error)}")
+    fly_in = _over_processes if runtime == "processes" else _in_process
+    with interruptible() as interruption:
+        done = fly_in(plan, out, watch, viewer, interruption)
+        try:
+            done.save()
+        except OSError as error:
+            done = done.failing(f"the summary is not written: {said(error)}")
+    interruption.heed()
     return done
 
 
@@ -79,10 +85,10 @@ def evidence(plan: Plan, done: Outcome) -> Evidence | None:
     return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
-def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
     from netem import journal  # pyarrow takes a while to import, and the start should not wait for it
 
-    launcher = Launcher(plan, out, watch=watch, viewer=viewer)
+    launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
     flight = launcher.flight
     try:
         launcher.fly()
@@ -112,13 +118,14 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> 
         uninstructed=flight.uninstructed,
         failure=failure,
         user_code=flight.user_code,
+        accounts=None if path.exists() or not book.exists() else accounts.of_journal(plan, timeline, book),
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
     )
 
 
-def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outcome:
+def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
     from world.logbook import Logbook  # takes a second to import; over processes only the world needs it
 
     swarm, books, flown = Swarm(plan), plan.books(viewer), History(plan.world, len(plan.channels), plan.reports)
@@ -130,9 +137,12 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None) -> Outc
                 flown.extend(moments, next_position)
                 logbook.write(moments, swarm.timeline)
                 watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+                interruption.heed()
 
             broken = _flown(swarm, see, books.batch, out)
             failure = None if broken is None else str(broken)
+    except Interrupted as error:
+        failure = str(error)
     except OSError as error:
         failure = f"the run could not be written down: {said(error)}"
     wall_s = time.perf_counter() - started
@@ -171,7 +181,7 @@ def _judged(
         plan,
         swarm.timeline,
         arrays if flown.ticks else None,
-        in_flight=swarm.in_flight,
+        in_flight=None if failure else swarm.in_flight,
         uninstructed=0,
         failure=failure,
         user_code=user_code,

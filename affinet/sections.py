@@ -112,10 +112,14 @@ class Manoeuvre(Section):
 
 
 class Time(Section):
-    """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick."""
+    """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick.
+
+    Over processes a run has stalled when nothing has moved for `patience` seconds.
+    """
 
     dt: Tick
     duration: Positive
+    patience: Annotated[float, Field(ge=2.0, le=3600.0)] = 3.0
     mode: Literal["lockstep"] = "lockstep"
     exchange: Literal["same-tick", "next-tick"] = "same-tick"
 

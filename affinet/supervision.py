@@ -6,122 +6,35 @@ end is `netem/supervised.py`.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import selectors
-import signal
 import subprocess
 import sys
-import threading
 import time
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import psutil
-
+from affinet.child import Child, RunFailed
+from affinet.interruption import Interruption
+from affinet.silence import holding_up, stalled
+from affinet.told import Beat, Event
 from netem.session import ENVIRONMENT
-from netem.supervised import brief_bytes
+from netem.supervised import BEAT_S
 
-_LAST_LINES = 12
 _GRACE_S = 1.2
+# To start takes a second of processor time, and there may be a hundred on two cores.
+_START_S, _START_EACH_S = 30.0, 3.0
+_LATE_BEATS = 2
+_NAMED = 6
 # What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
 _RUN = """import json, runpy, sys
 path, _, package = sys.argv[1:]
 sys.path[:] = json.loads(path)
 runpy.run_module(package, run_name="__main__", alter_sys=True)"""
-
-
-class RunFailed(RuntimeError):
-    """The run ended before its last tick: why."""
-
-
-class UserCodeFailed(RunFailed):
-    """It did because a user's own code did something wrong."""
-
-
-@dataclass
-class Child:
-    """A process of the run.
-
-    Parameters
-    ----------
-    role
-        "netem", "world" or "agent".
-    number
-        Of an agent.
-    process, log
-        The process, and the file its standard error goes to.
-    expected_to_die
-        Whether its death is in the script, or the run is over.
-    """
-
-    role: str
-    number: int | None
-    process: subprocess.Popen[bytes]
-    log: Path
-    expected_to_die: bool = False
-    rss_mb: float = 0.0
-    pending: bytes = b""
-    events: deque[dict[str, Any]] = field(default_factory=deque)
-
-    @property
-    def name(self) -> str:
-        """For people."""
-        return self.role if self.number is None else f"{self.role} {self.number}"
-
-    def order(self, order: str) -> None:
-        """Give it an order; a child that is gone cannot take it, and its end of file will say so."""
-        self._write(f"{order}\n".encode())
-
-    def brief(self, brief: Any) -> None:
-        """Give it its brief, which it reads when it has come that far."""
-        # Longer than a pipe holds: to wait for one that imports, or is frozen, would keep a death of another from being seen.
-        try:
-            threading.Thread(target=self._write, args=(brief_bytes(brief),), daemon=True).start()
-        except RuntimeError as error:  # what Python makes of it where the system has no more threads
-            raise OSError(errno.EAGAIN, str(error)) from error
-
-    def pause(self) -> None:
-        """Stop it, as the script says."""
-        self.process.send_signal(signal.SIGSTOP)
-
-    def resume(self) -> None:
-        """Let it go on."""
-        self.process.send_signal(signal.SIGCONT)
-
-    def measure(self) -> None:
-        """Note its resident memory."""
-        with suppress(psutil.NoSuchProcess):
-            self.rss_mb = max(self.rss_mb, psutil.Process(self.process.pid).memory_info().rss / 2**20)
-
-    def obituary(self) -> str:
-        """How it ended, and its last lines."""
-        code = self.process.wait()
-        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit status {code}"
-        lines = self.log.read_text(errors="replace").splitlines()[-_LAST_LINES:]
-        said = "".join(f"\n    {line}" for line in lines) if lines else " It had said nothing."
-        return f"{self.name} (pid {self.process.pid}) was {how}.{' Its last lines:' if lines else ''}{said}"
-
-    def report(self) -> dict[str, Any]:
-        """For the summary."""
-        return {
-            "role": self.role,
-            "id": self.number,
-            "pid": self.process.pid,
-            "rss_mb": round(self.rss_mb, 1),
-            "exit": self.process.returncode,
-        }
-
-    def _write(self, data: bytes) -> None:
-        stdin: Any = self.process.stdin
-        with suppress(BrokenPipeError, ValueError):  # it is gone, or the run is over and the pipe closed
-            stdin.write(data)
-            stdin.flush()
 
 
 def module(package: str) -> list[str]:
@@ -131,11 +44,29 @@ def module(package: str) -> list[str]:
 
 
 class Crew:
-    """All children of a run; leaving the block leaves none behind."""
+    """All children of a run; leaving the block leaves none behind.
 
-    def __init__(self, logs: Path) -> None:
+    Its clock, `now_s`, runs only while it listens, and never for longer than it meant to: time in which the launcher itself
+    was stopped, or did not come to look, is nobody's silence.
+    """
+
+    def __init__(self, logs: Path, patience_s: float, interruption: Interruption) -> None:
+        """No children yet.
+
+        Parameters
+        ----------
+        logs
+            Where their standard error goes, a file each.
+        patience_s
+            How long nothing may move before somebody is to blame, in seconds.
+        interruption
+            What may ask the run to end.
+        """
         self._logs = logs
+        self._patience_s = patience_s
+        self._interruption = interruption
         self._selector = selectors.DefaultSelector()
+        self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
 
     def __enter__(self) -> Crew:
@@ -159,34 +90,92 @@ class Crew:
             )
         child = Child(role, number, process, log)
         self.children.append(child)
-        self._selector.register(self._stdout(child), selectors.EVENT_READ, child)
+        self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         child.brief(brief)
         return child
 
-    def events(self, timeout_s: float, missing: str) -> Iterator[tuple[Child, dict[str, Any]]]:
-        """What the children tell, as it comes; endless.
+    def await_ready(self, children: Collection[Child]) -> None:
+        """Wait until all of them are ready; as long as somebody gets anywhere, that may take as long as it takes.
 
         Raises
         ------
         RunFailed
-            When a child dies out of turn or fails, or nobody tells anything for `timeout_s`.
+            When one dies or fails, or none gets anywhere for too long.
         """
-        while True:
-            for child in self.children:
-                while child.events:
-                    yield child, child.events.popleft()
-            ready = self._selector.select(timeout_s)
-            if not ready:
-                raise RunFailed(f"waited {timeout_s:g} s for {missing}")
-            for key, _ in ready:
-                self._read(key.data)
+        patience_s = _START_S + _START_EACH_S * len(self.children)
+        waiting, stopped_s = list(children), dict[str, float]()
+        self._moved_s = self.now_s
+        while waiting:
+            self.listen()
+            waiting = [child for child in waiting if not child.is_ready]
+            if self.now_s - self._looked_s < BEAT_S:
+                continue
+            self._looked_s = self.now_s
+            stopped_s = {child.name: stopped_s.get(child.name, self.now_s) for child in waiting if child.look().stopped}
+            late = self.now_s - self._moved_s >= patience_s
+            if late or any(self.now_s - since_s >= self._patience_s for since_s in stopped_s.values()):
+                blamed = [child for child in waiting if late or child.name in stopped_s]
+                raise RunFailed(f"{_said_of(blamed)}, and not ready: waited {self.now_s - self._moved_s:.1f} s for it")
+        for child in children:
+            child.measure()
+            child.looks = None
+        self._moved_s = self.now_s
+
+    def listen(self) -> list[tuple[Child, Event]]:
+        """What the children tell until the next beat is due; it may be nothing.
+
+        Raises
+        ------
+        RunFailed
+            When a child dies out of turn, fails, or tells what is not its own to tell.
+        Interrupted
+            When the run was asked to end.
+        """
+        self._interruption.heed()
+        began_s = time.monotonic()
+        ready = self._selector.select(BEAT_S)
+        self.now_s += min(time.monotonic() - began_s, BEAT_S)
+        return [(key.data, event) for key, _ in ready for event in self._hear(key.data)]
+
+    def blame_the_silent(self, awaited: Collection[Child]) -> None:
+        """Go on as long as something moves, or somebody works at it.
+
+        Parameters
+        ----------
+        awaited
+            Those for whom the launcher waits.
+
+        Raises
+        ------
+        RunFailed
+            When nothing moves: who is to blame.
+        """
+        quiet_s = self.now_s - self._moved_s
+        if quiet_s < self._patience_s / 2 or self.now_s - self._looked_s < BEAT_S:
+            return
+        self._looked_s = self.now_s
+        alive = {child.name: child for child in self.children if not (child.killed or child.is_done)}
+        beats = {name: self._lately(child) for name, child in alive.items()}
+        culprits = [alive[name] for name in holding_up(beats, [child.name for child in awaited])]
+        for child in culprits:
+            child.look()
+        if quiet_s < self._patience_s:
+            return
+        if not culprits:
+            raise RunFailed(f"nothing moved for {quiet_s:.1f} s, and nobody is to blame: {_who_waits(beats, beats)}")
+        looks = {child.name: child.looks for child in culprits if child.looks is not None}
+        trusted = [child.name for child in culprits if child.role != "agent"]
+        if blamed := stalled(looks, self._patience_s, trusted):
+            said = _said_of([alive[name] for name in blamed])
+            raise RunFailed(f"{said}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}")
 
     def kill(self, child: Child) -> None:
-        """Kill a child as the script says, and wait until it is gone."""
-        child.expected_to_die = True
+        """Kill a child as the script says, wait until it is gone, and keep nothing of it but its report."""
+        child.expected_to_die = child.killed = True
         child.measure()
         child.process.kill()
         child.process.wait()
+        self._forget(child)
 
     def release(self) -> None:
         """The run is over: from now on everybody may leave."""
@@ -194,39 +183,72 @@ class Crew:
             child.expected_to_die = True
             child.resume()
 
-    def await_all_gone(self, timeout_s: float) -> None:
-        """Wait until every child has left.
+    def await_all_gone(self) -> None:
+        """Wait until every child has left; as long as they go, or work at it, that may take as long as it takes.
 
         Raises
         ------
         RunFailed
-            When one has not within `timeout_s`, or left with an error.
+            When one does not leave, or left with an error.
         """
-        deadline = time.monotonic() + timeout_s
+        self._moved_s = self.now_s
+        staying = [child for child in self.children if child.process.poll() is None]
+        while staying:
+            self._await_end(staying[0])
+            if len(staying) > len(staying := [child for child in staying if child.process.poll() is None]):
+                self._moved_s = self.now_s
+            if self.now_s - self._moved_s >= self._patience_s:
+                self._blame_those_who_stay(staying)
         for child in self.children:
-            try:
-                child.process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired as error:
-                raise RunFailed(f"{child.name} had not left {timeout_s:g} s after the end of the run") from error
-            if child.process.returncode > 0:
+            if child.process.returncode and not child.killed:
                 raise RunFailed(child.obituary())
 
-    def _read(self, child: Child) -> None:
-        chunk = os.read(self._stdout(child), 65536)
-        if not chunk:
-            self._selector.unregister(self._stdout(child))
+    def _await_end(self, child: Child) -> None:
+        if not child.is_mute:
+            self.listen()
+            return
+        self._interruption.heed()
+        with suppress(subprocess.TimeoutExpired):
+            child.process.wait(BEAT_S)
+            return
+        self.now_s += BEAT_S
+
+    def _blame_those_who_stay(self, staying: Sequence[Child]) -> None:
+        for child in staying:
+            with suppress(RunFailed):  # it has left by now
+                child.look()
+        looks = {child.name: child.looks for child in staying if child.looks is not None}
+        trusted = [child.name for child in staying if child.role != "agent"]
+        if blamed := stalled(looks, self._patience_s, trusted):
+            said = _said_of([child for child in staying if child.name in blamed])
+            raise RunFailed(f"{said}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run")
+
+    def _lately(self, child: Child) -> Beat | None:
+        """What a child does, unless it has not said so for a while, or never does."""
+        return child.doing if self.now_s - child.beat_s <= _LATE_BEATS * BEAT_S else None
+
+    def _hear(self, child: Child) -> list[Event]:
+        before = child.doing
+        events = child.hear()
+        if events is None:
+            self._forget(child)
             if not child.expected_to_die:
                 raise RunFailed(child.obituary())
-            return
-        *lines, child.pending = (child.pending + chunk).split(b"\n")
-        for line in lines:
-            event = json.loads(line)
-            if event["event"] == "failed":
-                failure = UserCodeFailed if event.get("user_code") else RunFailed
-                raise failure(f"{child.name}: {event['reason']}")
-            if event["event"] == "done":  # it has done its part: agents leave while the world still writes
-                child.expected_to_die = True
-            child.events.append(event)
+            return []
+        if events or child.doing != before:
+            self._moved_s = self.now_s
+            self._forget_looks()
+        child.beat_s = self.now_s
+        return events
+
+    def _forget_looks(self) -> None:
+        for child in self.children:
+            child.looks = None
+
+    def _forget(self, child: Child) -> None:
+        if not child.is_mute:
+            self._selector.unregister(child.events_fd)
+            child.free()
 
     def _end_all(self) -> None:
         # The world goes first: it has a recording to close.
@@ -242,12 +264,23 @@ class Crew:
                 child.process.kill()
                 child.process.wait()
         for child in self.children:
-            for pipe in (child.process.stdin, child.process.stdout):
-                if pipe:
-                    with suppress(BrokenPipeError):
-                        pipe.close()
+            child.free()
 
-    @staticmethod
-    def _stdout(child: Child) -> int:
-        assert child.process.stdout is not None
-        return child.process.stdout.fileno()
+
+def _said_of(children: Sequence[Child]) -> str:
+    said = ", ".join(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children[:_NAMED])
+    return f"{said} and {len(children) - _NAMED} more" if len(children) > _NAMED else said
+
+
+def _who_waits(beats: Mapping[str, Beat | None], whom: Collection[str]) -> str:
+    waiting = {name: beat for name, beat in beats.items() if beat and not set(whom).isdisjoint(beat.waits)}
+    said = [f"{name} waits for {_of_whom(beat)}" for name, beat in islice(waiting.items(), _NAMED)]
+    more = [f"and {len(waiting) - _NAMED} more"] if len(waiting) > _NAMED else []
+    return "; ".join([*said, *more]) or "the launcher waits for it"
+
+
+def _of_whom(beat: Beat) -> str:
+    whom = ", ".join(beat.waits[:_NAMED]) + (
+        f" and {len(beat.waits) - _NAMED} more" if len(beat.waits) > _NAMED else ""
+    )
+    return f"{whom} ({beat.what}, tick {beat.tick})"

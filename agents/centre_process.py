@@ -11,11 +11,12 @@ import zenoh
 
 from agents.centre import Centre, Told
 from netem import wire
+from netem.broadcasts import Broadcasts
 from netem.channels import INPUT, MEASUREMENT
 from netem.keys import Keys
-from netem.sequence import Numbering, Sequences
+from netem.sequence import Numbering
 from netem.session import CENTRE, Login, await_subscribers, client
-from netem.supervised import Supervisor, patience
+from netem.supervised import Supervisor, called
 
 
 @dataclass(frozen=True)
@@ -30,29 +31,27 @@ class CentreBrief:
         How many there are.
     centre
         The filter.
-    patience_s
-        How long it waits for an agent, in seconds.
     """
 
     run: str
     login: Login
     ticks: int
     centre: Centre
-    patience_s: float
 
 
 class Listener:
     """The centre on the network."""
 
-    def __init__(self, session: zenoh.Session, brief: CentreBrief) -> None:
-        self._brief, self._centre = brief, brief.centre
+    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: CentreBrief) -> None:
+        self._supervisor, self._brief, self._centre = supervisor, brief, brief.centre
         keys, self._agents = Keys(brief.run), range(1, len(brief.centre.neighbours) + 1)
         self._ears = {
             channel: session.declare_subscriber(keys.broadcast("*", channel), zenoh.handlers.FifoChannel(4096))
             for channel in (MEASUREMENT, INPUT)
         }
         self._told = {agent: session.declare_publisher(keys.told(agent)) for agent in self._agents}
-        self._streams, self._numbers = Sequences("agent"), Numbering()
+        self._reader, self._numbers = Broadcasts(keys, self._agents, (MEASUREMENT, INPUT)), Numbering()
+        self._dimension = len(brief.centre.process) // len(brief.centre.neighbours)
         slots = zip(brief.centre.neighbours.tolist(), brief.centre.present.tolist(), strict=True)
         self._slots = [
             {number + 1: slot for slot, (number, real) in enumerate(zip(row, there, strict=True)) if real}
@@ -69,30 +68,37 @@ class Listener:
         for tick in range(self._brief.ticks):
             said = {channel: self._hear(channel, tick) for channel in self._ears}
             measured, seen = self._measurements(said[MEASUREMENT])
-            inputs = np.array([said[INPUT][agent]["velocity"] for agent in self._agents])
+            inputs = np.array([self._input(agent, said[INPUT][agent]) for agent in self._agents])
+            self._supervisor.works(tick)
             state, told = self._centre.step(state, measured, seen, inputs)
             self._tell(tick, told)
 
     def _hear(self, channel: str, tick: int) -> dict[int, dict[str, Any]]:
         said: dict[int, dict[str, Any]] = {}
-        missing = partial(_missing, channel, tick, self._agents, said)
-        with patience(self._brief.patience_s, missing):
-            while len(said) < len(self._agents):
-                broadcast = wire.unpack(wire.Broadcast, self._ears[channel].recv().payload.to_bytes())
-                if broadcast.k != tick or broadcast.src in said:
-                    raise wire.WireError(f"the centre is in tick {tick}, agent {broadcast.src} in tick {broadcast.k}")
-                self._streams.check(f"{broadcast.src} {channel}", broadcast.seq)
-                said[broadcast.src] = broadcast.payload
+        self._supervisor.waits(tick, "what it broadcasts", partial(_silent, self._agents, said))
+        awaited = {(agent, channel) for agent in self._agents}
+        while awaited:
+            sample = self._ears[channel].recv()
+            broadcast = self._reader.read(str(sample.key_expr), sample.payload.to_bytes(), tick, awaited)
+            awaited.remove((broadcast.src, channel))
+            said[broadcast.src] = broadcast.payload
         return said
+
+    def _input(self, agent: int, said: dict[str, Any]) -> Any:
+        return wire.numbers(said.get("velocity"), f"agent {agent} on {INPUT!r}: 'velocity'", (self._dimension,))
 
     def _measurements(self, said: dict[int, dict[str, Any]]) -> tuple[Any, Any]:
         agents, slots = self._centre.neighbours.shape
-        measured = np.zeros((agents, slots, len(self._centre.process) // agents))
+        measured = np.zeros((agents, slots, self._dimension))
         seen = np.zeros((agents, slots), dtype=bool)
         for agent, observed in said.items():
-            rows = [self._slots[agent - 1][neighbour] for neighbour in observed["neighbours"]]
-            if rows:
-                measured[agent - 1, rows], seen[agent - 1, rows] = observed["measured"], True
+            whose, slots_of = f"agent {agent} on {MEASUREMENT!r}", self._slots[agent - 1]
+            whom = wire.numbers(observed.get("neighbours"), f"{whose}: 'neighbours'", (None,), "iu").tolist()
+            if strangers := [neighbour for neighbour in whom if neighbour not in slots_of]:
+                raise wire.WireError(f"{whose}: 'neighbours': it has none called {strangers} (see docs/protocol.md)")
+            rows = [slots_of[neighbour] for neighbour in whom]
+            given = wire.numbers(observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._dimension))
+            measured[agent - 1, rows], seen[agent - 1, rows] = given, True
         return measured, seen
 
     def _tell(self, tick: int, told: Told) -> None:
@@ -102,8 +108,8 @@ class Listener:
             publisher.put(wire.pack(message))
 
 
-def _missing(channel: str, tick: int, agents: range, said: dict[int, Any]) -> str:
-    return f"the {channel} of agents {sorted(set(agents) - set(said))} in tick {tick}"
+def _silent(agents: range, said: dict[int, Any]) -> list[str]:
+    return [called(agent) for agent in sorted(set(agents) - set(said))]
 
 
 def main() -> None:
@@ -111,7 +117,7 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(CentreBrief)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
-        listener = Listener(session, brief)
+        listener = Listener(session, supervisor, brief)
         listener.await_everybody()
         supervisor.tell("ready")
         listener.run()

@@ -20,7 +20,7 @@ from analysis.pursuit import Sighting
 from netem import channels, wire
 from netem.keys import Keys
 from netem.sequence import Numbering, Sequences
-from netem.session import Login, await_subscribers, client
+from netem.session import CENTRE, HUB, Login, await_subscribers, client
 from netem.supervised import Supervisor
 from netem.user_code import UserCodeError
 
@@ -87,10 +87,15 @@ class AgentBrief:
     remembers: bool
 
 
+# Which data types that came will do for one that is wanted.
+_KINDS = {"f": "iuf", "i": "i", "u": "iu", "b": "b"}
+
+
 class Node:
     """One agent on the network."""
 
-    def __init__(self, session: zenoh.Session, brief: AgentBrief) -> None:
+    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: AgentBrief) -> None:
+        self._supervisor = supervisor
         self._number = brief.agent
         self._neighbours = brief.neighbours
         self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
@@ -135,9 +140,13 @@ class Node:
     def run(self) -> None:
         """Sense, broadcast, hear and act until the medium says that the run is over."""
         sensed: wire.SenseInbox | None = None
+        tick = 0
         while True:
+            self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
             inbox = wire.unpack_inbox(self._inbox.recv().payload.to_bytes())
             self._inboxes.check("inbox", inbox.seq)
+            tick = inbox.k
+            self._supervisor.works(tick)
             try:
                 if isinstance(inbox, wire.SenseInbox):
                     sensed = inbox
@@ -190,7 +199,9 @@ class Node:
     def _from_the_centre(self, tick: int) -> Mapping[str, Heard]:
         if self._told is None:
             return {}
+        self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
         told = wire.unpack(wire.Told, self._told.recv().payload.to_bytes())
+        self._supervisor.works(tick)
         self._tellings.check("told", told.seq)
         if told.k != tick:
             raise wire.WireError(f"the centre told of tick {told.k} in tick {tick}")
@@ -211,18 +222,17 @@ class Node:
 
     def _rows(self, channel: str, name: str, said: dict[int, Any]) -> Array:
         field, silence = self._channels[channel][name], self._silence[channel][name]
+        kinds = _KINDS[np.dtype(field.dtype).kind]
         try:
-            rows = [said[slot][name] if slot in said else silence for slot in range(self._width)]
-            gathered: Array = np.array(rows, dtype=field.dtype)
-            if gathered.shape != (self._width, *field.shape):
-                raise ValueError(f"shapes together {gathered.shape[1:]}")
-        except (KeyError, TypeError, ValueError) as error:
-            who = [self._neighbours[slot] for slot in said]
-            raise wire.WireError(
-                f"one of agents {who} broadcast a {channel!r} without a field {name!r} of shape {field.shape}: "
-                f"{error!r} (see docs/protocol.md)"
-            ) from error
-        return gathered
+            rows = np.array([said[slot][name] if slot in said else silence for slot in range(self._width)])
+        except (KeyError, TypeError, ValueError, OverflowError):
+            rows = np.array(None)
+        if rows.shape != (self._width, *field.shape) or rows.dtype.kind not in kinds:
+            rows = np.zeros((self._width, *field.shape))
+            for slot, payload in said.items():  # one of them is wrong: which
+                whose = f"agent {self._neighbours[slot]} on {channel!r}: {name!r}"
+                rows[slot] = wire.numbers(payload.get(name), whose, field.shape, kinds)
+        return rows.astype(field.dtype, copy=False)
 
 
 def _numbers(given: wire.Rows | None) -> Array | None:
@@ -246,7 +256,7 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
-        node = Node(session, brief)
+        node = Node(session, supervisor, brief)
         node.await_everybody()
         supervisor.tell("ready")
         node.run()

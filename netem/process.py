@@ -14,6 +14,7 @@ import zenoh
 
 from netem import channels, lie, wire
 from netem.air import Delivery, out_of_the_ordinary
+from netem.broadcasts import Broadcasts, fields
 from netem.control import Order, obey
 from netem.corrupt import Mark, corrupted_fields
 from netem.draws import Array
@@ -24,8 +25,8 @@ from netem.links import Integers, Links, Mask
 from netem.medium import Medium, recorded
 from netem.profile import Profile
 from netem.sequence import Numbering, Sequences
-from netem.session import HUB, Login, await_subscribers, hub
-from netem.supervised import Supervisor, patience
+from netem.session import HUB, WORLD, Login, await_subscribers, hub
+from netem.supervised import Supervisor, called
 from netem.timeline import Timeline
 from netem.trigger import Trigger
 
@@ -48,8 +49,6 @@ class MediumBrief:
         The journal of an earlier run that is to be judge of this one.
     positioned
         Agents that have positioning, shape (N,).
-    patience_s
-        How long to wait for a broadcast before the run is stalled, in seconds.
     """
 
     run: str
@@ -64,7 +63,6 @@ class MediumBrief:
     injected: tuple[Fault, ...]
     recorded: str | None
     positioned: Mask
-    patience_s: float
 
 
 @dataclass(frozen=True)
@@ -106,10 +104,12 @@ class Sentence:
 class Relay:
     """The medium of a run over Zenoh: one tick is sense, collect, deliver."""
 
-    def __init__(self, session: zenoh.Session, brief: MediumBrief) -> None:
+    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: MediumBrief) -> None:
         keys = self._keys = Keys(brief.run)
         agents = range(1, brief.links.agents + 1)
         self._brief = brief
+        self._supervisor = supervisor
+        self._awaited: set[tuple[int, str]] = set()
         self._links = brief.links
         self._injected = brief.injected
         self._scripted = Timeline(brief.links, brief.faults, brief.triggers)
@@ -121,11 +121,10 @@ class Relay:
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
         self._said: dict[tuple[int, int, str], bytes] = {}
         self._from_world = Sequences("world")
-        self._from_agents = Sequences("agent")
+        self._reader = Broadcasts(keys, agents, self._spoken)
         self._numbers = Numbering()
         self._sense = session.declare_subscriber(keys.sense, zenoh.handlers.FifoChannel(16))
         self._broadcasts = session.declare_subscriber(keys.broadcast("*", "*"), zenoh.handlers.FifoChannel(4096))
-        self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in self._spoken}
         self._journal = session.declare_publisher(keys.journal)
         self._control = session.declare_queryable(keys.control, zenoh.handlers.FifoChannel(16))
         self._inboxes = {agent: session.declare_publisher(keys.inbox(agent)) for agent in agents}
@@ -142,9 +141,12 @@ class Relay:
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
         sentence = self._judge(0, None) if self._medium.ahead else None
+        tick = 0
         while True:
+            self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
             sense = wire.unpack(wire.Sense, self._sense.recv().payload.to_bytes())
             self._from_world.check("sense", sense.seq)
+            self._supervisor.works(sense.k)
             if sense.last:
                 self._end(sense.k)
                 return
@@ -161,7 +163,8 @@ class Relay:
             # The agents now work on what they heard: time to decide the next tick, where that needs no positions.
             self._air = self._ahead
             self._forget(sense.k)
-            sentence = self._judge(sense.k + 1, None) if self._medium.ahead else None
+            tick = sense.k + 1
+            sentence = self._judge(tick, None) if self._medium.ahead else None
 
     def _judge(self, tick: int, position: Array | None) -> Sentence:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
@@ -235,8 +238,7 @@ class Relay:
     def _welcome_back(self, tick: int) -> None:
         for agent in self._timeline.restarted(tick):
             self._numbers.restart(f"inbox {agent}")
-            for name in self._spoken:
-                self._from_agents.restart(f"{agent} {name}")
+            self._reader.restart(agent)
 
     def _hand_out_measurements(self, sense: wire.Sense, sentence: Sentence) -> None:
         clock = self._timeline.clock(sense.k).tolist()
@@ -257,20 +259,18 @@ class Relay:
             self._inboxes[agent].put(wire.pack(inbox))
 
     def _collect(self, sentence: Sentence) -> None:
-        tick = sentence.tick
-        awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
-        with patience(self._brief.patience_s, lambda: _missing(tick, awaited)):
-            while awaited:
-                sample = self._broadcasts.recv()
-                key, data = str(sample.key_expr), sample.payload.to_bytes()
-                said = wire.unpack(wire.Broadcast, data)
-                if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
-                    raise wire.WireError(
-                        f"in tick {tick}, {key} said: agent {said.src}, {said.channel!r} of tick {said.k}"
-                    )
-                self._from_agents.check(f"{said.src} {said.channel}", said.seq)
-                self._said[tick, said.src, said.channel] = self._as_told(said, data)
-                awaited.remove((said.src, said.channel))
+        self._awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
+        self._supervisor.waits(sentence.tick, "what it broadcasts", self._silent)
+        while self._awaited:
+            sample = self._broadcasts.recv()
+            data = sample.payload.to_bytes()
+            said = self._reader.read(str(sample.key_expr), data, sentence.tick, self._awaited)
+            self._said[said.k, said.src, said.channel] = self._as_told(said, data)
+            self._awaited.remove((said.src, said.channel))
+        self._supervisor.works(sentence.tick)
+
+    def _silent(self) -> list[str]:
+        return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
 
     def _hand_out_broadcasts(self, sentence: Sentence) -> None:
         for agent in sentence.awake:
@@ -281,23 +281,22 @@ class Relay:
     def _as_told(self, said: wire.Broadcast, data: bytes) -> bytes:
         for liar in self._timeline.at(said.k).liars:
             if said.src in liar.agents and said.channel == lie.CHANNEL:
-                fields = {name: np.array(field) for name, field in said.payload.items()}
-                said = said._replace(payload=lie.told(fields, liar))
+                said = said._replace(payload=lie.told(fields(said), liar))
                 data = wire.pack(said)
         return data
 
-    def _as_it_arrives(self, said: Arriving) -> bytes:
-        data = self._said[said.content, said.src, self._brief.channels[said.channel]]
-        if said.mark in (Mark.NONE, Mark.STALE):
+    def _as_it_arrives(self, arriving: Arriving) -> bytes:
+        data = self._said[arriving.content, arriving.src, self._brief.channels[arriving.channel]]
+        if arriving.mark in (Mark.NONE, Mark.STALE):
             return data
-        draw = self._medium.bit_draws(*(np.array([n]) for n in (said.content, said.channel, said.link)))
+        draw = self._medium.bit_draws(*(np.array([n]) for n in (arriving.content, arriving.channel, arriving.link)))
         kind, bias = (
-            np.array([said.mark], dtype=np.uint8),
-            self._medium.bias(np.array([said.content]), np.array([said.link])),
+            np.array([arriving.mark], dtype=np.uint8),
+            self._medium.bias(np.array([arriving.content]), np.array([arriving.link])),
         )
         broadcast = wire.unpack(wire.Broadcast, data)
-        fields = {name: np.array([field]) for name, field in broadcast.payload.items()}
-        wrong = {name: field[0] for name, field in corrupted_fields(fields, kind, bias, draw).items()}
+        said = {name: field[None] for name, field in fields(broadcast).items()}
+        wrong = {name: field[0] for name, field in corrupted_fields(said, kind, bias, draw).items()}
         return wire.pack(broadcast._replace(payload=wrong))
 
     def _forget(self, tick: int) -> None:
@@ -310,18 +309,13 @@ class Relay:
             inbox.put(wire.pack(wire.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), wire.Phase.END)))
 
 
-def _missing(tick: int, awaited: set[tuple[int, str]]) -> str:
-    shown = ", ".join(f"agent {agent}'s {channel}" for agent, channel in sorted(awaited)[:6])
-    return f"{shown} of tick {tick}{' and more' if len(awaited) > 6 else ''}"
-
-
 def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
     with supervisor.confessing(), zenoh.open(config) as session:
-        relay = Relay(session, brief)
+        relay = Relay(session, supervisor, brief)
         relay.await_everybody()
         supervisor.tell("ready")
         relay.run()

@@ -39,7 +39,9 @@ _PRIORITIES = (
     "background",
 )
 _LONGEST_QUEUE = 16
-# A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh.
+_PENDING = 10_000
+# A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
+# that log in at once on two cores.
 _LEASE_MS = 3_600_000
 
 
@@ -81,14 +83,17 @@ class Login:
     password: str
 
 
-def client(login: Login) -> zenoh.Config:
-    """Configuration of an agent or the world: connects to the hub, and to nobody else."""
+def client(login: Login, patience_s: float | None = None) -> zenoh.Config:
+    """Configuration of an agent or the world: connects to the hub, and to nobody else.
+
+    It tries for as long as `patience_s`; None for ever, where a launcher watches.
+    """
     return _config(
         {
             "mode": "client",
             "connect": {
                 "endpoints": [login.endpoint],
-                "timeout_ms": 10_000,
+                "timeout_ms": -1 if patience_s is None else round(1000 * patience_s),
                 "exit_on_failure": True,
                 "retry": {"period_init_ms": 10, "period_max_ms": 50, "period_increase_factor": 1.5},
             },
@@ -128,6 +133,7 @@ def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
                 "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
                 "transport": {
                     "shared_memory": {"enabled": False},
+                    "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
                     "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
                     "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
                 },

@@ -3,6 +3,9 @@
 Supervision does not travel the air it supervises. A child gets its brief on standard input, hears orders there, and
 reports events on standard output, one JSON map a line. Standard input is also its lifeline: when it closes, the launcher is
 gone and the child goes too, so nothing is ever orphaned, be it stopped or inside a call that lasts.
+
+A child beats by itself: twice a second a thread of its own tells which tick it is in, and whom it waits for. It judges
+nobody: that is for the launcher, who hears everybody (docs/decisions/0002).
 """
 
 from __future__ import annotations
@@ -16,10 +19,10 @@ import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 import msgpack
 
@@ -34,9 +37,19 @@ _STDIN, _STDOUT, _STDERR = 0, 1, 2
 _PR_SET_PDEATHSIG = 1
 _LAST_RESORT_S = 2.0
 
+BEAT_S = 0.5
+LAUNCHER = "launcher"  # as one who is waited for
 
-class Stalled(RuntimeError):
-    """Something that had to come did not come in time."""
+
+def called(agent: int) -> str:
+    """An agent's name among the processes of a run."""
+    return f"agent {agent}"
+
+
+class _Doing(NamedTuple):
+    tick: int
+    what: str
+    whom: Callable[[], Iterable[str]]
 
 
 def brief_bytes(brief: Any) -> bytes:
@@ -53,20 +66,42 @@ class Supervisor:
         self._events = os.dup(_STDOUT)
         os.dup2(_STDERR, _STDOUT)
         self._confessed = False
+        self._speaking = threading.Lock()
+        self._doing = _Doing(0, "", tuple)
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
         _go_on_without_a_launcher()
 
     def brief(self, kind: type[T]) -> T:
-        """The child's brief; from then on the lifeline is watched."""
+        """The child's brief; from then on the lifeline is watched, and the child beats."""
         (length,) = _LENGTH.unpack(_read_exactly(_LENGTH.size))
         brief = from_plain(kind, msgpack.unpackb(_read_exactly(length), strict_map_key=False))
-        threading.Thread(target=self._watch, daemon=True).start()
+        for watch in (self._watch, self._beat):
+            threading.Thread(target=watch, daemon=True).start()
         return brief
 
     def tell(self, event: str, **facts: Any) -> None:
         """Report an event to the launcher."""
-        os.write(self._events, json.dumps({"event": event} | facts).encode() + b"\n")
+        line = json.dumps({"event": event} | facts).encode() + b"\n"
+        with self._speaking:
+            while line:
+                line = line[os.write(self._events, line) :]
+
+    def works(self, tick: int) -> None:
+        """From now on the child waits for nobody: what comes of this tick is up to it."""
+        self._doing = _Doing(tick, "", tuple)
+
+    def waits(self, tick: int, what: str, whom: Callable[[], Iterable[str]]) -> None:
+        """From now on the child waits for others.
+
+        Parameters
+        ----------
+        tick
+            The tick it is in.
+        what, whom
+            What it waits for, and the names of those who still owe it; asked from another thread.
+        """
+        self._doing = _Doing(tick, what, whom)
 
     def await_order(self, order: str) -> None:
         """Wait until the launcher gives this order.
@@ -76,8 +111,11 @@ class Supervisor:
         RuntimeError
             When it gives another.
         """
+        before = self._doing
+        self.waits(before.tick, f"the order to {order}", lambda: (LAUNCHER,))
         if (given := self._orders.get()) != order:
             raise RuntimeError(f"the launcher ordered {given!r} where {order!r} was due")
+        self._doing = before
 
     @contextmanager
     def confessing(self) -> Iterator[None]:
@@ -87,8 +125,17 @@ class Supervisor:
         except Exception as error:
             if not self._confessed:
                 self._confessed = True
-                self.tell("failed", reason=_reason(error), user_code=isinstance(error, UserCodeError))
+                self.tell("user-code" if isinstance(error, UserCodeError) else "failed", reason=_reason(error))
             raise
+
+    def _beat(self) -> None:
+        while True:
+            tick, what, whom = self._doing
+            try:
+                self.tell("beat", k=tick, what=what, waits=list(whom()))
+            except OSError:  # the launcher is gone, and the lifeline says so
+                return
+            time.sleep(BEAT_S)
 
     def _watch(self) -> None:
         pending = b""
@@ -102,22 +149,6 @@ class Supervisor:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-@contextmanager
-def patience(seconds: float, missing: Callable[[], str]) -> Iterator[None]:
-    """Raise `Stalled`, saying what is `missing`, when the block takes longer than this. For the main thread."""
-
-    def expire(_signum: int, _frame: FrameType | None) -> NoReturn:
-        raise Stalled(f"waited {seconds:g} s for {missing()}")
-
-    previous = signal.signal(signal.SIGALRM, expire)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
-
-
 def _go_on_without_a_launcher() -> None:
     # A process that the script has stopped cannot see its lifeline close; elsewhere than on Linux nothing wakes it.
     if sys.platform == "linux":
@@ -129,7 +160,7 @@ def _leave(signum: int, _frame: FrameType | None) -> NoReturn:
 
 
 def _reason(error: Exception) -> str:
-    if isinstance(error, Stalled | UserCodeError):
+    if isinstance(error, UserCodeError):
         return str(error)
     return said(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
 

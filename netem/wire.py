@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import Any, NamedTuple, TypeVar
 
 import msgpack
+import numpy as np
 
 from netem.control import Answer, Order
 from netem.draws import Array
@@ -171,6 +172,7 @@ class Journal(NamedTuple):
 
 # One packer, used again and again: a new one takes and returns a quarter of a megabyte for every message.
 _PACKER = msgpack.Packer(default=plainly)
+_AS_IN_AN_INBOX = b"\x91\x91"  # a list in a list, as deep as the messages of an exchange
 
 INBOXES: dict[str, type[SenseInbox | ExchangeInbox | EndInbox]] = {
     Phase.SENSE: SenseInbox,
@@ -194,6 +196,59 @@ def unpack(kind: type[T], data: bytes) -> T:
         When it is no such message: which field, what was expected, what came.
     """
     return _read(kind, _load(data))
+
+
+def unpack_relayed(data: bytes) -> Broadcast:
+    """A broadcast that is passed on as it is: its receiver must be able to read it inside an inbox.
+
+    Raises
+    ------
+    WireError
+        When it is no broadcast, or nests too deep.
+    """
+    ((plain,),) = _load(_AS_IN_AN_INBOX + data)
+    return _read(Broadcast, plain)
+
+
+def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds: str = "iuf") -> Array:
+    """What somebody said as an array.
+
+    Parameters
+    ----------
+    given
+        A number, or nested lists of them.
+    whose
+        Who said it, and where: how the error begins.
+    shape
+        What it has to be, any length where it begins with None; None for any shape.
+    kinds
+        Of NumPy's data types, those that will do.
+
+    Raises
+    ------
+    WireError
+        When it is something else.
+    """
+    if isinstance(given, list) and not given and shape and not shape[0]:
+        return np.empty([length or 0 for length in shape])
+    try:
+        array = np.array(given)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        array = np.array(None)
+    if not (shape is None or _fits(array.shape, shape)) or (array.dtype.kind not in kinds and array.size):
+        what = "truths" if kinds == "b" else "numbers"
+        of = "" if shape is None else f" of shape ({', '.join('any' if n is None else str(n) for n in shape)})"
+        raise WireError(f"{whose}: expected {what}{of}, got {shown(given)} (see docs/protocol.md)")
+    return array
+
+
+def shown(given: Any) -> str:
+    """Whatever it is, in a few words."""
+    try:
+        text = repr(given)
+    except RecursionError:
+        return f"a {type(given).__name__} that nests too deep"
+    return text if len(text) < 80 else text[:77] + "..."
 
 
 def unpack_inbox(data: bytes) -> SenseInbox | ExchangeInbox | EndInbox:
@@ -236,6 +291,12 @@ def _read(kind: type[T], plain: Any) -> T:
         return from_plain(kind, plain)
     except PlainError as error:
         raise WireError(f"{kind.__name__}: {error} (see docs/protocol.md)") from error
+    except RecursionError as error:
+        raise WireError(f"{kind.__name__}: it nests too deep (see docs/protocol.md)") from error
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return shape == wanted or (wanted[:1] == (None,) and len(shape) == len(wanted) and shape[1:] == wanted[1:])
 
 
 def _load(data: bytes) -> Any:

@@ -13,6 +13,26 @@ from world.history import digest
 # Tests that fly processes stay on one worker: two swarms of processes at once are too many for two cores.
 PROCESSES = pytest.mark.xdist_group("processes")
 
+# The smallest swarm: five processes.
+TRIANGLE = """
+[formation]
+nodes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+edges = ["1-2", "2-3", "1-3"]
+leaders = [1, 2, 3]
+[manoeuvre]
+preset = "hover"
+[time]
+dt = 0.05
+duration = 0.5
+[sensing]
+sigma = 0.1
+[agents]
+estimator = "none"
+law = "rest"
+[record]
+enabled = false
+"""
+
 
 @cache
 def plan_of(name: str, *overrides: str) -> Plan:

@@ -1,21 +1,24 @@
 """No death of any process leaves an orphan, a hang or an unreadable recording."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import time
 from importlib import resources
 
+import numpy as np
 import psutil
 import pytest
 from flying import PROCESSES
 from rerun.chunk import RrdReader
 
+from netem import journal
+
 pytestmark = PROCESSES
 
-PATIENCE = 30.0
+PATIENCE = 180.0
+SOON = 30.0  # what takes half a second on a quiet machine; a hang would take all of the patience
 
 
 class Running:
@@ -48,7 +51,7 @@ class Running:
         self.children = []
         try:
             await_true(lambda: self.recorded() > 100_000, "the run never got going")
-        except AssertionError:
+        except BaseException:  # a test that ran out of time too
             self.__exit__()
             raise
         self.children = psutil.Process(self.launcher.pid).children()
@@ -82,7 +85,7 @@ def await_true(condition, otherwise):
     deadline = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < deadline, otherwise
-        os.sched_yield()
+        time.sleep(0.02)
 
 
 def moments(recording):
@@ -97,29 +100,67 @@ def test_a_death_ends_the_run_with_its_reason(package, out):
         victim.kill()
         took, said, _ = run.ends()
     summary = json.loads(said.splitlines()[-1])
-    assert took < 5
+    assert took < SOON
     assert run.launcher.returncode == 1
     assert summary["verdict"] == "fail"
     assert f"(pid {victim.pid}) was killed by SIGKILL" in summary["reasons"][0]
     assert moments(out / "run.rrd") > 10
+    # Whoever died, the accounts say what became of everything up to the last tick that was written down.
+    table = journal.read(out / journal.FILE)
+    counts = dict(zip(*np.unique(table["verdict"].to_numpy(), return_counts=True), strict=True))
+    messages = summary["messages"]
+    assert summary["ticks"] == table["tick"].to_numpy().max() + 1 >= 50
+    assert messages["offered"] == summary["ticks"] * 24 * 4
+    assert messages["delivered"] == counts["delivered"]
+    assert messages["dropped"] == {"lost": counts["dropped"]}
+    assert messages["in_flight"] == 0
 
 
-def test_a_frozen_agent_ends_the_run_and_is_named(out):
+@pytest.mark.parametrize(
+    ("package", "name"),
+    [
+        ("agents", "agent"),
+        pytest.param("netem", "netem", marks=pytest.mark.slow),
+        pytest.param("world", "world", marks=pytest.mark.slow),
+    ],
+)
+def test_who_is_frozen_ends_the_run_and_is_named_with_its_state(package, name, out):
     with Running(out) as run:
-        frozen = run.child("agents")
+        frozen = run.child(package)
         frozen.suspend()
         took, said, _ = run.ends()
     reason = json.loads(said.splitlines()[-1])["reasons"][0]
-    assert took < 6  # 3 to 3.3 s of patience, 1.2 s of grace for a process that cannot even be asked to leave
-    assert "waited" in reason
-    assert "agent" in reason
+    assert took < SOON  # 3 s of patience, a beat, 1.2 s of grace for a process that cannot even be asked to leave
+    assert reason.startswith(name)
+    assert f"(pid {frozen.pid}) is stopped (state T): nothing moved for " in reason
+
+
+@pytest.mark.slow
+def test_time_in_which_everybody_was_stopped_is_nobodys_silence(out):
+    with Running(out) as run:
+        everybody = [psutil.Process(run.launcher.pid), *run.children]
+        for process in everybody:
+            process.suspend()
+        time.sleep(6)  # twice the patience
+        for process in everybody:
+            process.resume()
+        recorded = run.recorded()
+        await_true(lambda: run.recorded() > recorded + 50_000, "it did not fly on")
+        run.launcher.send_signal(signal.SIGSTOP)  # and the launcher alone
+        time.sleep(6)
+        run.launcher.send_signal(signal.SIGCONT)
+        recorded = run.recorded()
+        await_true(lambda: run.recorded() > recorded + 50_000, "it did not fly on")
+        run.launcher.send_signal(signal.SIGINT)
+        run.ends()
+    assert json.loads((out / "summary.json").read_text())["reasons"] == ["interrupted by SIGINT"]
 
 
 def test_a_killed_launcher_leaves_no_orphan_and_a_readable_recording(out):
     with Running(out) as run:
         run.launcher.kill()
         took, _, _ = run.ends()
-    assert took < 5
+    assert took < SOON
     assert moments(out / "run.rrd") > 10
 
 
@@ -136,7 +177,7 @@ def test_who_is_paused_leaves_with_a_killed_launcher(out, pausing):
         await_true(lambda: len(run.stopped()) == 3, "nobody was paused")
         run.launcher.kill()
         took, _, _ = run.ends()
-    assert took < 5
+    assert took < SOON
     assert moments(out / "run.rrd") > 10
 
 
@@ -146,7 +187,7 @@ def test_the_death_of_a_paused_agent_ends_the_run_with_its_reason(out, pausing):
         victim = run.stopped()[0]
         victim.kill()
         took, said, _ = run.ends()
-    assert took < 5
+    assert took < SOON
     assert f"(pid {victim.pid}) was killed by SIGKILL" in json.loads(said.splitlines()[-1])["reasons"][0]
 
 
@@ -155,6 +196,6 @@ def test_ctrl_c_leaves_in_order(out):
         run.launcher.send_signal(signal.SIGINT)
         took, _, complained = run.ends()
     assert run.launcher.returncode == 130
-    assert took < 5
+    assert took < SOON
     assert "interrupted" in complained
     assert moments(out / "run.rrd") > 10

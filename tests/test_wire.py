@@ -337,7 +337,6 @@ MEDIUM = MediumBrief(
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
-    patience_s=10.0,
 )
 
 

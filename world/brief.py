@@ -60,8 +60,6 @@ class WorldBrief:
         What the agents' estimators report beyond edges, by name, and the shape of each for one agent.
     books
         How it writes that down.
-    patience_s
-        How long to wait for the agents before the run is stalled, in seconds.
     """
 
     run: str
@@ -73,4 +71,3 @@ class WorldBrief:
     triggers: tuple[Trigger, ...]
     reports: Mapping[str, tuple[int, ...]]
     books: Books
-    patience_s: float

@@ -14,10 +14,11 @@ from netem import system_errors, wire
 from netem.fault import Fault
 from netem.keys import Keys
 from netem.plain import from_plain
-from netem.sequence import Numbering, Sequences
-from netem.session import WORLD, await_subscribers, client
-from netem.supervised import Supervisor, patience
+from netem.sequence import Numbering
+from netem.session import HUB, WORLD, await_subscribers, client
+from netem.supervised import Supervisor, called
 from netem.timeline import Conditions, Timeline
+from world.acts import Acts
 from world.brief import WorldBrief
 from world.formation import Array
 from world.history import FILE as ARRAYS
@@ -37,20 +38,17 @@ class Theatre:
         self._supervisor = supervisor
         self._timeline = self._scripted = Timeline(brief.world.links, brief.faults, brief.triggers)
         keys = Keys(brief.run)
-        self._acting = {keys.act(agent): agent for agent in range(1, brief.world.links.agents + 1)}
+        dimension = brief.world.formation.dimension
+        self._reader = Acts(keys, brief.world.links, dimension, brief.reports)
         self._acts = session.declare_subscriber(keys.act("*"), zenoh.handlers.FifoChannel(4096))
         self._journal = session.declare_subscriber(keys.journal, zenoh.handlers.FifoChannel(64))
         self._sense = session.declare_publisher(keys.sense)
         self._numbers = Numbering()
-        self._streams = Sequences("agent")
-        self._heard = dict.fromkeys(self._acting.values(), 0)
+        self._heard = dict.fromkeys(range(1, brief.world.links.agents + 1), 0)
         self._awaited: set[int] = set()
         self._moments: list[Moment] = []
         self._batch = brief.books.batch
-        dimension = brief.world.formation.dimension
-        self._unknown = [[0.0] * dimension] * brief.world.links.slots.shape[1]
-        self._unsure = [[0.0] * (dimension * (dimension + 1) // 2)] * brief.world.links.slots.shape[1]
-        self._nobody = wire.Act(0, 0, 0, self._unknown[0], [], [], [], np.nan, None, {}, 0)
+        self._nobody = wire.Act(0, 0, 0, np.zeros(dimension), [], [], [], np.nan, None, {}, 0)
         self._vigil = Vigil(brief.world)
         self.uninstructed = 0
         self._unsaid = {name: np.full(shape, np.nan).tolist() for name, shape in brief.reports.items()}
@@ -70,9 +68,9 @@ class Theatre:
             self._publish(tick, measured, scene, fired)
             if tick % self._batch == 0:  # while the agents work on this tick
                 self._write_down(tick, scene, logbook)
-            with patience(self._brief.patience_s, partial(self._missing, tick)):
-                journal = self._read_journal(tick)
-                acts = self._read_acts(tick)
+            journal = self._read_journal(tick)
+            acts = self._read_acts(tick)
+            self._supervisor.works(tick)
             self._hear_of_faults(journal)
             now = self._timeline.at(tick)
             moment = self._moment(scene, measured, journal, acts, now)
@@ -102,7 +100,7 @@ class Theatre:
                 self._supervisor.tell(event, agents=agents, remembering=timeline.remembering(tick), k=tick)
                 self._supervisor.await_order(event)
         for agent in self._timeline.restarted(tick):
-            self._streams.restart(f"{agent} act")
+            self._reader.restart(agent)
             self._heard[agent] = 0
 
     def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
@@ -120,6 +118,7 @@ class Theatre:
         return [dict(zip(sighting._fields, said, strict=True)) for said in agents]
 
     def _read_journal(self, tick: int) -> wire.Journal:
+        self._supervisor.waits(tick, "its journal", lambda: (HUB,))
         journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
         if journal.k != tick:
             raise wire.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
@@ -132,35 +131,32 @@ class Theatre:
 
     def _read_acts(self, tick: int) -> dict[int, wire.Act]:
         self._awaited = set((np.flatnonzero(~self._timeline.at(tick).idle) + 1).tolist())
+        self._supervisor.waits(tick, "its act", self._idle)
         acts = {}
         while self._awaited:
             sample = self._acts.recv()
-            key, act = str(sample.key_expr), wire.unpack(wire.Act, sample.payload.to_bytes())
-            if self._acting.get(key) != act.src or act.k != tick or act.src not in self._awaited:
-                raise wire.WireError(f"in tick {tick}, {key} said: agent {act.src} acts in tick {act.k}")
-            self._streams.check(f"{act.src} act", act.seq)
+            act = self._reader.read(str(sample.key_expr), sample.payload.to_bytes(), tick, self._awaited)
             self._awaited.remove(act.src)
             acts[act.src] = act
         return acts
 
-    def _missing(self, tick: int) -> str:
-        if self._awaited:
-            return f"agents {sorted(self._awaited)} to act in tick {tick}"
-        return f"the medium's journal of tick {tick}"
+    def _idle(self) -> list[str]:
+        return [called(agent) for agent in sorted(self._awaited)]
 
     def _moment(
         self, scene: Scene, measured: Array, journal: wire.Journal, acts: dict[int, wire.Act], now: Conditions
     ) -> Moment:
         self._account(journal, acts)
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
+        believed = self._reader.beliefs(acts)
         return Moment(
             position=scene.position,
             target=self._world.goal(journal.k, scene),
             measured=measured,
             input=self._world.flown(scene, np.array([act.input for act in everybody]), now),
-            estimate=[act.estimate + self._unknown[len(act.estimate) :] for act in everybody],
-            known=[act.known + [False] * (len(self._unknown) - len(act.known)) for act in everybody],
-            covariance=[act.covariance + self._unsure[len(act.covariance) :] for act in everybody],
+            estimate=believed.estimate,
+            known=believed.known,
+            covariance=believed.covariance,
             psi=[act.psi for act in everybody],
             feasible=[UNTOLD if act.feasible is None else int(act.feasible) for act in everybody],
             reports={

@@ -10,7 +10,7 @@ from netem.keys import Keys
 from netem.session import client
 from netem.supervised import Supervisor
 
-PEERS = range(1, 8)
+PEERS = range(1, 11)
 
 
 def main() -> None:
@@ -18,16 +18,18 @@ def main() -> None:
     brief = supervisor.brief(AgentBrief)
     keys = Keys(brief.run)
     with zenoh.open(client(brief.login)) as session, zenoh.open(client(brief.login)) as side:
-        node = Node(session, brief)
+        node = Node(session, supervisor, brief)
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
-        inboxes = [side.declare_subscriber(keys.inbox(peer), zenoh.handlers.FifoChannel(10_000)) for peer in PEERS]
+        private = [key for peer in PEERS for key in (keys.inbox(peer), keys.told(peer))]
+        inboxes = [side.declare_subscriber(key, zenoh.handlers.FifoChannel(10_000)) for key in private]
         node.await_everybody()
         supervisor.tell("ready")
         lies = 0
         for peer in PEERS:
             if peer == brief.agent:
                 continue
-            for key in (keys.broadcast(peer, "theta"), keys.broadcast(peer, "input"), keys.act(peer), keys.inbox(peer)):
+            spoken = [keys.broadcast(peer, channel) for channel in ("input", "measurement")]
+            for key in (*spoken, keys.act(peer), keys.inbox(peer), keys.told(peer)):
                 for _ in range(20):
                     side.put(key, b"a lie", allowed_destination=zenoh.Locality.REMOTE)
                     lies += 1

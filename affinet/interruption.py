@@ -1,0 +1,61 @@
+"""Signals that ask a run to end: noted, and heeded where nothing is left half done."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+
+_HEEDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_BY_DEFAULT = (signal.SIG_DFL, signal.default_int_handler)
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was asked to end, by this signal."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"interrupted by {signal.Signals(number).name}")
+        self.status = 128 + number
+
+
+@dataclass
+class Interruption:
+    """Whether a signal has come: the number of the first; others are ignored, since the run is ending already."""
+
+    number: int | None = None
+
+    def heed(self) -> None:
+        """Go on if no signal has come.
+
+        Raises
+        ------
+        Interrupted
+            If one has.
+        """
+        if self.number is not None:
+            raise Interrupted(self.number)
+
+    def note(self, number: int, _frame: FrameType | None) -> None:
+        """Take a signal."""
+        self.number = self.number or number
+
+
+@contextmanager
+def interruptible() -> Iterator[Interruption]:
+    """Note the signals that come while the block runs; those that are ignored, as under nohup, stay ignored."""
+    interruption = Interruption()
+    if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
+        yield interruption
+        return
+    before = {number: signal.getsignal(number) for number in _HEEDED}
+    heeded = [number for number, handler in before.items() if handler in _BY_DEFAULT]
+    for number in heeded:
+        signal.signal(number, interruption.note)
+    try:
+        yield interruption
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])

@@ -1,0 +1,114 @@
+"""A run that is asked to end by a signal leaves in order: no secrets, a summary, and the conventional exit status."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from flying import PROCESSES
+
+from affinet.interruption import Interrupted, Interruption, interruptible
+from netem import journal
+
+PATIENCE = 180.0
+
+
+def await_true(condition, otherwise):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, otherwise
+        time.sleep(0.02)
+
+
+def rows(book):
+    try:
+        return journal.read(book).num_rows
+    except journal.JournalError:  # it has not even begun
+        return 0
+
+
+@pytest.fixture
+def private(tmp_path):
+    folder = tmp_path / "t"
+    folder.mkdir()
+    return folder
+
+
+def interrupted(number, runtime, out, private, monkeypatch, again=False):
+    monkeypatch.setenv("TMPDIR", str(private))
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has its children ignore it
+    command = [sys.executable, "-m", "affinet.cli", "run", "corridor", "--duration", "600", "--estimator", "none"]
+    command += ["--runtime", runtime, "--set", "record.enabled=false"]
+    launcher = subprocess.Popen(
+        [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    book, children = out / "journal.arrows", []
+    try:
+        await_true(lambda: rows(book), "the run never got going")
+        children = psutil.Process(launcher.pid).children()
+        for _ in range(3 if again else 1):
+            launcher.send_signal(number)
+        _, complained = launcher.communicate(timeout=PATIENCE)
+        _, alive = psutil.wait_procs(children, timeout=PATIENCE)
+    finally:
+        if launcher.poll() is None:
+            launcher.kill()
+            launcher.communicate()
+    assert not alive
+    return launcher.returncode, complained
+
+
+@pytest.mark.parametrize(
+    ("runtime", "number", "status"),
+    [
+        pytest.param("processes", signal.SIGTERM, 143, marks=PROCESSES),
+        pytest.param("processes", signal.SIGHUP, 129, marks=[PROCESSES, pytest.mark.slow]),
+        pytest.param("processes", signal.SIGINT, 130, marks=[PROCESSES, pytest.mark.slow]),
+        pytest.param("inprocess", signal.SIGTERM, 143, marks=pytest.mark.slow),
+        pytest.param("inprocess", signal.SIGHUP, 129),
+        pytest.param("inprocess", signal.SIGINT, 130, marks=pytest.mark.slow),
+    ],
+)
+def test_a_run_asked_to_end_leaves_a_summary_and_no_secrets(runtime, number, status, out, private, monkeypatch):
+    left, complained = interrupted(number, runtime, out, private, monkeypatch, again=number == signal.SIGINT)
+    name = signal.Signals(number).name
+    assert left == status
+    assert complained.splitlines()[-1] == f"interrupted by {name}"
+    assert "Traceback" not in complained
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["verdict"] == "fail"
+    assert summary["reasons"] == [f"interrupted by {name}"]
+    assert summary["messages"]["offered"] >= 50 * 24 * 3  # ticks, links, and at least sensing, inputs and measurements
+    assert not list(private.iterdir())  # passwords, socket, checkpoints
+    assert not (out / "control.json").exists()
+
+
+def test_the_first_signal_counts_and_the_others_are_too_late():
+    with interruptible() as interruption:
+        interruption.heed()
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(Interrupted, match=r"^interrupted by SIGTERM$") as error:
+            interruption.heed()
+    assert error.value.status == 143
+
+
+def test_what_is_ignored_stays_ignored_and_handlers_come_back():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
+    try:
+        with interruptible() as interruption:
+            signal.raise_signal(signal.SIGHUP)
+            interruption.heed()
+            assert signal.getsignal(signal.SIGTERM) == interruption.note
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_an_interruption_ends_whatever_a_keyboard_interrupt_ends():
+    with pytest.raises(KeyboardInterrupt):
+        Interruption(signal.SIGHUP).heed()
