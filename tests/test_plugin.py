@@ -85,7 +85,8 @@ def test_vacuous(swarm):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_fails(swarm):
-    swarm({SHORT}).fault("lie", agents=["all"], at=0, matrix=[[1e9, 0.0], [0.0, 1e9]]).fly("fail")
+    gullible = swarm({SHORT}, "time.duration=2", "agents.estimator=conral")
+    gullible.fault("lie", agents=["all"], at=0, matrix=[[1e9, 0.0], [0.0, 1e9]]).fly("fail")
 
 def test_does_not_fail(swarm):
     swarm({SHORT}).fly("fail")
