@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from netem.draws import Array
+from netem.links import Integers
 
 SIGMAS = 3.0  # of a mean or a share
 SIGMAS_OF_MANY = 4.0  # of correlations, of which there are many
@@ -64,7 +66,7 @@ class Against:
         error = float(off.std(ddof=1)) * len(off) ** 0.5 / float(below.sum())
         return self.normal(what, requested, float(above.sum() / below.sum()), error)
 
-    def counts(self, what: str, chances: Array, counted: Array) -> Row:
+    def counts(self, what: str, chances: Array, counted: Array | Integers) -> Row:
         """How often each kind of independent event came: chi-square; the last bin takes what `chances` leave to 1."""
         chances, counted = _pooled(chances, counted[None], _FEWEST)
         total = counted.sum()
@@ -83,7 +85,8 @@ class Against:
 
     def distribution(self, what: str, cdf: Callable[[Array], Array], sample: Array) -> Row:
         """The distribution of independent values: Kolmogorov-Smirnov."""
-        test = stats.kstest(sample.ravel(), cdf)
+        distributed: Any = cdf  # the stubs know of functions of one number only
+        test = stats.kstest(sample.ravel(), distributed)
         return self._p(what, "its distribution", f"D = {test.statistic:.2g} of {sample.size}", float(test.pvalue))
 
     def uncorrelated(self, what: str, a: Array, b: Array) -> Row:
@@ -118,7 +121,7 @@ class Against:
         return Row(self.model, self.parameters, what, requested, achieved, f"p = {p:.3f}", p > UNLIKELY, UNLIKELY)
 
 
-def _pooled(chances: Array, counted: Array, fewest: int) -> tuple[Array, Array]:
+def _pooled(chances: Array, counted: Array | Integers, fewest: int) -> tuple[Array, Array]:
     """Neighbouring bins in one until enough is expected in each; counts by row (rows, bins), the last bin open."""
     chances = np.append(chances, max(0.0, 1.0 - chances.sum()))[: counted.shape[-1]]
     expected, starts, held = chances * counted.sum(), [0], 0.0

@@ -114,7 +114,7 @@ def _duplicates(verdicts: int, seed: int) -> Iterator[Row]:
     yield against.share("share", 0.05, copied)
     tick = np.arange(ticks)[:, None, None]
     wait, first = (made.copy_due - tick)[copied], (made.due - tick)[copied]
-    chances = np.diff(case.cdf(np.arange(41) * flown.DT))
+    chances: Array = np.diff(case.cdf(np.arange(41.0) * flown.DT))
     yield against.counts("ticks of a copy", chances, np.bincount(np.clip(wait, 1, 41), minlength=42)[1:])
     score_wait, score_first = ((ticks_ - ticks_.mean()) / ticks_.std() for ticks_ in (wait, first))
     yield against.uncorrelated("with the first's ticks", score_wait, score_first)

@@ -1,6 +1,6 @@
 """The tick against its floor, in one run: the same messages through bare Zenoh, with no computing.
 
-    python bench/lockstep.py [--ticks 1500] [--rounds 3]
+    python bench/lockstep.py [--ticks 1500] [--rounds 3] [--swarms corridor hexa]
 
 Prints, for 7 and 10 agents: the floor (as many processes, the same keys, message sizes, logins and access control, nobody
 computes), the tick of GA-RKF with recording on and off, their ratio, the real-time factor, the start, and memory. Machines are
@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def sizes(plan: Plan) -> dict[str, int]:
     degree = round(links / agents)
     heard = round(degree * plan.scenario.network.availability)
     map_ = number(size=(dimension, dimension))
-    said = {
+    said: dict[str, dict[str, Any]] = {
         "input": {"velocity": number(size=dimension)},
         "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
         "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
@@ -45,20 +46,28 @@ def sizes(plan: Plan) -> dict[str, int]:
     broadcasts = [wire.pack(wire.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
     messages = {
         "sense": wire.pack(
-            wire.Sense(500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), None, [])
+            wire.Sense(
+                500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), None, None, []
+            )
         ),
         "seen": wire.pack(
             wire.SenseInbox(
-                500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None, None
+                500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None, None, None
             )
         ),
         "heard": wire.pack_exchange(500, 500, broadcasts * heard),
         "act": wire.pack(
             wire.Act(
-                *(500, 1, 500, number(size=dimension), number(size=(degree, dimension)), [True] * degree),
+                k=500,
+                src=1,
+                seq=500,
+                input=number(size=dimension),
+                estimate=number(size=(degree, dimension)),
+                known=[True] * degree,
                 covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
                 psi=0.1,
                 feasible=True,
+                reports={},
                 heard=500,
             )
         ),
@@ -87,17 +96,28 @@ def floor_tick(plan: Plan, ticks: int) -> float:
                 env=os.environ | ENVIRONMENT,
             )
             told = {"role": role, "agents": agents, "ticks": ticks, "size": size, "users": str(users)}
-            process.stdin.write(json.dumps(told | {"login": [endpoint, name, passwords[role]]}) + "\n")
-            process.stdin.flush()
+            _tell(process, json.dumps(told | {"login": [endpoint, name, passwords[role]]}))
         for process in started.values():
-            process.stdout.readline()
+            _said(process)
         for role in [HUB, *(role for role in names if role not in (HUB, WORLD)), WORLD]:
-            started[role].stdin.write("go\n")
-            started[role].stdin.flush()
-        tick = float(started[WORLD].stdout.readline())
+            _tell(started[role], "go")
+        tick = float(_said(started[WORLD]))
         for process in started.values():
             process.communicate("done\n", timeout=20)
     return tick
+
+
+def _tell(process: subprocess.Popen[str], line: str) -> None:
+    told = process.stdin
+    assert told is not None
+    told.write(line + "\n")
+    told.flush()
+
+
+def _said(process: subprocess.Popen[str]) -> str:
+    said = process.stdout
+    assert said is not None
+    return said.readline()
 
 
 def fly(plan: Plan) -> tuple[float, float, float]:
@@ -115,10 +135,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ticks", type=int, default=1500)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--swarms", nargs="+", default=["corridor", "hexa"], metavar="SCENARIO")
     options = parser.parse_args()
     print("| swarm | floor, ms | tick, ms | ratio | x real time | recording | start, s | agent, MB |")
     print("|---|---|---|---|---|---|---|---|")
-    for name in ("corridor", "hexa"):
+    for name in options.swarms:
         duration = f"time.duration={options.ticks / 100:g}"
         on = planning.make(scenario.load(name, [duration]))
         off = planning.make(scenario.load(name, [duration, "record.enabled=false"]))

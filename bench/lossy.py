@@ -78,15 +78,16 @@ def _by_message(case: Case, verdicts: int, seed: int) -> tuple[Mask, Array]:
     links, ticks = flown.size(verdicts)
     air = flown.medium(seed, links, chains=flown.layers(links, *case.chains, by_packet=case.by_packet))
     if not case.by_packet:
-        fate, due = (field[:, 0] for field in flown.fly(air, ticks)[:2])
-        return fate == Fate.LOST, (due - np.arange(ticks)[:, None]) * flown.DT
+        made = flown.fly(air, ticks)
+        return made.fate[:, 0] == Fate.LOST, (made.due[:, 0] - np.arange(float(ticks))[:, None]) * flown.DT
     ticks = 2 * ticks + 400
     offered = np.random.default_rng(seed).random((ticks, 1, len(links))) < 0.5
-    fate, due = (field[:, 0] for field in flown.fly(air, ticks, offered)[:2])
+    made = flown.fly(air, ticks, offered)
     few = int(offered.sum(axis=0).min())
     when = np.argsort(~offered[:, 0], axis=0, kind="stable")[:few]
-    lost = np.take_along_axis(fate, when, axis=0) == Fate.LOST
-    return lost, (np.take_along_axis(due, when, axis=0) - when) * flown.DT
+    lost = np.take_along_axis(made.fate[:, 0], when, axis=0) == Fate.LOST
+    waited = np.take_along_axis(made.due[:, 0], when, axis=0) - when
+    return lost, np.asarray(waited * flown.DT, dtype=np.float64)
 
 
 def _stationary(against: Against, case: Case, verdicts: int, seed: int) -> Iterator[Row]:

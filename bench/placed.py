@@ -43,17 +43,25 @@ def _reach(links: Links, law: Law, inner: float, outer: float, shadowing: float 
     return Reach(law, np.ones(len(links), dtype=bool), inner, outer, 3.0, shadowing, coherence, True, True)
 
 
-def _passing(verdicts: int, seed: int, distances: Array, **given: float) -> tuple[Mask, Array]:
+def _passing(
+    verdicts: int,
+    seed: int,
+    distances: Array,
+    law: Law,
+    inner: float,
+    outer: float,
+    shadowing: float = 0.0,
+    coherence: int = 1,
+) -> tuple[Mask, Array]:
     links, ticks = flown.size(verdicts)
-    law = Law.LOG_DISTANCE if "shadowing" in given else Law.RAMP
     position, length = _apart(links, distances)
-    reach = _reach(links, law, **given)
+    reach = _reach(links, law, inner, outer, shadowing, coherence)
     return flown.fly(flown.medium(seed, links, reaches=(reach,)), ticks, position=position).fate != Fate.RANGE, length
 
 
 def _ramp(verdicts: int, seed: int) -> Iterator[Row]:
     distances, against = np.array([9.9, 11.0, 15.0, 18.0, 19.5, 20.0]), Against("ramp", "10 to 20 m")
-    passing, length = _passing(verdicts, seed, distances, inner=10.0, outer=20.0)
+    passing, length = _passing(verdicts, seed, distances, Law.RAMP, inner=10.0, outer=20.0)
     for distance in distances:
         here, due = passing[..., length == distance], float(np.clip((20.0 - distance) / 10.0, 0.0, 1.0))
         if 0.0 < due < 1.0:
@@ -64,7 +72,7 @@ def _ramp(verdicts: int, seed: int) -> Iterator[Row]:
 
 def _disk(verdicts: int, seed: int) -> Iterator[Row]:
     distances = np.array([1.0, 20.0, 20.001, 50.0])
-    passing, length = _passing(verdicts, seed, distances, inner=20.0, outer=20.0)
+    passing, length = _passing(verdicts, seed, distances, Law.RAMP, inner=20.0, outer=20.0)
     as_due = passing == (length <= 20.0)
     yield Against("disk", "20 m").exactly("verdicts as the distance says", 1.0, float(as_due.mean()))
 
@@ -74,11 +82,11 @@ def _log_distance(verdicts: int, seed: int, coherence: int) -> Iterator[Row]:
     distances = np.array([10.0, 16.0, 20.0, 25.0, 35.0])
     against = Against("log-distance", f"20 m, exponent 3, 4 dB, {coherence} ticks")
     passing, length = _passing(
-        2 * coherence * verdicts, seed, distances, inner=0.0, outer=20.0, shadowing=4.0, coherence=coherence
+        2 * coherence * verdicts, seed, distances, Law.LOG_DISTANCE, 0.0, 20.0, shadowing=4.0, coherence=coherence
     )
     passing = passing[: len(passing) // coherence * coherence, 0]
-    spells = passing.reshape(-1, coherence, passing.shape[-1] // 2, 2).swapaxes(1, 2)
-    spells = spells.reshape(*spells.shape[:2], -1)
+    by_pair = passing.reshape(-1, coherence, passing.shape[-1] // 2, 2).swapaxes(1, 2)
+    spells = by_pair.reshape(*by_pair.shape[:2], -1)
     yield against.exactly("one fate in a spell of a pair", 1.0, float((spells == spells[..., :1]).all(axis=-1).mean()))
     for distance in distances:
         due = float(ndtr(10.0 * 3.0 * np.log10(20.0 / distance) / 4.0))
@@ -124,8 +132,9 @@ def _schedules(verdicts: int, seed: int) -> Iterator[Row]:
         yield against.exactly("verdicts as the clock says", 1.0, float((opened == due).mean()))
     links = flown.pairs(100)
     ticks = np.arange(-(-verdicts // len(links)))
-    lengths = [np.full(len(links), n) for n in (7, 0, 3)]
-    fate = flown.fly(flown.medium(seed, links, schedules=(Schedule(*lengths, True, True),)), len(ticks)).fate[:, 0]
+    period, begins, lasts = (np.full(len(links), n) for n in (7, 0, 3))
+    part_time = Schedule(period, begins, lasts, True, True)
+    fate = flown.fly(flown.medium(seed, links, schedules=(part_time,)), len(ticks)).fate[:, 0]
     against, whole = Against("schedule", "3 of 7 ticks"), len(fate) // 7 * 7
     yield against.exactly("verdicts as the clock says", 1.0, float(((ticks % 7 < 3) == (fate != Fate.CLOSED).T).mean()))
     chain, closed = schedule.turning(7, 3), float((fate[:whole] == Fate.CLOSED).mean())

@@ -18,6 +18,7 @@ from affinet.batch import fly_all
 from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
 from analysis.information import Array, position_jet, unpacked
+from netem.links import Integers
 from world.dynamics import carried
 
 _TICK = 1e-3  # s
@@ -51,7 +52,7 @@ def _numbers(text: str) -> list[float]:
     return [float(number) for number in text.split(",")]
 
 
-def _flown(seconds: float, seed: int) -> tuple[Array, Array]:
+def _flown(seconds: float, seed: int) -> tuple[Array, Integers]:
     """What every agent knows in every tick, with derivatives, shape (T, m + 1, N, C), and its neighbours (N, n)."""
     overrides = (f"time.dt={_TICK}", f"time.duration={seconds}", 'agents.parameters.target.fusion="none"')
     flown = plan.make(scenario.load("target", overrides))
@@ -59,7 +60,7 @@ def _flown(seconds: float, seed: int) -> tuple[Array, Array]:
     return np.moveaxis(known, 1, 2), flown.world.links.neighbours
 
 
-def _agree(known: Array, neighbours: Array, step: float, theta: float) -> Array:
+def _agree(known: Array, neighbours: Integers, step: float, theta: float) -> Array:
     """Root mean square errors of position, velocity and acceleration, shape (m + 1,)."""
     defaults = TargetEstimator()
     order, agents, numbers = known.shape[1] - 1, *known.shape[2:]

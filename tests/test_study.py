@@ -468,7 +468,7 @@ def drawn(monkeypatch):
     """The figures that are drawn from now on."""
     kept = []
 
-    class Kept(figures.Figure):
+    class Kept(figures.Figure):  # type: ignore[name-defined]
         def __init__(self, **how):
             super().__init__(**how)
             kept.append(self)
