@@ -59,7 +59,7 @@ class Centre:
     def begin(self, batch: tuple[int, ...]) -> Whole:
         """Everybody at the same place, as far as is known (9a)-(9b)."""
         agents, size = len(self.neighbours), len(self.process)
-        prior = self.prior_position**2 * np.eye(size)
+        prior = self.prior_position * self.prior_position * np.eye(size)
         return Whole(np.zeros((*batch, agents, size // agents)), np.broadcast_to(prior, (*batch, size, size)).copy())
 
     def step(self, state: Whole, measured: Array, seen: Mask, inputs: Array) -> tuple[Whole, Told]:

@@ -11,6 +11,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from numerics.elementary import whole_power
+
 Array = NDArray[np.float64]
 
 
@@ -60,5 +62,5 @@ def power(base: Array, exponent: int, rate: Array, orders: int) -> Array:
     jet = []
     for order in range(orders):
         falling = float(np.prod(np.arange(exponent - order + 1, exponent + 1))) if order <= exponent else 0.0
-        jet.append(falling * base ** max(exponent - order, 0) * rate**order)
+        jet.append(falling * whole_power(base, max(exponent - order, 0)) * whole_power(rate, order))
     return np.stack(jet)

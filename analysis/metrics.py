@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from numerics.elementary import whole_power
+
 Array = NDArray[np.float64]
 
 
@@ -23,7 +25,7 @@ def tracking_error(position: Array, target: Array, present: NDArray[np.bool_]) -
     Array
         Shape (...); NaN where nobody is present.
     """
-    squared = ((position - target) ** 2).sum(axis=-1)
+    squared = whole_power(position - target, 2).sum(axis=-1)
     number = present.sum(axis=-1)
     total = np.where(present, squared, 0.0).sum(axis=-1)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
@@ -56,7 +58,7 @@ def procrustes_error(position: Array, nominal: Array, present: NDArray[np.bool_]
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(Z).all(axis=(-2, -1)))
     spread: Array = np.swapaxes(np.where(finite[..., None, None], Z, 0.0), -1, -2) @ P
     U, _, Vt = np.linalg.svd(spread)
-    squared = ((Z @ (U @ Vt) - P) ** 2).sum(axis=(-2, -1))
+    squared = whole_power(Z @ (U @ Vt) - P, 2).sum(axis=(-2, -1))
     return np.where(finite, np.sqrt(squared) / number, np.nan)
 
 
@@ -70,7 +72,7 @@ def estimation_error(estimate: Array, true: Array, known: NDArray[np.bool_]) -> 
     known
         Which edges have an estimate, shape (..., N, n).
     """
-    squared = ((estimate - true) ** 2).sum(axis=-1)
+    squared = whole_power(estimate - true, 2).sum(axis=-1)
     total: Array = np.sqrt(np.where(known, squared, 0.0).sum(axis=(-2, -1)))
     return total
 

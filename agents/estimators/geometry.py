@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.brief import Array, Mask
 from agents.estimators.small import determinant, inverse
+from numerics.elementary import whole_power
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 SINGULAR = 1e-9
@@ -51,7 +52,7 @@ def regular(gram: Array) -> Mask:
     """Whether rank H = D (Remark 1), shape (...): the test is on the nominal H, never on Y."""
     dimension = gram.shape[-1]
     scale = np.einsum("...ii", gram) / dimension
-    spans: Mask = determinant(gram) > SINGULAR * scale**dimension
+    spans: Mask = determinant(gram) > SINGULAR * whole_power(scale, dimension)
     return spans
 
 

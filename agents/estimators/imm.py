@@ -18,6 +18,7 @@ from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
 from agents.estimators.small import determinant, inverse
+from numerics.elementary import exp, log
 
 
 class Modes(NamedTuple):
@@ -144,13 +145,13 @@ def _surprise(mean: Array, covariance: Array, observed: Array, R: Array) -> Arra
     S = covariance[..., :dimension, :dimension] + R
     innovation = observed - mean[..., :dimension]
     squared = (innovation * (inverse(S) @ innovation[..., None])[..., 0]).sum(axis=-1)
-    surprise: Array = squared + np.log(determinant(S))
+    surprise: Array = squared + log(determinant(S))
     return surprise
 
 
 def _weighed(expected: Array, surprise: Array) -> Array:
     # Against the least surprised, so that a measurement far from all of them does not underflow to 0 / 0.
-    likelihood = np.exp(-0.5 * (surprise - surprise.min(axis=-1, keepdims=True)))
+    likelihood = exp(-0.5 * (surprise - surprise.min(axis=-1, keepdims=True)))
     weighed = expected * likelihood
     probability: Array = weighed / weighed.sum(axis=-1, keepdims=True)
     return probability

@@ -55,7 +55,7 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
     # successive predictions count as independent: exact for p = 1, too sure of itself for longer models after several losses.
     expected = (flown.inputs[..., : len(a), :] * a[:, None]).sum(axis=-2)
     spread = (flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None]).sum(axis=-3)
-    spread = spread + (sigma**2 if len(a) else 0.0) * np.eye(dimension)
+    spread = spread + (sigma * sigma if len(a) else 0.0) * np.eye(dimension)
     newest = np.where(said.fresh[..., None], said.fields["velocity"], expected)
     doubt = np.where(said.fresh[..., None, None], 0.0, spread)
     return Flown(

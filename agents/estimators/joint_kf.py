@@ -55,7 +55,7 @@ class JointEdgeFilter:
         slots, dimension = brief.relative.shape[-2:]
         shape = (*batch, slots)
         edges = np.ones((slots, slots)) + np.eye(slots)
-        prior = self.prior_position**2 * np.kron(edges, identity(dimension))
+        prior = self.prior_position * self.prior_position * np.kron(edges, identity(dimension))
         return Joint(
             mean=np.zeros((*shape, dimension)),
             covariance=np.broadcast_to(prior, (*batch, *prior.shape)).copy(),
@@ -79,7 +79,7 @@ class JointEdgeFilter:
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
-        covariance = state.covariance + brief.process + brief.dt**2 * block_diagonal(doubt)
+        covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
         R = block_diagonal(brief.sensor.spread(state.measured))
         mean, covariance = corrected(mean, covariance, state.measured, R, state.seen)
         known = np.broadcast_to(brief.present, state.seen.shape)

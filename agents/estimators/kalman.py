@@ -59,11 +59,11 @@ def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[A
     The rest moves exactly as in `motion`.
     """
     order = ORDER[model]
-    taylor = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    taylor = np.array([[1.0, dt, dt * dt / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
     transition = np.where(np.arange(3) < order, taylor, 0.0)
-    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt**2 / 2, dt, 1.0])
+    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt * dt / 2, dt, 1.0])
     axes = np.eye(dimension)
-    F, Q = np.kron(transition, axes), sigma_w**2 * np.kron(np.outer(deflection, deflection), axes)
+    F, Q = np.kron(transition, axes), sigma_w * sigma_w * np.kron(np.outer(deflection, deflection), axes)
     return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
 
 
@@ -80,7 +80,7 @@ def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float])
         Of position, and of its derivatives as far as the state has them, in SI units.
     """
     prior = np.repeat(deviations, dimension)
-    covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
+    covariance = np.broadcast_to(np.diag(prior * prior), (*shape, len(prior), len(prior))).copy()
     return np.zeros((*shape, len(prior))), covariance
 
 

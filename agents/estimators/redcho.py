@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from agents.brief import Array
+from numerics.elementary import power, whole_power
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,11 @@ class Consensus:
         rates = []
         for mu in range(self.order + 1):
             exponent = (self.order - mu) / (self.order + 1)
-            pull = (size**exponent * sign).sum(axis=-2)
+            pull = (power(size, exponent) * sign).sum(axis=-2)
             higher = internal[..., mu + 1, :] if mu < self.order else 0.0
-            rates.append(self.k[mu] * self.theta ** (mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :])
+            rates.append(
+                self.k[mu] * whole_power(self.theta, mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :]
+            )
         stepped: Array = internal + dt * np.stack(rates, axis=-2)
         return stepped
 

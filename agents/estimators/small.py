@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.brief import Array
+from numerics.elementary import hypot
 
 _CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
@@ -58,7 +59,7 @@ def rotation(matrix: Array) -> Array:
 
 
 def _turn(along: Array, across: Array) -> Array:
-    length = np.hypot(along, across)
+    length = hypot(along, across)
     somewhere = length > 0.0
     size = np.where(somewhere, length, 1.0)
     cosine, sine = np.where(somewhere, along, 1.0) / size, across / size

@@ -22,6 +22,7 @@ from analysis.information import numbers, packed, position_jet, unpacked
 from analysis.pursuit import Target, diffusion, transition
 from netem.channels import TARGET
 from netem.links import Integers
+from numerics.elementary import whole_power
 
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
@@ -121,7 +122,7 @@ class TargetEstimator:
         if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
             raise ValueError(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
-        prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
+        prior = np.broadcast_to(np.diag(deviations * deviations), (*batch, order, order)).copy()
         first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.zeros(batch, dtype=np.int64))
         slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
         return Track(
@@ -237,7 +238,7 @@ class TargetEstimator:
         rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
         passed = np.clip((state.now - state.last.made) * dt / latency, 0.0, 1.0)
         rising = jets.power(passed, exponent, rate, orders)
-        falling = self.alpha**exponent * jets.power(1.0 - passed, exponent, -rate, orders)
+        falling = whole_power(self.alpha, exponent) * jets.power(1.0 - passed, exponent, -rate, orders)
         share = jets.quotient(rising, rising + falling)
         alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((orders - 1, *passed.shape))])
         return np.where(state.settled, share, alone)
