@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from analysis.affine import Manoeuvre
 from analysis.pursuit import Sighting, Target
 from analysis.sensor import Sensor
+from numerics.algebra import sum_over
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -110,8 +111,7 @@ class Brief:
     @cached_property
     def degree(self) -> Array:
         """gamma_i = sum_j l_ij, shape (...)."""
-        total: Array = self.stress.sum(axis=-1)
-        return total
+        return sum_over(self.stress, -1)
 
     @property
     def dimension(self) -> int:

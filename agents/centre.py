@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agents.brief import Array, Mask
 from analysis.sensor import Sensor
+from numerics.algebra import product
 
 
 class Whole(NamedTuple):
@@ -76,12 +77,12 @@ class Centre:
         position = state.position + self.dt * inputs
         covariance = state.covariance + self.process
         precision = np.where(seen[..., None, None], np.linalg.inv(self.sensor.spread(measured)), 0.0)
-        surprise = precision @ (measured - self._edges(position))[..., None]
-        pulled = self._incidence @ surprise.reshape(*seen.shape[:-2], -1, dimension)
+        surprise = product(precision, (measured - self._edges(position))[..., None])
+        pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))
         information = self._information(precision)
-        solved = np.linalg.solve(np.eye(agents * dimension) + covariance @ information, covariance)
+        solved = np.linalg.solve(np.eye(agents * dimension) + product(covariance, information), covariance)
         corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
-        moved = (corrected @ pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
+        moved = product(corrected, pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
         whole = Whole(position + moved.reshape(position.shape), corrected)
         return whole, Told(self._edges(whole.position), self._spread(corrected, agents, dimension))
 
@@ -89,7 +90,7 @@ class Centre:
         """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""
         agents, dimension = len(self.neighbours), precision.shape[-1]
         batch = precision.shape[:-4]
-        pairs = self._pairs @ precision.reshape(*batch, -1, dimension * dimension)
+        pairs = product(self._pairs, precision.reshape(*batch, -1, dimension * dimension))
         blocks = pairs.reshape(*batch, agents, agents, dimension, dimension)
         return np.swapaxes(blocks, -3, -2).reshape(*batch, agents * dimension, agents * dimension)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from numerics.algebra import product
 from numerics.elementary import log, whole_power
 
 Array = NDArray[np.float64]
@@ -94,7 +95,7 @@ def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
     # Runs may diverge, stand still, or end at 0.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         time, logarithm = seconds[inside] - seconds[inside].mean(), log(error[:, inside])
-        slope = (logarithm @ time) / (time @ time)
+        slope = product(logarithm, time) / product(time, time)
         total = logarithm - logarithm.mean(axis=1, keepdims=True)
         explained = 1.0 - whole_power(total - slope[:, None] * time, 2).sum(axis=1) / whole_power(total, 2).sum(axis=1)
         straight = (explained >= _STRAIGHT) & (slope < 0.0)

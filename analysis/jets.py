@@ -11,6 +11,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from numerics.algebra import product
 from numerics.elementary import whole_power
 
 Array = NDArray[np.float64]
@@ -20,7 +21,9 @@ def times(one: Array, other: Array) -> Array:
     """The jet of a matrix product, of jets (m + 1, ..., r, s) and (m + 1, ..., s, c)."""
     return np.stack(
         [
-            reduce(np.add, [comb(order, lower) * (one[lower] @ other[order - lower]) for lower in range(order + 1)])
+            reduce(
+                np.add, [comb(order, lower) * product(one[lower], other[order - lower]) for lower in range(order + 1)]
+            )
             for order in range(len(one))
         ]
     )
@@ -42,9 +45,9 @@ def inverse(matrix: Array) -> Array:
     inverted = [np.linalg.inv(matrix[0])]
     for order in range(1, len(matrix)):
         drawn = reduce(
-            np.add, [comb(order, lower) * (matrix[order - lower] @ inverted[lower]) for lower in range(order)]
+            np.add, [comb(order, lower) * product(matrix[order - lower], inverted[lower]) for lower in range(order)]
         )
-        inverted.append(-inverted[0] @ drawn)
+        inverted.append(product(-inverted[0], drawn))
     return np.stack(inverted)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from netem.channels import THETA
 from netem.fault import Fault
+from numerics.algebra import product
 
 CHANNEL = THETA
 
@@ -16,4 +17,6 @@ CHANNEL = THETA
 def told(fields: Mapping[str, Any], liar: Fault) -> dict[str, Any]:
     """The fields (..., D, D) of maps that a liar tells, each multiplied by its matrix; other fields as they are."""
     matrix = np.array(liar.matrix)
-    return {name: matrix @ field if field.shape[-2:] == matrix.shape else field for name, field in fields.items()}
+    return {
+        name: product(matrix, field) if field.shape[-2:] == matrix.shape else field for name, field in fields.items()
+    }

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from numerics.algebra import product
 from numerics.elementary import exp, whole_power
 from world.formation import Array
 
@@ -79,11 +80,11 @@ class Disturbance:
         nominal
             Of one swarm, shape (n, D), in metres.
         """
-        drawn = white @ self._root_axes.T
+        drawn = product(white, self._root_axes.T)
         if self.kernel is not None and self.kernel.positions == "true":
-            drawn = _root(self.kernel.correlation(position)) @ drawn
+            drawn = product(_root(self.kernel.correlation(position)), drawn)
         elif self.kernel is not None:
-            drawn = _root(self.kernel.correlation(nominal)) @ drawn
+            drawn = product(_root(self.kernel.correlation(nominal)), drawn)
         if before is None:
             return drawn
         return self.persistence * before + np.sqrt(1.0 - self.persistence * self.persistence) * drawn

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import ndtr
 
 from analysis.affine import Array, Manoeuvre
+from numerics.algebra import product
 from numerics.elementary import cos, exp, sin
 
 _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -51,7 +52,7 @@ def corridor(seconds: Array) -> Manoeuvre:
         ],
         axis=-1,
     )
-    return Manoeuvre(theta, course - theta @ _ANCHOR)
+    return Manoeuvre(theta, course - product(theta, _ANCHOR))
 
 
 def ravine(seconds: Array) -> Manoeuvre:
@@ -79,7 +80,7 @@ def ravine(seconds: Array) -> Manoeuvre:
         0.5 * (_travel(seconds, 3, 6) - _travel(seconds, 15, 6)),
     ]
     scale = _matrix([[one, nothing, nothing], [nothing, width, nothing], [nothing, nothing, height]])
-    return Manoeuvre(yaw @ scale, np.stack(course, axis=-1))
+    return Manoeuvre(product(yaw, scale), np.stack(course, axis=-1))
 
 
 def hover(seconds: Array, dimension: int) -> Manoeuvre:

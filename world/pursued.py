@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from analysis.pursuit import Sighting, Target, diffusion, transition
 from netem.draws import Purpose, Seed, uniform
 from netem.links import Integers
+from numerics.algebra import product
 from world.formation import Array
 from world.noise import normal
 
@@ -77,7 +78,7 @@ class Pursuit:
         firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
         white = normal(firsts, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
         drift, root = self._motion
-        moved = drift @ chase.target + root @ white.reshape(swarms, order, axes)
+        moved = product(drift, chase.target) + product(root, white.reshape(swarms, order, axes))
         return Chase(
             target=moved,
             method=method,

@@ -18,6 +18,7 @@ from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicat
 from agents.estimators.blocks import block_diagonal, diagonal_blocks
 from agents.estimators.geometry import identity
 from netem.channels import INPUT
+from numerics.algebra import product
 
 
 class Joint(NamedTuple):
@@ -107,5 +108,5 @@ def corrected(mean: Array, covariance: Array, measured: Array, R: Array, seen: M
     observed = np.where(rows[..., :, None], covariance, 0.0)
     gain = np.swapaxes(np.linalg.solve(S, observed), -1, -2)
     innovation = np.where(rows, (measured - mean).reshape(rows.shape), 0.0)
-    moved = mean.reshape(rows.shape) + (gain @ innovation[..., None])[..., 0]
-    return moved.reshape(shape), covariance - gain @ observed
+    moved = mean.reshape(rows.shape) + product(gain, innovation[..., None])[..., 0]
+    return moved.reshape(shape), covariance - product(gain, observed)

@@ -15,6 +15,7 @@ import numpy as np
 
 from agents.brief import Array, Mask
 from agents.estimators.small import inverse
+from numerics.algebra import product
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 
@@ -86,7 +87,7 @@ def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float])
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:
     """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S)."""
-    return mean @ F.T, F @ covariance @ F.T + Q
+    return product(mean, F.T), product(F, covariance, F.T) + Q
 
 
 def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> tuple[Array, Array]:
@@ -105,7 +106,7 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     """
     dimension = observed.shape[-1]
     innovation = observed - mean[..., :dimension]
-    gain = covariance[..., :dimension] @ inverse(covariance[..., :dimension, :dimension] + R)
+    gain = product(covariance[..., :dimension], inverse(covariance[..., :dimension, :dimension] + R))
     gain = np.where(usable[..., None, None], gain, 0.0)
-    corrected = mean + (gain @ innovation[..., None])[..., 0]
-    return corrected, covariance - gain @ covariance[..., :dimension, :]
+    corrected = mean + product(gain, innovation[..., None])[..., 0]
+    return corrected, covariance - product(gain, covariance[..., :dimension, :])

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from agents.brief import Array
+from numerics.algebra import product, sum_over
 from numerics.elementary import power, whole_power
 
 
@@ -30,7 +31,7 @@ class Consensus:
 
     def outputs(self, local: Array, internal: Array) -> Array:
         """s_mu, shape (m + 1, ..., C), of jets of own signals (m + 1, ..., C) and internal variables (..., m + 1, C)."""
-        mixed = _mixing(self.order, self.gamma) @ internal
+        mixed = product(_mixing(self.order, self.gamma), internal)
         agreed: Array = local - np.moveaxis(mixed, -2, 0)
         return agreed
 
@@ -53,7 +54,7 @@ class Consensus:
         rates = []
         for mu in range(self.order + 1):
             exponent = (self.order - mu) / (self.order + 1)
-            pull = (power(size, exponent) * sign).sum(axis=-2)
+            pull = sum_over(power(size, exponent) * sign, -2)
             higher = internal[..., mu + 1, :] if mu < self.order else 0.0
             rates.append(
                 self.k[mu] * whole_power(self.theta, mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :]
@@ -68,5 +69,5 @@ def _mixing(order: int, gamma: tuple[float, ...]) -> Array:
     Gamma = np.eye(order + 1, k=1) - np.diag(gamma)
     rows = [np.eye(order + 1)[0]]
     for _ in range(order):
-        rows.append(rows[-1] @ Gamma)
+        rows.append(product(rows[-1], Gamma))
     return np.stack(rows)

@@ -20,6 +20,7 @@ from agents.estimators.edge_kf import of_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
 from netem.channels import INPUT
+from numerics.algebra import product, sum_over
 
 
 class Past(NamedTuple):
@@ -123,16 +124,16 @@ class SilentEdgeFilter:
     def _neighbours(self, brief: Brief, past: Past) -> tuple[Array, Array]:
         """What the neighbours fly, shape (..., n, D), and its covariance; at rest with R_u(0) while the past is too short."""
         R_u0, seconds = self.sigma_u * self.sigma_u * identity(brief.dimension), self.window * brief.dt
-        flown = past.input[..., 1 : self.window + 1, :].mean(axis=-2)[..., None, :]
+        flown = sum_over(past.input[..., 1 : self.window + 1, :], -2)[..., None, :] / self.window
         moved = past.mean[..., self.window, :, :] - past.mean[..., 0, :, :]
         observed = moved / seconds + flown
         ends = past.covariance[..., 0, :, :, :] + past.covariance[..., self.window, :, :, :]
         noise = (self.window * of_edges(brief) + ends) / (seconds * seconds)
-        trust, a = R_u0 @ inverse(R_u0 + noise), self.coefficient
+        trust, a = product(R_u0, inverse(R_u0 + noise)), self.coefficient
         enough = (past.length > self.window)[..., None, None]
-        theirs = np.where(enough, a * (trust @ observed[..., None])[..., 0], 0.0)
+        theirs = np.where(enough, a * product(trust, observed[..., None])[..., 0], 0.0)
         # R_u(0) - W R_u(1)^T, without the difference of two large numbers.
-        return theirs, np.where(enough[..., None], (1.0 - a * a) * R_u0 + a * a * trust @ noise, R_u0)
+        return theirs, np.where(enough[..., None], (1.0 - a * a) * R_u0 + product(a * a * trust, noise), R_u0)
 
 
 def _pushed(newest: Array, past: Array, axis: int) -> Array:

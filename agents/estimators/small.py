@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.brief import Array
+from numerics.algebra import product
 from numerics.elementary import hypot
 
 _CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -53,8 +54,8 @@ def rotation(matrix: Array) -> Array:
     # A swarm that diverges overflows at last: LAPACK would raise, and end the flight.
     finite = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
     U, _, Vt = np.linalg.svd(np.where(finite, matrix, 0.0))
-    U[..., -1] *= np.where(determinant(U @ Vt) < 0.0, -1.0, 1.0)[..., None]
-    nearest: Array = U @ Vt
+    U[..., -1] *= np.where(determinant(product(U, Vt)) < 0.0, -1.0, 1.0)[..., None]
+    nearest: Array = product(U, Vt)
     return nearest
 
 

@@ -22,6 +22,7 @@ from analysis.information import numbers, packed, position_jet, unpacked
 from analysis.pursuit import Target, diffusion, transition
 from netem.channels import TARGET
 from netem.links import Integers
+from numerics.algebra import product, sum_over
 from numerics.elementary import whole_power
 
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
@@ -182,7 +183,7 @@ class TargetEstimator:
         said = heard[TARGET]
         fresh, theirs = said.fresh, said.fields["information"]
         if self.fusion == "mean":
-            counted = np.where(fresh[..., None, None], theirs, 0.0).sum(axis=-3)
+            counted = sum_over(np.where(fresh[..., None, None], theirs, 0.0), -3)
             return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
         consensus = self._consensus(brief)
         agreed = consensus.outputs(own, state.internal)
@@ -204,10 +205,14 @@ class TargetEstimator:
         lag = np.maximum(state.now - state.last.made - latency, 0)
         mean, P = carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        L = (A @ P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
-        corrected = A @ mean + L @ (sighting.position[..., None, :] - mean[..., :1, :])
-        closed = A - L @ np.eye(1, target.order)
-        covariance = closed @ P @ np.swapaxes(closed, -1, -2) + R[..., None, None] * (L @ np.swapaxes(L, -1, -2)) + W
+        L = product(A, P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
+        corrected = product(A, mean) + product(L, sighting.position[..., None, :] - mean[..., :1, :])
+        closed = A - product(L, np.eye(1, target.order))
+        covariance = (
+            product(closed, P, np.swapaxes(closed, -1, -2))
+            + R[..., None, None] * product(L, np.swapaxes(L, -1, -2))
+            + W
+        )
         done = sighting.done
 
         def replaced(new: Any, old: Any) -> Any:
