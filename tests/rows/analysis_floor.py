@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis import affine, consistency, graph, indicator, information, jets, localization, metrics, pursuit, sensor
-from numerics import elementary
+from numerics import algebra, elementary
 from rows.case import covariance, of, real, share, truth, whole
 
 MANY = 500  # numbers that round apart once in a thousand times
@@ -40,6 +40,8 @@ CASES = {
     "numerics.elementary.sin": of(elementary.sin, real(), rows=MANY),
     "numerics.elementary.cos": of(elementary.cos, real(), rows=MANY),
     "numerics.elementary.arctan2": of(elementary.arctan2, real(), real(), rows=MANY),
+    "numerics.algebra.product": of(algebra.product, real(9, 9), real(9, 9), real(9, 2)),
+    "numerics.algebra.sum_over": of(lambda x: algebra.sum_over(x, -1), real(3, 19)),
     "analysis.jets.power": of(lambda x, rate: jets.power(x, 3, rate, 3), share(), real(), rows=4000, out=1),
     "analysis.jets.times": of(jets.times, real(3, 3, 3, axis=1), real(3, 3, 2, axis=1), out=1),
     "analysis.jets.scaled": of(jets.scaled, real(3, axis=1), real(3, 3, 2, axis=1), out=1),
@@ -67,6 +69,7 @@ CASES = {
         consistency.of_innovations,
         *(real(4, 9, 2), real(4, 9, 2), share(4, 9, 3), covariance(4, 9, 2, 2), truth(4, 9)),
     ),
+    "analysis.consistency.band": of(lambda number: consistency.band(0.9, 2, number), whole(99)),
     "analysis.consistency.nees": of(consistency.nees, real(9, 3), real(9, 6)),
     "analysis.consistency.whole": of(consistency.whole, real(9, 6)),
     "analysis.graph.mutual": of(graph.mutual, truth(AGENTS, AGENTS)),

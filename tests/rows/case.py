@@ -50,12 +50,12 @@ def covariance(*shape, axis=0):
 
 @dataclass(frozen=True)
 class Case:
-    """A function, its arguments for one row, how many rows at most, and on which axis of its results they stand."""
+    """A function, its arguments for one row, how many rows at most, and on which axis of each result they stand."""
 
     call: Callable[..., Any]
     arguments: tuple[Argument, ...]
     rows: int = SIZES[-1]
-    out: int = 0
+    out: int | tuple[int, ...] = 0
 
 
 def of(call, *arguments, rows=SIZES[-1], out=0):
@@ -117,8 +117,9 @@ def parted(name: str, case: Case) -> list[str]:
         for layout, laid in LAYOUTS.items():
             given = [laid(array, axis) for array, axis in zip(first, axes, strict=True)]
             together = list(leaves(case.call(*given)))
+            outs = case.out if isinstance(case.out, tuple) else (case.out,) * len(together)
             for row in range(size):
-                if [_bits(np.take(leaf, row, case.out)) for leaf in together] != numbers[row]:
+                if [_bits(np.take(leaf, row, out)) for leaf, out in zip(together, outs, strict=True)] != numbers[row]:
                     found.append(f"row {row} of {size}, {layout}")
                     break
     return found
