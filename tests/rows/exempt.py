@@ -45,7 +45,7 @@ EXEMPT = {
     WRITTEN: """
         netem.journal.Writer.write netem.journal.availability netem.journal.Recorded.verdicts world.history.Vigil.errors
         world.history.Vigil.see world.history.History.extend world.history.History.arrays world.history.load
-        world.history.digest world.localized.FirstMeasurements.of world.localized.FirstMeasurements.tick
+        world.history.digest world.history.one_nan world.localized.FirstMeasurements.of world.localized.FirstMeasurements.tick
         world.localized.FirstMeasurements.take world.localized.FirstMeasurements.edges world.realised.Realised.stabilised
         world.realised.Watch.follow world.realised.realise world.stage.points world.stage.scalars analysis.claims.flat
         analysis.claims.approaches analysis.claims.lower analysis.claims.ratio analysis.claims.stays_below
