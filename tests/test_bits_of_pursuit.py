@@ -14,7 +14,7 @@ from agents.estimators.target import TargetEstimator
 from agents.pursuit import Pursuit as PursuitLaw
 from analysis.pursuit import Sighting
 
-TICKS = 60
+TICKS = 40
 ESTIMATORS = {
     "smooth, agreed": TargetEstimator(theta=2.0, derivatives="agreed"),
     "smooth, own": TargetEstimator(theta=2.0, derivatives="own", alpha=0.3),
