@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from netem.links import Links
+from world import history
 from world.history import Arrays
 
-# In the order in which a tick makes them, so that a cause is named before what follows from it.
-_OF_AGENTS = ("target", "position", "known", "estimate", "covariance", "psi", "feasible", "input")
 _OF_LINKS = ("measured",)
 _OF_CHANNELS = ("fates", "newest")
-_ORDER = (
+# In the order in which a tick makes them, so that a cause is named before what follows from it; what estimators report and the
+# input come after.
+_MADE = (
     "target",
     "position",
     "error",
@@ -31,8 +32,8 @@ _ORDER = (
     "covariance",
     "psi",
     "feasible",
-    "input",
 )
+_OF_NOBODY = ("error", "copies", "late", "dropped")
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     """The first difference of two runs over the same links and channels; None when every bit is the same."""
     parted = [
         (tick, place, name)
-        for place, name in enumerate(_ORDER)
+        for place, name in enumerate((*_MADE, *sorted(one.keys() - {*_MADE, "input"}), "input"))
         if (tick := _first_tick(one[name], other[name])) is not None
     ]
     if not parted:
@@ -94,7 +95,7 @@ def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:
 def _unlike(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.bool_]:
     """Where two arrays differ in any bit: a NaN is like itself, and 0.0 is not -0.0."""
     if one.dtype.kind == "f":
-        one, other = (np.ascontiguousarray(array).view(np.uint64) for array in (one, other))
+        one, other = (history.one_nan(array).view(np.uint64) for array in (one, other))
     unlike: NDArray[np.bool_] = np.not_equal(one, other)
     return unlike
 
@@ -104,4 +105,4 @@ def _where(name: str, row: tuple[int, ...], links: Links, channels: Sequence[str
         return f"{links.src[row[0]]}->{links.dst[row[0]]}"
     if name in _OF_CHANNELS:
         return f"{channels[row[0]]} on {links.src[row[1]]}->{links.dst[row[1]]}"
-    return f"agent {row[0] + 1}" if name in _OF_AGENTS else ""
+    return "" if name in _OF_NOBODY else f"agent {row[0] + 1}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.affine import Manoeuvre
+from analysis.algebra import sum_over
 from analysis.pursuit import Sighting, Target
 from analysis.sensor import Sensor
 
@@ -110,8 +111,7 @@ class Brief:
     @cached_property
     def degree(self) -> Array:
         """gamma_i = sum_j l_ij, shape (...)."""
-        total: Array = self.stress.sum(axis=-1)
-        return total
+        return sum_over(self.stress, -1)
 
     @property
     def dimension(self) -> int:

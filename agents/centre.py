@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.brief import Array, Mask
+from analysis.algebra import product
 from analysis.sensor import Sensor
 
 
@@ -59,7 +60,7 @@ class Centre:
     def begin(self, batch: tuple[int, ...]) -> Whole:
         """Everybody at the same place, as far as is known (9a)-(9b)."""
         agents, size = len(self.neighbours), len(self.process)
-        prior = self.prior_position**2 * np.eye(size)
+        prior = self.prior_position * self.prior_position * np.eye(size)
         return Whole(np.zeros((*batch, agents, size // agents)), np.broadcast_to(prior, (*batch, size, size)).copy())
 
     def step(self, state: Whole, measured: Array, seen: Mask, inputs: Array) -> tuple[Whole, Told]:
@@ -76,12 +77,12 @@ class Centre:
         position = state.position + self.dt * inputs
         covariance = state.covariance + self.process
         precision = np.where(seen[..., None, None], np.linalg.inv(self.sensor.spread(measured)), 0.0)
-        surprise = precision @ (measured - self._edges(position))[..., None]
-        pulled = self._incidence @ surprise.reshape(*seen.shape[:-2], -1, dimension)
+        surprise = product(precision, (measured - self._edges(position))[..., None])
+        pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))
         information = self._information(precision)
-        solved = np.linalg.solve(np.eye(agents * dimension) + covariance @ information, covariance)
+        solved = np.linalg.solve(np.eye(agents * dimension) + product(covariance, information), covariance)
         corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
-        moved = (corrected @ pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
+        moved = product(corrected, pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
         whole = Whole(position + moved.reshape(position.shape), corrected)
         return whole, Told(self._edges(whole.position), self._spread(corrected, agents, dimension))
 
@@ -89,7 +90,7 @@ class Centre:
         """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""
         agents, dimension = len(self.neighbours), precision.shape[-1]
         batch = precision.shape[:-4]
-        pairs = self._pairs @ precision.reshape(*batch, -1, dimension * dimension)
+        pairs = product(self._pairs, precision.reshape(*batch, -1, dimension * dimension))
         blocks = pairs.reshape(*batch, agents, agents, dimension, dimension)
         return np.swapaxes(blocks, -3, -2).reshape(*batch, agents * dimension, agents * dimension)
 

@@ -14,6 +14,7 @@ import numpy as np
 from agents.brief import Array, Brief, Own, Reading
 from agents.estimators.base import Estimate, Heard
 from analysis.affine import Manoeuvre
+from analysis.algebra import sum_over
 from analysis.unsuited import Unsuited
 
 State = TypeVar("State")
@@ -214,8 +215,7 @@ def stress_force(brief: Brief, estimate: Estimate) -> Array:
 
 def weighted(stress: Array, of_neighbours: Array) -> Array:
     """Sum over the neighbours of their weights (..., n) by what is known of each (..., n, D), shape (..., D)."""
-    total: Array = (stress[..., None] * of_neighbours).sum(axis=-2)
-    return total
+    return sum_over(stress[..., None] * of_neighbours, -2)
 
 
 def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array) -> Array:

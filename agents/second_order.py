@@ -134,7 +134,7 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
     # The velocity at the tick itself; that from one tick to the next would be half a tick ahead.
     wanted = mission.velocity(tick, brief.nominal, brief.dt) - 0.5 * brief.dt * acceleration
     astray = mission.target(tick, brief.nominal) - position
-    pull = gain**2 * astray + 2.0 * gain * (wanted - velocity)
+    pull = gain * gain * astray + 2.0 * gain * (wanted - velocity)
     return acceleration + pull
 
 

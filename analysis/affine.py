@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
+
 Array = NDArray[np.float64]
 
 
@@ -31,7 +33,7 @@ class Manoeuvre:
         Ticks and agents broadcast against each other; before its first and after its last tick the manoeuvre rests.
         """
         reached = np.clip(tick, 0, len(self.theta) - 1)
-        return (self.theta[reached] @ nominal[..., None])[..., 0] + self.offset[reached]
+        return product(self.theta[reached], nominal[..., None])[..., 0] + self.offset[reached]
 
     def velocity(self, tick: int | NDArray[np.int64], nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""

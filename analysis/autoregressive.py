@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
+from analysis.algebra import product
+
 Array = NDArray[np.float64]
 
 
@@ -54,5 +56,5 @@ def fit(signals: Array, order: int) -> Model:
     if covariance[0] == 0.0:
         raise ValueError("the inputs are zero throughout: there is nothing to fit")
     a = solve_toeplitz(covariance[:order], covariance[1:])
-    driven = max(covariance[0] - float(a @ covariance[1:]), 0.0)
+    driven = max(covariance[0] - float(product(a, covariance[1:])), 0.0)
     return Model(tuple(a.tolist()), float(np.sqrt(driven)), float(np.sqrt(covariance[0])))

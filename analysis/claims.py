@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
+from analysis.elementary import log, whole_power
+
 Array = NDArray[np.float64]
 Span = tuple[float, float | None]
 
@@ -91,10 +94,10 @@ def exponential(says: str, seconds: Array, error: Array, span: Span) -> Verdict:
     inside = within(seconds, span)
     # Runs may diverge, stand still, or end at 0.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        time, logarithm = seconds[inside] - seconds[inside].mean(), np.log(error[:, inside])
-        slope = (logarithm @ time) / (time @ time)
+        time, logarithm = seconds[inside] - seconds[inside].mean(), log(error[:, inside])
+        slope = product(logarithm, time) / product(time, time)
         total = logarithm - logarithm.mean(axis=1, keepdims=True)
-        explained = 1.0 - ((total - slope[:, None] * time) ** 2).sum(axis=1) / (total**2).sum(axis=1)
+        explained = 1.0 - whole_power(total - slope[:, None] * time, 2).sum(axis=1) / whole_power(total, 2).sum(axis=1)
         straight = (explained >= _STRAIGHT) & (slope < 0.0)
     rate = f", by {-slope[straight].mean():.3g} 1/s" if straight.any() else ""
     found = f"{straight.mean():.0%} of the runs fall along a line (R² at least {_STRAIGHT:g}){rate}"

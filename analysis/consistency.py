@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
+from analysis.algebra import sum_over
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -122,5 +124,5 @@ def _smallest(matrix: Array) -> Array:
 
 def _averaged(normalised: Array, counted: Mask) -> Normalised:
     number = counted.sum(axis=(-2, -1))
-    total = np.where(counted, normalised, 0.0).sum(axis=(-2, -1))
+    total = sum_over(np.where(counted, normalised, 0.0), (-2, -1))
     return Normalised(np.where(number > 0, total / np.maximum(number, 1), np.nan), number)

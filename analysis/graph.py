@@ -12,6 +12,8 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -175,7 +177,7 @@ def grams(sees: Mask, nominal: Array) -> Array:
     dimension = nominal.shape[-1]
     relative = nominal[..., :, None, :] - nominal[..., None, :, :]
     products = (relative[..., :, None] * relative[..., None, :]).reshape(*relative.shape[:-1], dimension**2)
-    flat = (sees[..., None, :].astype(np.float64) @ products)[..., 0, :]
+    flat = product(sees[..., None, :].astype(np.float64), products)[..., 0, :]
     return flat.reshape(*flat.shape[:-1], dimension, dimension)
 
 
@@ -221,5 +223,5 @@ def reached(adjacency: Mask) -> Mask:
     agents = adjacency.shape[-1]
     reach = (adjacency | np.eye(agents, dtype=np.bool_)).astype(np.float64)
     for _ in range((agents - 1).bit_length()):
-        reach = np.minimum(reach @ reach, 1.0)
+        reach = np.minimum(product(reach, reach), 1.0)
     return reach > 0.0

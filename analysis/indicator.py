@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product, sum_over
 from analysis.graph import grams, regular
 
 Array = NDArray[np.float64]
@@ -63,22 +64,22 @@ def bounds(
     share = np.where(defined, 1.0 / np.maximum(number, 1), np.nan)
 
     apart = _squared_distances(_readings(relative, sees, inverse))
-    slope = here.sum(axis=-1)[..., None] * share * np.where(counts, apart, 0.0).sum(axis=-1)
+    slope = here.sum(axis=-1)[..., None] * share * sum_over(np.where(counts, apart, 0.0), -1)
     spread = np.einsum("...ii", inverse)  # ||Phi_i||_F^2
-    pairs = np.where(counts, spread[..., :, None] + spread[..., None, :], 0.0).sum(axis=-1)
+    pairs = sum_over(np.where(counts, spread[..., :, None] + spread[..., None, :], 0.0), -1)
     return Bounds(slope, np.trace(covariance) * share * pairs)
 
 
 def _readings(relative: Array, sees: Mask, inverse: Array) -> Array:
     """B_i Phi_i^T, flat, shape (..., N, N D): how agent i's fit reads everybody's position."""
-    phi = np.where(sees[..., None], relative @ inverse, 0.0)
-    own = np.eye(sees.shape[-1])[..., None] * phi.sum(axis=-2, keepdims=True)
+    phi = np.where(sees[..., None], product(relative, inverse), 0.0)
+    own = np.eye(sees.shape[-1])[..., None] * sum_over(phi, -2)[..., None, :]
     return (own - phi).reshape(*phi.shape[:-2], -1)
 
 
 def _squared_distances(rows: Array) -> Array:
     """Between all pairs of rows (..., N, M), shape (..., N, N)."""
-    products = rows @ np.swapaxes(rows, -1, -2)
+    products = product(rows, np.swapaxes(rows, -1, -2))
     squares = np.einsum("...ii->...i", products)
     sizes = squares[..., :, None] + squares[..., None, :]
     apart = sizes - 2.0 * products

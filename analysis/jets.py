@@ -11,6 +11,9 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
+from analysis.elementary import whole_power
+
 Array = NDArray[np.float64]
 
 
@@ -18,7 +21,9 @@ def times(one: Array, other: Array) -> Array:
     """The jet of a matrix product, of jets (m + 1, ..., r, s) and (m + 1, ..., s, c)."""
     return np.stack(
         [
-            reduce(np.add, [comb(order, lower) * (one[lower] @ other[order - lower]) for lower in range(order + 1)])
+            reduce(
+                np.add, [comb(order, lower) * product(one[lower], other[order - lower]) for lower in range(order + 1)]
+            )
             for order in range(len(one))
         ]
     )
@@ -40,9 +45,9 @@ def inverse(matrix: Array) -> Array:
     inverted = [np.linalg.inv(matrix[0])]
     for order in range(1, len(matrix)):
         drawn = reduce(
-            np.add, [comb(order, lower) * (matrix[order - lower] @ inverted[lower]) for lower in range(order)]
+            np.add, [comb(order, lower) * product(matrix[order - lower], inverted[lower]) for lower in range(order)]
         )
-        inverted.append(-inverted[0] @ drawn)
+        inverted.append(product(-inverted[0], drawn))
     return np.stack(inverted)
 
 
@@ -60,5 +65,5 @@ def power(base: Array, exponent: int, rate: Array, orders: int) -> Array:
     jet = []
     for order in range(orders):
         falling = float(np.prod(np.arange(exponent - order + 1, exponent + 1))) if order <= exponent else 0.0
-        jet.append(falling * base ** max(exponent - order, 0) * rate**order)
+        jet.append(falling * whole_power(base, max(exponent - order, 0)) * whole_power(rate, order))
     return np.stack(jet)

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product, sum_over
 from analysis.metrics import root_mean_square
 
 Array = NDArray[np.float64]
@@ -48,14 +49,13 @@ def together(relative: Array, information: Array) -> Edges:
     information
         Inverse covariance of each, shape (..., N, N, D, D), in 1/m2; 0 where i did not measure j.
     """
-    pull = (information @ relative[..., None])[..., 0]
+    pull = product(information, relative[..., None])[..., 0]
     return Edges(information + np.swapaxes(information, -4, -3), pull - np.swapaxes(pull, -3, -2))
 
 
 def weights(edges: Edges) -> Array:
     """Upsilon_ii of every agent, shape (..., N, D, D): what it counts in the weighted centroid (7)."""
-    total: Array = edges.information.sum(axis=-3)
-    return total
+    return sum_over(edges.information, -3)
 
 
 def system(edges: Edges) -> tuple[Array, Array]:
@@ -64,7 +64,7 @@ def system(edges: Edges) -> tuple[Array, Array]:
     agents, dimension = own.shape[-3], own.shape[-1]
     blocks = np.eye(agents)[:, :, None, None] * own[..., :, None, :, :] - edges.information
     matrix = np.swapaxes(blocks, -3, -2).reshape(*own.shape[:-3], agents * dimension, agents * dimension)
-    return matrix, edges.pull.sum(axis=-2).reshape(*own.shape[:-3], agents * dimension)
+    return matrix, sum_over(edges.pull, -2).reshape(*own.shape[:-3], agents * dimension)
 
 
 def centred(place: Array, own: Array) -> Array:
@@ -74,7 +74,7 @@ def centred(place: Array, own: Array) -> Array:
 
 def centroid(place: Array, own: Array) -> Array:
     """The weighted centroid (w^T (1 x I))^-1 w^T x of positions (..., N, D), shape (..., D), in metres; NaN without weights."""
-    weighed, total = (own @ place[..., None]).sum(axis=-3), own.sum(axis=-3)
+    weighed, total = sum_over(product(own, place[..., None]), -3), sum_over(own, -3)
     counts = np.asarray(np.linalg.det(total) != 0.0)[..., None, None]
     solved = np.linalg.solve(np.where(counts, total, np.eye(total.shape[-1])), weighed)
     return np.asarray(np.where(counts, solved, np.nan)[..., 0], dtype=np.float64)
@@ -162,9 +162,9 @@ def _symmetric(edges: Edges) -> Array:
     """D^-1/2 Upsilon D^-1/2, shape (..., N D, N D), which has the eigenvalues of D^-1 Upsilon."""
     matrix, _ = system(edges)
     values, vectors = np.linalg.eigh(weights(edges))
-    root = (vectors / np.sqrt(values)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    root = product(vectors / np.sqrt(values)[..., None, :], np.swapaxes(vectors, -1, -2))
     agents, dimension = root.shape[-3], root.shape[-1]
     blocks = matrix.reshape(*matrix.shape[:-2], agents, dimension, agents, dimension)
     blocks = np.swapaxes(blocks, -3, -2)
-    blocks = root[..., :, None, :, :] @ blocks @ root[..., None, :, :, :]
+    blocks = product(root[..., :, None, :, :], blocks, root[..., None, :, :, :])
     return np.swapaxes(blocks, -3, -2).reshape(matrix.shape)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product, sum_over
+from analysis.elementary import whole_power
+
 Array = NDArray[np.float64]
 
 
@@ -23,9 +26,9 @@ def tracking_error(position: Array, target: Array, present: NDArray[np.bool_]) -
     Array
         Shape (...); NaN where nobody is present.
     """
-    squared = ((position - target) ** 2).sum(axis=-1)
+    squared = sum_over(whole_power(position - target, 2), -1)
     number = present.sum(axis=-1)
-    total = np.where(present, squared, 0.0).sum(axis=-1)
+    total = sum_over(np.where(present, squared, 0.0), -1)
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
@@ -54,9 +57,9 @@ def procrustes_error(position: Array, nominal: Array, present: NDArray[np.bool_]
     number = np.maximum(present.sum(axis=-1), 1)
     Z, P = _centred(position, present), _centred(np.broadcast_to(nominal, position.shape), present)
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(Z).all(axis=(-2, -1)))
-    spread: Array = np.swapaxes(np.where(finite[..., None, None], Z, 0.0), -1, -2) @ P
+    spread: Array = product(np.swapaxes(np.where(finite[..., None, None], Z, 0.0), -1, -2), P)
     U, _, Vt = np.linalg.svd(spread)
-    squared = ((Z @ (U @ Vt) - P) ** 2).sum(axis=(-2, -1))
+    squared = sum_over(whole_power(product(Z, product(U, Vt)) - P, 2), (-2, -1))
     return np.where(finite, np.sqrt(squared) / number, np.nan)
 
 
@@ -70,20 +73,18 @@ def estimation_error(estimate: Array, true: Array, known: NDArray[np.bool_]) -> 
     known
         Which edges have an estimate, shape (..., N, n).
     """
-    squared = ((estimate - true) ** 2).sum(axis=-1)
-    total: Array = np.sqrt(np.where(known, squared, 0.0).sum(axis=(-2, -1)))
-    return total
+    squared = sum_over(whole_power(estimate - true, 2), -1)
+    return np.sqrt(sum_over(np.where(known, squared, 0.0), (-2, -1)))
 
 
 def covariance_trace(triangles: Array, dimension: int) -> Array:
     """The trace of the covariances of all edges, from their upper triangles (..., N, n, D (D + 1) / 2), shape (...), in m2."""
     diagonal = np.cumsum([0, *range(dimension, 1, -1)])
-    total: Array = triangles[..., diagonal].sum(axis=(-3, -2, -1))
-    return total
+    return sum_over(triangles[..., diagonal], (-3, -2, -1))
 
 
 def _centred(points: Array, present: NDArray[np.bool_]) -> Array:
     taking_part = present[..., None]
-    centre = np.where(taking_part, points, 0.0).sum(axis=-2, keepdims=True)
+    centre = sum_over(np.where(taking_part, points, 0.0), -2)[..., None, :]
     centre = centre / np.maximum(present.sum(axis=-1), 1)[..., None, None]
     return np.where(taking_part, points - centre, 0.0)

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.elementary import whole_powers
+
 Array = NDArray[np.float64]
 
 
@@ -60,7 +62,7 @@ def transition(order: int, seconds: Array) -> Array:
     steps = np.arange(order)[None, :] - np.arange(order)[:, None]
     forward = np.maximum(steps, 0)
     factorials = np.array([float(factorial(step)) for step in range(order)])
-    powers = np.asarray(seconds)[..., None, None] ** forward / factorials[forward]
+    powers = whole_powers(seconds, order)[..., forward] / factorials[forward]
     return np.where(steps >= 0, powers, 0.0)
 
 
@@ -70,6 +72,6 @@ def diffusion(order: int, seconds: Array, intensity: float) -> Array:
     exponent = lower[:, None] + lower[None, :] + 1
     scale = np.array([float(factorial(step)) for step in range(order)])[lower]
     spread: Array = (
-        intensity * np.asarray(seconds)[..., None, None] ** exponent / (exponent * scale[:, None] * scale[None, :])
+        intensity * whole_powers(seconds, 2 * order)[..., exponent] / (exponent * scale[:, None] * scale[None, :])
     )
     return spread

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.elementary import arctan2, cos, exp, expm1, hypot, sin
 from analysis.unsuited import Unsuited
 
 Array = NDArray[np.float64]
@@ -130,10 +131,10 @@ def _direction(angles: Array, variances: Array) -> tuple[Array, Array, Array]:
 
 def _circle(angle: Array, variance: float) -> tuple[Array, Array, Array]:
     """Mean (..., 2), second moments and covariance (..., 2, 2) of cosine and sine of a normal angle."""
-    kept, lost = np.exp(-variance), -np.expm1(-variance)
-    cosine, sine = np.cos(2.0 * angle), np.sin(2.0 * angle)
-    mean = np.sqrt(kept) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    second = 0.5 * _matrix(1.0 + kept**2 * cosine, kept**2 * sine, 1.0 - kept**2 * cosine)
+    kept, lost = exp(-variance), -expm1(-variance)
+    cosine, sine = cos(2.0 * angle), sin(2.0 * angle)
+    mean = np.sqrt(kept) * np.stack([cos(angle), sin(angle)], axis=-1)
+    second = 0.5 * _matrix(1.0 + kept * kept * cosine, kept * kept * sine, 1.0 - kept * kept * cosine)
     covariance = 0.5 * lost * _matrix(1.0 - kept * cosine, -kept * sine, 1.0 + kept * cosine)
     return mean, second, covariance
 
@@ -144,17 +145,17 @@ def _matrix(first: Array, mixed: Array, last: Array) -> Array:
 
 def _shrinking(variances: Array) -> Array:
     """By what factors the mean of the coordinates is too small (4.3), shape (D,)."""
-    angles = np.exp(-variances[1:] / 2)
+    angles = exp(-variances[1:] / 2)
     level = angles.prod()
     return np.array([level, level, *angles[1:]])
 
 
 def _polar(position: Array) -> Array:
-    planar = np.hypot(position[..., 0], position[..., 1])
-    azimuth = np.arctan2(position[..., 1], position[..., 0])
+    planar = hypot(position[..., 0], position[..., 1])
+    azimuth = arctan2(position[..., 1], position[..., 0])
     if position.shape[-1] == 2:
         return np.stack([planar, azimuth], axis=-1)
-    return np.stack([np.hypot(planar, position[..., 2]), azimuth, np.arctan2(position[..., 2], planar)], axis=-1)
+    return np.stack([hypot(planar, position[..., 2]), azimuth, arctan2(position[..., 2], planar)], axis=-1)
 
 
 def _turned(line: Array, offset: Array) -> Array:
@@ -173,6 +174,6 @@ def _turned(line: Array, offset: Array) -> Array:
 def _cartesian(polar: Array) -> Array:
     reach, azimuth = polar[..., 0], polar[..., 1]
     if polar.shape[-1] == 2:
-        return np.stack([reach * np.cos(azimuth), reach * np.sin(azimuth)], axis=-1)
-    planar = reach * np.cos(polar[..., 2])
-    return np.stack([planar * np.cos(azimuth), planar * np.sin(azimuth), reach * np.sin(polar[..., 2])], axis=-1)
+        return np.stack([reach * cos(azimuth), reach * sin(azimuth)], axis=-1)
+    planar = reach * cos(polar[..., 2])
+    return np.stack([planar * cos(azimuth), planar * sin(azimuth), reach * sin(polar[..., 2])], axis=-1)

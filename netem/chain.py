@@ -14,6 +14,7 @@ from functools import cached_property, reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
 from netem.draws import Array
 from netem.links import Integers
 
@@ -58,7 +59,7 @@ class Chain:
         # Cesaro limit by repeated squaring of the lazy chain, which has the same stationary distributions and no period.
         lazy = (self.transition + np.eye(states)) / 2.0
         for _ in range(60):
-            lazy = lazy @ lazy
+            lazy = product(lazy, lazy)
             lazy /= lazy.sum(axis=-1, keepdims=True)
         mixture: Array = lazy.mean(axis=0)
         return mixture
@@ -66,7 +67,7 @@ class Chain:
     @property
     def mean_loss(self) -> float:
         """Share of messages lost: sum of pi_s q_s."""
-        return float(self.stationary @ self.loss)
+        return float(product(self.stationary, self.loss))
 
     @property
     def mean_burst(self) -> float:
@@ -81,11 +82,11 @@ class Chain:
         if not self._burst_begins.any():
             return np.full(longest, np.nan)
         going_on = self._burst_begins / self._burst_begins.sum()
-        ends = self.transition @ (1.0 - self.loss)
+        ends = product(self.transition, 1.0 - self.loss)
         lengths = np.empty(longest)
         for n in range(longest):
-            lengths[n] = going_on @ ends
-            going_on = going_on @ self.transition @ self._lost
+            lengths[n] = product(going_on, ends)
+            going_on = product(going_on, self.transition, self._lost)
         return lengths
 
     @property
@@ -93,17 +94,17 @@ class Chain:
         """Mean age of information with one message a step and no delay, in steps: sum over n of P(the last n all lost)."""
         states = len(self.loss)
         try:
-            run = np.linalg.solve((np.eye(states) - self.transition @ self._lost), np.ones(states))
+            run = np.linalg.solve((np.eye(states) - product(self.transition, self._lost)), np.ones(states))
         except np.linalg.LinAlgError:
             return float("inf")
-        age = float(self.stationary @ self._lost @ run)
+        age = float(product(self.stationary, self._lost, run))
         return age if 0.0 <= age < 1e12 else float("inf")
 
     @property
     def mean_extra_delay(self) -> float:
         """Of the messages that pass, in seconds; NaN when none do."""
         passing = self.stationary * (1.0 - self.loss)
-        return float(passing @ self.extra_delay / passing.sum()) if passing.sum() > 0.0 else float("nan")
+        return float(product(passing, self.extra_delay) / passing.sum()) if passing.sum() > 0.0 else float("nan")
 
     def together(self, other: Chain) -> Chain:
         """Two independent chains on one link: a message passes when both let it, and their delays add."""
@@ -120,7 +121,7 @@ class Chain:
     @property
     def _burst_begins(self) -> Array:
         """Probability that a message passes and the next is lost, by the state of the next, shape (S,)."""
-        begins: Array = (self.stationary * (1.0 - self.loss)) @ self.transition * self.loss
+        begins: Array = product(self.stationary * (1.0 - self.loss), self.transition) * self.loss
         return begins
 
 

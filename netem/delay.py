@@ -13,6 +13,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from analysis.elementary import exp, log, power, whole_power
 from netem.draws import Array
 from netem.links import Integers, Mask
 
@@ -73,10 +74,10 @@ class Delay:
             case Law.NORMAL:
                 seconds = self.mean + self.jitter * ndtri(u)
             case Law.EXPONENTIAL:
-                seconds = -self.mean * np.log1p(-u)
+                seconds = -self.mean * log(1.0 - u)
             case Law.PARETO:
                 shape = self._shape
-                seconds = self.mean * (shape - 1.0) / shape * (1.0 - u) ** (-1.0 / shape)
+                seconds = self.mean * (shape - 1.0) / shape * power(1.0 - u, -1.0 / shape)
             case Law.TABLE:
                 place = (u * len(self.table)).astype(np.int64)
                 seconds = self.table[np.minimum(place, len(self.table) - 1)]
@@ -88,10 +89,10 @@ class Delay:
         mean, jitter = self.mean, self.jitter
         match self.law:
             case Law.UNIFORM if jitter > mean:
-                return (mean + jitter) ** 2 / (4.0 * jitter)
+                return (mean + jitter) * (mean + jitter) / (4.0 * jitter)
             case Law.NORMAL if jitter > 0.0:
                 ratio = mean / jitter
-                density = np.exp(-ratio * ratio / 2.0) / np.sqrt(2.0 * np.pi)
+                density = exp(-ratio * ratio / 2.0) / np.sqrt(2.0 * np.pi)
                 return float(mean * ndtr(ratio) + jitter * density)
             case Law.TABLE:
                 return float(self.table.mean())
@@ -100,7 +101,7 @@ class Delay:
     @property
     def _shape(self) -> float:
         # Pareto (type I) with this mean and standard deviation: (sd / mean)^2 = 1 / (a (a - 2)).
-        return 1.0 + float(np.sqrt(1.0 + (self.mean / self.jitter) ** 2))
+        return 1.0 + float(np.sqrt(1.0 + whole_power(self.mean / self.jitter, 2)))
 
 
 def ticks(seconds: Array, dt: float) -> Integers:
@@ -110,5 +111,5 @@ def ticks(seconds: Array, dt: float) -> Integers:
 
 def correlated(before: Array, fresh: Array, correlation: float) -> Array:
     """The next values of Gaussian sequences: standard normal again, with this correlation to the last."""
-    following: Array = correlation * before + (1.0 - correlation**2) ** 0.5 * fresh
+    following: Array = correlation * before + np.sqrt(1.0 - correlation * correlation) * fresh
     return following

@@ -39,6 +39,6 @@ class Zone:
         One draw a tick serves the whole zone: its links share their fate. In the zone, mean loss is `share`.
         """
         apart = position - self.centre
-        inside = (apart * apart).sum(axis=-1) <= self.radius**2
+        inside = (apart * apart).sum(axis=-1) <= self.radius * self.radius
         struck: Mask = inside[receivers] & self.rows
         return struck

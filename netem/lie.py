@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.algebra import product
 from netem.channels import THETA
 from netem.fault import Fault
 
@@ -16,4 +17,6 @@ CHANNEL = THETA
 def told(fields: Mapping[str, Any], liar: Fault) -> dict[str, Any]:
     """The fields (..., D, D) of maps that a liar tells, each multiplied by its matrix; other fields as they are."""
     matrix = np.array(liar.matrix)
-    return {name: matrix @ field if field.shape[-2:] == matrix.shape else field for name, field in fields.items()}
+    return {
+        name: product(matrix, field) if field.shape[-2:] == matrix.shape else field for name, field in fields.items()
+    }

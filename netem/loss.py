@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.algebra import product
 from netem.chain import ROUNDING, Chain, steady
 
 
@@ -86,7 +87,7 @@ def bursts(loss: float, lengths: Sequence[float]) -> Chain:
     chances = np.array(lengths, dtype=np.float64)
     if not len(chances) or (chances < 0.0).any() or abs(chances.sum() - 1.0) > 1e-9:
         raise ValueError(f"lengths must be probabilities that add up to 1, got {list(lengths)}")
-    mean = float(chances @ np.arange(1, len(chances) + 1))
+    mean = float(product(chances, np.arange(1, len(chances) + 1)))
     most = mean / (mean + 1.0)
     if not 0.0 <= loss <= most + ROUNDING:
         raise ValueError(f"bursts of mean length {mean:g} lose at most {most:.4g} of all messages, not {loss:g}")

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from analysis.elementary import power
 from netem.draws import Array
 from netem.links import Integers, Mask
 
@@ -67,7 +68,7 @@ class Reach:
         if self.law is Law.RAMP:
             farthest = self.outer - draw * (self.outer - self.inner)
         else:
-            farthest = self.outer * 10.0 ** (self.shadowing * shadow / (10.0 * self.exponent))
+            farthest = self.outer * power(10.0, self.shadowing * shadow / (10.0 * self.exponent))
         limited: Array = np.where(self.rows, farthest, np.inf)
         return limited
 

@@ -9,7 +9,7 @@ import pytest
 
 from affinet import plan, scenario
 from agents.agent import Agent, renew
-from agents.controllers import ConstantVelocity, Static, VaryingVelocity
+from agents.controllers import ConstantVelocity, Rest, Static, VaryingVelocity
 from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
@@ -21,6 +21,7 @@ from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
+from agents.estimators.silent import SilentEdgeFilter
 from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
 
 TICKS, RUNS = 10, 3
@@ -46,9 +47,11 @@ ESTIMATORS = {
     "mmse": MinimumMeanSquareError(),
     "edge-kf": EdgeKalmanFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
     "joint-kf": JointEdgeFilter(coefficients=(0.8, -0.1), sigma_n=0.1),
+    "silent-kf": SilentEdgeFilter(window=3),
     "jor": JacobiOverRelaxation(),
 }
 LAWS = {
+    "rest": Rest(),
     "static": Static(),
     "constant-velocity": ConstantVelocity(),
     "communicated": VaryingVelocity(relaxation=0.7),

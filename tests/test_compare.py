@@ -51,6 +51,19 @@ def test_the_first_difference_is_named(changes, named, arrays):
     assert str(compared(arrays, **changes)).startswith(named)
 
 
+def test_what_estimators_report_is_compared_too(arrays):
+    reporting = arrays | {"reference": np.zeros((50, 7, 2))}
+    difference = compared(reporting, reference=((8, 2, 1), 1.0), input=((8, 0, 0), 1.0))
+    assert str(difference) == "tick 8: reference of agent 3 is 0.0 in one run and 1.0 in the other"
+
+
+def test_one_nan_is_like_another(arrays):
+    one, other = ({**arrays, "psi": np.where(np.isnan(arrays["psi"]), nan, arrays["psi"])} for nan in (np.nan, -np.nan))
+    assert one["psi"].tobytes() != other["psi"].tobytes()
+    assert first_difference(one, other, PLAN.world.links, PLAN.channels) is None
+    assert history.digest(one) == history.digest(other) == history.digest(arrays)
+
+
 def test_links_that_measured_otherwise_are_named_by_their_ends(arrays):
     for link, (src, dst) in enumerate(zip(PLAN.world.links.src, PLAN.world.links.dst, strict=True)):
         here = arrays["measured"][9, link, 1].item()

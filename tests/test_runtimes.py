@@ -1,12 +1,14 @@
 """One implementation, two runtimes, the same bits."""
 
 import json
+from importlib.metadata import entry_points
 
 import numpy as np
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 
 from affinet import scenario
+from affinet.registry import ESTIMATORS
 from affinet.run import fly, rehearse
 from world import history
 
@@ -18,7 +20,11 @@ COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
 SHORTENED = {
     **dict.fromkeys(("ravine", "corridor", "hexa", "rigid"), ("time.duration=15",)),
     "switching": ("time.dt=0.1",),
-    "target": ("time.duration=4", "agents.parameters.target.theta=2"),
+    "target": (
+        "time.dt=0.01",
+        "time.duration=1.7",
+        "agents.parameters.target.theta=2",
+    ),  # detections take 0.5 s, or 1 s
 }
 
 
@@ -41,23 +47,23 @@ def test_two_runs_over_processes_agree_and_two_seeds_do_not(tmp_path):
     assert first == second != other
 
 
-@pytest.mark.parametrize(
-    "air",
-    [
-        ("network.delay_ticks=2",),
-        ('time.exchange="next-tick"', "agents.parameters.varying-velocity.relaxation=0.3"),
-        (
-            "network.coupled=false",
-            "network.delay_ticks=1",
-            'network.links=[{links="2->4",availability=0.1,delay_ticks=5}]',
-        ),
-        ('agents.estimator="none"', 'agents.law="static"'),
-        ('agents.parameters.varying-velocity.source="feed-forward"', "dynamics.disturbance=0.001"),
-        ('agents.parameters.varying-velocity.source="estimated"', 'agents.parameters.ga-rkf.geometry="ral"'),
-        ('timeline=[{verb="kill",at=0.5,agents=[4,6]},{verb="restart",at=1.0,agents=[4]}]', "network.delay_ticks=3"),
-    ],
-    ids=["delay", "next-tick", "uncoupled", "bare", "feed-forward", "estimated", "kill-under-delay"],
+AIRS = (
+    ("network.delay_ticks=2",),
+    ('time.exchange="next-tick"', "agents.parameters.varying-velocity.relaxation=0.3"),
+    (
+        "network.coupled=false",
+        "network.delay_ticks=1",
+        'network.links=[{links="2->4",availability=0.1,delay_ticks=5}]',
+    ),
+    ('agents.estimator="none"', 'agents.law="static"'),
+    ('agents.parameters.varying-velocity.source="feed-forward"', "dynamics.disturbance=0.001"),
+    ('agents.parameters.varying-velocity.source="estimated"', 'agents.parameters.ga-rkf.geometry="ral"'),
+    ('timeline=[{verb="kill",at=0.5,agents=[4,6]},{verb="restart",at=1.0,agents=[4]}]', "network.delay_ticks=3"),
 )
+AIR_NAMES = ("delay", "next-tick", "uncoupled", "bare", "feed-forward", "estimated", "kill-under-delay")
+
+
+@pytest.mark.parametrize("air", AIRS, ids=AIR_NAMES)
 def test_every_kind_of_air_and_agent_agrees(air, out):
     overrides = ("time.duration=2", *air)
     outcome = processes(out, "corridor", *overrides)
@@ -66,19 +72,19 @@ def test_every_kind_of_air_and_agent_agrees(air, out):
 
 
 BRIEFLY = "time.duration=0.4"
+KINDS = {
+    "imm": ('agents.estimator="imm"',),
+    "ral": ('agents.estimator="ral"',),
+    "conral-similarity": ('agents.estimator="conral"', 'agents.parameters.conral.constraint="similarity"'),
+    "ga-rkf-rotation": (
+        'agents.parameters.ga-rkf.constraint="rotation"',
+        'agents.parameters.ga-rkf.geometry="ral"',
+    ),
+    "rkf-constant-velocity": ('agents.estimator="rkf"', 'agents.parameters.rkf.model="constant-velocity"'),
+}
 
 
-@pytest.mark.parametrize(
-    "agents",
-    [
-        ('agents.estimator="imm"',),
-        ('agents.estimator="ral"',),
-        ('agents.estimator="conral"', 'agents.parameters.conral.constraint="similarity"'),
-        ('agents.parameters.ga-rkf.constraint="rotation"', 'agents.parameters.ga-rkf.geometry="ral"'),
-        ('agents.estimator="rkf"', 'agents.parameters.rkf.model="constant-velocity"'),
-    ],
-    ids=["imm", "ral", "conral-similarity", "ga-rkf-rotation", "rkf-constant-velocity"],
-)
+@pytest.mark.parametrize("agents", KINDS.values(), ids=KINDS)
 def test_every_kind_of_estimator_agrees(agents, out):
     outcome = processes(out, "corridor", BRIEFLY, *agents)
     assert outcome.verdict == "pass", outcome.reasons
@@ -87,7 +93,10 @@ def test_every_kind_of_estimator_agrees(agents, out):
     assert outcome.digest not in {digest_of("corridor", BRIEFLY, *agents[:-1]), digest_of("corridor", BRIEFLY)}
 
 
-@pytest.mark.parametrize("estimator", ["joint-kf", "edge-kf"])
+BY_INPUTS = ("joint-kf", "edge-kf")
+
+
+@pytest.mark.parametrize("estimator", BY_INPUTS)
 def test_filters_that_predict_by_lost_inputs_agree_too(estimator, out):
     overrides = (
         *("time.duration=0.4", "time.dt=0.02", f"agents.estimator={estimator}", "agents.parameters.static.alpha=2"),
@@ -99,6 +108,27 @@ def test_filters_that_predict_by_lost_inputs_agree_too(estimator, out):
     assert outcome.digest == digest_of("rigid", *overrides, model)
     # A setting that does nothing agrees as well.
     assert outcome.digest not in {digest_of("rigid", *overrides), digest_of("rigid", *overrides[:-1], model)}
+
+
+def flown_above():
+    """The estimators, by their classes, that fly over processes above: as a scenario has it, or as said there."""
+    by_name = {entry.name: entry.value for entry in entry_points(group=ESTIMATORS)}
+    shipped = {scenario.load(name).agents.estimator for name in scenario.shipped()}
+    said = {name for name in by_name if any(f'agents.estimator="{name}"' in kind for kind in (*AIRS, *KINDS.values()))}
+    return {by_name[name] for name in {*shipped, *said, *BY_INPUTS}}
+
+
+OTHERS = {entry.value: entry.name for entry in entry_points(group=ESTIMATORS) if entry.value not in flown_above()}
+
+
+@pytest.mark.parametrize("estimator", OTHERS.values())
+def test_every_other_estimator_agrees(estimator, out):
+    overrides = ("time.duration=0.2", "time.dt=0.02", "agents.parameters.static.alpha=2", "network.availability=0.7")
+    other = f'agents.estimator="{estimator}"'
+    outcome = processes(out, "rigid", *overrides, other)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("rigid", *overrides, other)
+    assert outcome.digest != digest_of("rigid", *overrides)
 
 
 @pytest.mark.parametrize(

@@ -561,13 +561,13 @@ def raising(run):
 
 CHECKERS = [
     (Checker("mine", raising), "mine: KeyError: 'no such' ("),
-    (Checker("mine", lambda _: None), "mine: must return a Finding, got None ("),
+    (Checker("mine", lambda _: None), "mine: must return a Finding, got None ("),  # type: ignore[return-value]
     (Checker("mine", raising) & Checker("other", raising), "mine: KeyError: 'no such' ("),
     (always(raising), "always: KeyError: 'no such' ("),
     # Before: AttributeErrors of ours, or a pass for a signal of another length.
-    (always(lambda run: run.error), "always: a signal must be bool (T,) = (20,), got float64 (20,) ("),
+    (always(lambda run: run.error), "always: a signal must be bool (T,) = (20,), got float64 (20,) ("),  # type: ignore[return-value]
     (always(lambda run: (run.error < 1)[:5]), "always: a signal must be bool (T,) = (20,), got bool (5,) ("),
-    (eventually(lambda _: True, name="once"), "once: a signal must be bool (T,) = (20,), got a bool ("),
+    (eventually(lambda _: True, name="once"), "once: a signal must be bool (T,) = (20,), got a bool ("),  # type: ignore[return-value]
 ]
 
 

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from analysis.algebra import product
+from analysis.elementary import exp, whole_power
 from world.formation import Array
 
 Shape = Literal["exponential", "squared-exponential"]
@@ -36,9 +38,9 @@ class Kernel:
         difference = position[..., :, None, :] - position[..., None, :, :]
         distance = np.sqrt((difference * difference).sum(axis=-1))
         if self.shape == "exponential":
-            correlated: Array = np.exp(-distance / self.length)
+            correlated: Array = exp(-distance / self.length)
         else:
-            correlated = np.exp(-0.5 * (distance / self.length) ** 2)
+            correlated = exp(-0.5 * whole_power(distance / self.length, 2))
         return correlated
 
 
@@ -78,14 +80,14 @@ class Disturbance:
         nominal
             Of one swarm, shape (n, D), in metres.
         """
-        drawn = white @ self._root_axes.T
+        drawn = product(white, self._root_axes.T)
         if self.kernel is not None and self.kernel.positions == "true":
-            drawn = _root(self.kernel.correlation(position)) @ drawn
+            drawn = product(_root(self.kernel.correlation(position)), drawn)
         elif self.kernel is not None:
-            drawn = _root(self.kernel.correlation(nominal)) @ drawn
+            drawn = product(_root(self.kernel.correlation(nominal)), drawn)
         if before is None:
             return drawn
-        return self.persistence * before + np.sqrt(1.0 - self.persistence**2) * drawn
+        return self.persistence * before + np.sqrt(1.0 - self.persistence * self.persistence) * drawn
 
     @cached_property
     def _root_axes(self) -> Array:

@@ -8,6 +8,7 @@ from math import factorial
 
 import numpy as np
 
+from analysis.elementary import whole_power
 from netem.timeline import Conditions
 from world.formation import Array
 
@@ -18,7 +19,9 @@ def carried(derivatives: Sequence[Array], dt: float) -> Array:
     z_k+1 = z_k + dt u_k for single integrators, z_k + dt zdot_k + dt^2 / 2 u_k for double ones, and so on.
     """
     value, *rates = derivatives
-    return reduce(np.add, [dt**order / factorial(order) * rate for order, rate in enumerate(rates, 1)], value)
+    return reduce(
+        np.add, [whole_power(dt, order) / factorial(order) * rate for order, rate in enumerate(rates, 1)], value
+    )
 
 
 def flown(commanded: Array, coasting: Array, now: Conditions) -> Array:

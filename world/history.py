@@ -280,9 +280,19 @@ def load(path: Path) -> Arrays:
 
 
 def digest(arrays: Arrays) -> str:
-    """SHA-256 over positions, inputs, estimates, indicators and verdicts, bit for bit."""
+    """SHA-256 over positions, inputs, estimates, indicators and verdicts, bit for bit.
+
+    It is the same in either runtime. Between CPUs it is as far as OpenBLAS takes the same kernels for products and inverses:
+    set OPENBLAS_CORETYPE alike to compare (docs/decisions/0001).
+    """
     total = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         total.update(f"{name}{array.dtype.str}{array.shape}".encode())
-        total.update(np.ascontiguousarray(array).tobytes())
+        total.update(one_nan(array).tobytes())
     return total.hexdigest()
+
+
+def one_nan(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, contiguous, with one NaN for all: of what sign the others are is up to the CPU."""
+    contiguous = np.ascontiguousarray(array)
+    return np.where(np.isnan(contiguous), np.nan, contiguous) if contiguous.dtype.kind == "f" else contiguous

@@ -11,6 +11,8 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import ndtr
 
 from analysis.affine import Array, Manoeuvre
+from analysis.algebra import product
+from analysis.elementary import cos, exp, sin
 
 _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _COLLAPSE = np.array([[-1.375, -0.375], [0.0, 0.0]])
@@ -52,7 +54,7 @@ def corridor(seconds: Array) -> Manoeuvre:
         ],
         axis=-1,
     )
-    return Manoeuvre(theta, course - theta @ _ANCHOR)
+    return Manoeuvre(theta, course - product(theta, _ANCHOR))
 
 
 def ravine(seconds: Array) -> Manoeuvre:
@@ -70,7 +72,7 @@ def ravine(seconds: Array) -> Manoeuvre:
     """
     blend = partial(_bell_step, seconds)
     turned = 0.5 * np.pi * blend(34, 10)
-    cosine, sine, nothing, one = np.cos(turned), np.sin(turned), np.zeros_like(turned), np.ones_like(turned)
+    cosine, sine, nothing, one = cos(turned), sin(turned), np.zeros_like(turned), np.ones_like(turned)
     yaw = _matrix([[cosine, sine, nothing], [-sine, cosine, nothing], [nothing, nothing, one]])
     width = 1.0 - 0.6 * (blend(12, 8) - blend(24, 8))
     height = 1.0 - blend(44, 6) + blend(53, 6)
@@ -80,7 +82,7 @@ def ravine(seconds: Array) -> Manoeuvre:
         0.5 * (_travel(seconds, 3, 6) - _travel(seconds, 15, 6)),
     ]
     scale = _matrix([[one, nothing, nothing], [nothing, width, nothing], [nothing, nothing, height]])
-    return Manoeuvre(yaw @ scale, np.stack(course, axis=-1))
+    return Manoeuvre(product(yaw, scale), np.stack(course, axis=-1))
 
 
 def hover(seconds: Array, dimension: int) -> Manoeuvre:
@@ -166,7 +168,7 @@ def _bell_step(seconds: Array, start: float, duration: float) -> Array:
     """F(t; t0, T) of the benchmark: the integral of a normal speed profile cut off at 4 sigma; it ends at 0.9989."""
     u = np.clip(seconds, start, start + duration)
     sigma = duration / 8
-    edge = np.exp(-8.0) / np.sqrt(2 * np.pi)
+    edge = exp(-8.0) / np.sqrt(2 * np.pi)
     step: Array = ndtr((u - start - duration / 2) / sigma) - ndtr(-4.0) - 8 * edge * (u - start) / duration
     return step
 
@@ -174,5 +176,5 @@ def _bell_step(seconds: Array, start: float, duration: float) -> Array:
 def _travel(seconds: Array, start: float, duration: float) -> Array:
     """S(t; t0, T) of the benchmark: metres covered when the speed rises from 0 to 1 m/s along half a cosine."""
     v = np.clip(seconds - start, 0.0, duration)
-    rising = (v - duration / np.pi * np.sin(np.pi * v / duration)) / 2
+    rising = (v - duration / np.pi * sin(np.pi * v / duration)) / 2
     return rising + np.maximum(seconds - start - duration, 0.0)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.algebra import product
 from analysis.pursuit import Sighting, Target, diffusion, transition
 from netem.draws import Purpose, Seed, uniform
 from netem.links import Integers
@@ -77,7 +78,7 @@ class Pursuit:
         firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
         white = normal(firsts, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
         drift, root = self._motion
-        moved = drift @ chase.target + root @ white.reshape(swarms, order, axes)
+        moved = product(drift, chase.target) + product(root, white.reshape(swarms, order, axes))
         return Chase(
             target=moved,
             method=method,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.algebra import product
 from netem.links import Links, Mask
 from netem.timeline import Conditions
 from world.formation import Array
@@ -17,7 +18,7 @@ def relative(position: Array, links: Links) -> Array:
 
 def noise(standard: Array, covariance: Array) -> Array:
     """Measurement noise v_ij with this covariance (D, D), from standard normal draws (..., D)."""
-    coloured: Array = standard @ np.linalg.cholesky(covariance).T
+    coloured: Array = product(standard, np.linalg.cholesky(covariance).T)
     return coloured
 
 

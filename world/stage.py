@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from analysis.elementary import cos, sin
 from world.formation import Array
 from world.world import World
 
@@ -35,7 +36,7 @@ def ellipses(centre: Array, covariance: Array, deviations: float) -> Array:
     values, vectors = np.linalg.eigh(covariance)
     axes = deviations * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
     first, second = np.triu_indices(centre.shape[-1], 1)
-    lines = axes[..., first][..., None] * np.cos(_CIRCLE) + axes[..., second][..., None] * np.sin(_CIRCLE)
+    lines = axes[..., first][..., None] * cos(_CIRCLE) + axes[..., second][..., None] * sin(_CIRCLE)
     return spatial(centre[..., None, None, :] + np.moveaxis(lines, -3, -1))
 
 

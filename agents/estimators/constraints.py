@@ -14,6 +14,7 @@ from agents.brief import Array, Mask
 from agents.estimators import geometry
 from agents.estimators.geometry import SINGULAR, Fit
 from agents.estimators.small import inverse, rotation
+from analysis.algebra import product
 
 Constraint = Literal["affine", "scaling", "rotation", "similarity"]
 
@@ -85,7 +86,7 @@ class Affine:
         """Least squares (10)."""
         gram = geometry.gram(relative, seen)
         feasible = self.feasible(gram)
-        theta = _cross(relative, measured) @ geometry.inverse_gram(gram, feasible)
+        theta = product(_cross(relative, measured), geometry.inverse_gram(gram, feasible))
         return _fitted(theta, feasible, gram)
 
     def nearest(self, theta: Array) -> Array:
@@ -95,7 +96,7 @@ class Affine:
     def covariance(self, shape: Fit, relative: Array, R: Array) -> Array:
         """(p_ij^T (H H^T)^-1 p_ij) R, which is (12) with one R for all edges and an identity of size N_i,k (errata)."""
         inverse_gram = geometry.inverse_gram(shape.gram, self.feasible(shape.gram))
-        leverage = (relative @ inverse_gram * relative).sum(axis=-1)
+        leverage = (product(relative, inverse_gram) * relative).sum(axis=-1)
         return leverage[..., None, None] * R
 
 
@@ -190,12 +191,12 @@ class Similarity:
         values, vectors = np.linalg.eigh(shape.gram)
         counts = values > SINGULAR * values.mean(axis=-1, keepdims=True)
         inverted = np.where(counts, 1.0, 0.0) / np.where(counts, values, 1.0)
-        pseudo = (vectors * inverted[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+        pseudo = product(vectors * inverted[..., None, :], np.swapaxes(vectors, -1, -2))
         rank = np.maximum(counts.sum(axis=-1), 1)[..., None, None]
         read = _least_squares(turns, shape.gram, self.feasible(shape.gram))
         return _spread(
             np.concatenate([turns, turn[..., None, :, :]], axis=-3),
-            np.concatenate([read, (turn @ pseudo / rank)[..., None, :, :]], axis=-3),
+            np.concatenate([read, (product(turn, pseudo) / rank)[..., None, :, :]], axis=-3),
             shape.gram,
             relative,
             R,
@@ -211,8 +212,7 @@ MAPS: Mapping[Constraint, Maps] = {
 
 
 def _cross(relative: Array, measured: Array) -> Array:
-    product: Array = np.swapaxes(measured, -1, -2) @ relative
-    return product
+    return product(np.swapaxes(measured, -1, -2), relative)
 
 
 def _fitted(theta: Array, feasible: Mask, gram: Array) -> Fit:
@@ -231,27 +231,27 @@ def _singular_values(matrix: Array) -> Array:
 
 def _turns(theta: Array) -> Array:
     """The directions K_q Theta in which the rotation of a map can move, shape (..., q, D, D)."""
-    directions: Array = _GENERATORS[theta.shape[-1]] @ rotation(theta)[..., None, :, :]
+    directions: Array = product(_GENERATORS[theta.shape[-1]], rotation(theta)[..., None, :, :])
     return directions
 
 
 def _least_squares(directions: Array, gram: Array, feasible: Mask) -> Array:
     """W_q, shape (..., q, D, D): to first order the parameter along T_q moves by sum_j (W_q h_j)^T v_j."""
     T = _flat(directions)
-    normal = T @ np.swapaxes(_flat(directions @ gram[..., None, :, :]), -1, -2)
-    solved: Array = inverse(np.where(feasible[..., None, None], normal, np.eye(T.shape[-2]))) @ T
+    normal = product(T, np.swapaxes(_flat(product(directions, gram[..., None, :, :])), -1, -2))
+    solved: Array = product(inverse(np.where(feasible[..., None, None], normal, np.eye(T.shape[-2]))), T)
     return solved.reshape(directions.shape)
 
 
 def _spread(directions: Array, read: Array, gram: Array, relative: Array, R: Array) -> Array:
     """G_ij C G_ij^T, shape (..., n, D, D), with G_ij = [T_q p_ij] and C the covariance of the parameters read by W_q."""
-    noise = R @ read @ gram[..., None, :, :]
-    C = _flat(read) @ np.swapaxes(_flat(noise), -1, -2)
+    noise = product(R, read, gram[..., None, :, :])
+    C = product(_flat(read), np.swapaxes(_flat(noise), -1, -2))
     q, dimension = directions.shape[-3:-1]
     columns = np.moveaxis(directions, -1, -3)
-    G = relative @ columns.reshape(*columns.shape[:-2], q * dimension)
+    G = product(relative, columns.reshape(*columns.shape[:-2], q * dimension))
     G = G.reshape(*G.shape[:-1], q, dimension)
-    covariance: Array = np.swapaxes(G, -1, -2) @ C[..., None, :, :] @ G
+    covariance: Array = product(np.swapaxes(G, -1, -2), C[..., None, :, :], G)
     return covariance
 
 

@@ -60,7 +60,7 @@ class EdgeKalmanFilter:
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Edges:
         """Everybody at the same place, as far as is known (5a)."""
         shape = (*batch, brief.relative.shape[-2])
-        prior = 2.0 * self.prior_position**2 * identity(brief.dimension)
+        prior = 2.0 * self.prior_position * self.prior_position * identity(brief.dimension)
         return Edges(
             mean=np.zeros((*shape, brief.dimension)),
             covariance=np.broadcast_to(prior, (*shape, *prior.shape)).copy(),
@@ -84,7 +84,7 @@ class EdgeKalmanFilter:
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
-        covariance = state.covariance + of_edges(brief) + brief.dt**2 * doubt
+        covariance = state.covariance + of_edges(brief) + brief.dt * brief.dt * doubt
         R = brief.sensor.spread(state.measured)
         filters = kalman.correct(mean, covariance, state.measured, R, state.seen)
         estimate = Estimate(

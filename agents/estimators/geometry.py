@@ -9,6 +9,8 @@ import numpy as np
 
 from agents.brief import Array, Mask
 from agents.estimators.small import determinant, inverse
+from analysis.algebra import product, sum_over
+from analysis.elementary import whole_power
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 SINGULAR = 1e-9
@@ -43,15 +45,14 @@ def gram(relative: Array, seen: Mask) -> Array:
         Shape (..., n).
     """
     H = np.where(seen[..., None], relative, 0.0)
-    product: Array = np.swapaxes(H, -1, -2) @ H
-    return product
+    return product(np.swapaxes(H, -1, -2), H)
 
 
 def regular(gram: Array) -> Mask:
     """Whether rank H = D (Remark 1), shape (...): the test is on the nominal H, never on Y."""
     dimension = gram.shape[-1]
     scale = np.einsum("...ii", gram) / dimension
-    spans: Mask = determinant(gram) > SINGULAR * scale**dimension
+    spans: Mask = determinant(gram) > SINGULAR * whole_power(scale, dimension)
     return spans
 
 
@@ -62,7 +63,7 @@ def inverse_gram(gram: Array, feasible: Mask) -> Array:
 
 def apply(theta: Array, relative: Array) -> Array:
     """Relative positions Theta p_ij under a map (..., D, D), shape (..., n, D) (eq. 11)."""
-    return relative @ np.swapaxes(theta, -1, -2)
+    return product(relative, np.swapaxes(theta, -1, -2))
 
 
 def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
@@ -81,14 +82,14 @@ def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
     """
     difference = theirs - own.theta[..., None, :, :]
     number = counts.sum(axis=-1)
-    mean = total(counts, difference * difference).sum(axis=(-2, -1)) / np.maximum(number, 1)
+    mean = sum_over(total(counts, difference * difference), (-2, -1)) / np.maximum(number, 1)
     return np.where(own.feasible & (number > 0), mean, np.nan)
 
 
 def total(counts: Mask, maps: Array) -> Array:
     """Sum of the maps (..., n, D, D) that count, shape (..., D, D)."""
     flat = maps.reshape(*maps.shape[:-2], -1)
-    summed = counts[..., None, :].astype(np.float64) @ flat
+    summed = product(counts[..., None, :].astype(np.float64), flat)
     return summed.reshape(*maps.shape[:-3], *maps.shape[-2:])
 
 

@@ -18,6 +18,8 @@ from agents.brief import Array, Brief, Mask, Own
 from agents.estimators import kalman
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.small import determinant, inverse
+from analysis.algebra import product
+from analysis.elementary import exp, log
 
 
 class Modes(NamedTuple):
@@ -76,10 +78,10 @@ class InteractingMultipleModel:
     def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
         """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""
         F, Q, chain = self._models(brief.dimension, brief.dt)
-        expected = (state.probability[..., None, :] @ chain)[..., 0, :]
+        expected = product(state.probability[..., None, :], chain)[..., 0, :]
         weights = chain * state.probability[..., :, None] / expected[..., None, :]
         mean, covariance = _mix(state.mean, state.covariance, weights)
-        mean, covariance = (F @ mean[..., None])[..., 0], F @ covariance @ np.swapaxes(F, -1, -2) + Q
+        mean, covariance = product(F, mean[..., None])[..., 0], product(F, covariance, np.swapaxes(F, -1, -2)) + Q
         observed, usable = measured[..., None, :], seen[..., None]
         R = brief.sensor.spread(measured)[..., None, :, :]
         surprise = _surprise(mean, covariance, observed, R)
@@ -132,10 +134,10 @@ def _mix(mean: Array, covariance: Array, weights: Array) -> tuple[Array, Array]:
     """
     size = mean.shape[-1]
     columns = np.swapaxes(weights, -1, -2)
-    centre = columns @ mean
-    within = (columns @ covariance.reshape(*covariance.shape[:-2], size * size)).reshape(*centre.shape, size)
+    centre = product(columns, mean)
+    within = product(columns, covariance.reshape(*covariance.shape[:-2], size * size)).reshape(*centre.shape, size)
     apart = mean[..., None, :, :] - centre[..., :, None, :]
-    between = np.swapaxes(apart, -1, -2) @ (columns[..., None] * apart)
+    between = product(np.swapaxes(apart, -1, -2), columns[..., None] * apart)
     return centre, within + between
 
 
@@ -144,14 +146,14 @@ def _surprise(mean: Array, covariance: Array, observed: Array, R: Array) -> Arra
     dimension = observed.shape[-1]
     S = covariance[..., :dimension, :dimension] + R
     innovation = observed - mean[..., :dimension]
-    squared = (innovation * (inverse(S) @ innovation[..., None])[..., 0]).sum(axis=-1)
-    surprise: Array = squared + np.log(determinant(S))
+    squared = (innovation * product(inverse(S), innovation[..., None])[..., 0]).sum(axis=-1)
+    surprise: Array = squared + log(determinant(S))
     return surprise
 
 
 def _weighed(expected: Array, surprise: Array) -> Array:
     # Against the least surprised, so that a measurement far from all of them does not underflow to 0 / 0.
-    likelihood = np.exp(-0.5 * (surprise - surprise.min(axis=-1, keepdims=True)))
+    likelihood = exp(-0.5 * (surprise - surprise.min(axis=-1, keepdims=True)))
     weighed = expected * likelihood
     probability: Array = weighed / weighed.sum(axis=-1, keepdims=True)
     return probability

@@ -9,6 +9,7 @@ import numpy as np
 
 from agents.brief import Array
 from agents.estimators.base import Heard
+from analysis.algebra import sum_over
 from analysis.unsuited import Unsuited
 
 _ROUNDING = 1e-9  # of the root of a random walk
@@ -56,9 +57,9 @@ def hear(flown: Flown, said: Heard, coefficients: Sequence[float], sigma: float)
     a = np.array(coefficients, dtype=np.float64)
     # One-step prediction (6.6) with its covariance (6.18), which is that of (6.10) where the past is known. As there, errors of
     # successive predictions count as independent: exact for p = 1, too sure of itself for longer models after several losses.
-    expected = (flown.inputs[..., : len(a), :] * a[:, None]).sum(axis=-2)
-    spread = (flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None]).sum(axis=-3)
-    spread = spread + (sigma**2 if len(a) else 0.0) * np.eye(dimension)
+    expected = sum_over(flown.inputs[..., : len(a), :] * a[:, None], -2)
+    spread = sum_over(flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None], -3)
+    spread = spread + (sigma * sigma if len(a) else 0.0) * np.eye(dimension)
     newest = np.where(said.fresh[..., None], said.fields["velocity"], expected)
     doubt = np.where(said.fresh[..., None, None], 0.0, spread)
     return Flown(

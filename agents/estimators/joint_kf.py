@@ -17,6 +17,7 @@ from agents.estimators import inputs
 from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
 from agents.estimators.blocks import block_diagonal, diagonal_blocks
 from agents.estimators.geometry import identity
+from analysis.algebra import product
 from netem.channels import INPUT
 
 
@@ -59,7 +60,7 @@ class JointEdgeFilter:
         slots, dimension = brief.relative.shape[-2:]
         shape = (*batch, slots)
         edges = np.ones((slots, slots)) + np.eye(slots)
-        prior = self.prior_position**2 * np.kron(edges, identity(dimension))
+        prior = self.prior_position * self.prior_position * np.kron(edges, identity(dimension))
         return Joint(
             mean=np.zeros((*shape, dimension)),
             covariance=np.broadcast_to(prior, (*batch, *prior.shape)).copy(),
@@ -83,7 +84,7 @@ class JointEdgeFilter:
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
-        covariance = state.covariance + brief.process + brief.dt**2 * block_diagonal(doubt)
+        covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
         R = block_diagonal(brief.sensor.spread(state.measured))
         mean, covariance = corrected(mean, covariance, state.measured, R, state.seen)
         known = np.broadcast_to(brief.present, state.seen.shape)
@@ -111,5 +112,5 @@ def corrected(mean: Array, covariance: Array, measured: Array, R: Array, seen: M
     observed = np.where(rows[..., :, None], covariance, 0.0)
     gain = np.swapaxes(np.linalg.solve(S, observed), -1, -2)
     innovation = np.where(rows, (measured - mean).reshape(rows.shape), 0.0)
-    moved = mean.reshape(rows.shape) + (gain @ innovation[..., None])[..., 0]
-    return moved.reshape(shape), covariance - gain @ observed
+    moved = mean.reshape(rows.shape) + product(gain, innovation[..., None])[..., 0]
+    return moved.reshape(shape), covariance - product(gain, observed)

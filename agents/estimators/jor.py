@@ -16,6 +16,7 @@ from agents.brief import Array, Brief, Mask, Own
 from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
+from analysis.algebra import product, sum_over
 from netem.channels import PLACE
 
 
@@ -105,11 +106,11 @@ class JacobiOverRelaxation:
         return Belief(place, theirs, told, state.own, other), no_edges(counts, brief.dimension, {PLACE: place})
 
     def _moved(self, brief: Brief, place: Array, theirs: Array, information: Array, pull: Array, counts: Mask) -> Array:
-        own = information.sum(axis=-3)
-        drawn = (information @ theirs[..., None])[..., 0] + np.where(counts[..., None], pull, 0.0)
+        own = sum_over(information, -3)
+        drawn = product(information, theirs[..., None])[..., 0] + np.where(counts[..., None], pull, 0.0)
         anybody = np.asarray(counts.any(axis=-1))
         weight = np.where(anybody[..., None, None], own, identity(brief.dimension))
-        toward = (inverse(weight) @ drawn.sum(axis=-2)[..., None])[..., 0]
+        toward = product(inverse(weight), sum_over(drawn, -2)[..., None])[..., 0]
         fixed = np.logical_and(brief.leader, self.anchor)
         stepped = (1.0 - self.h) * place + self.h * toward
         return np.where((anybody & ~fixed)[..., None], stepped, place)
@@ -128,5 +129,5 @@ def _edges(brief: Brief, own: Side, other: Side) -> tuple[Array, Array]:
         spread = np.where(known, brief.sensor.spread(side.measured), identity(brief.dimension))
         precision = np.where(known, inverse(spread), 0.0)
         information = information + precision
-        pull = pull + (precision @ side.measured[..., None])[..., 0]
+        pull = pull + product(precision, side.measured[..., None])[..., 0]
     return information, pull

@@ -15,6 +15,7 @@ import numpy as np
 
 from agents.brief import Array, Mask
 from agents.estimators.small import inverse
+from analysis.algebra import product
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 
@@ -59,11 +60,11 @@ def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[A
     The rest moves exactly as in `motion`.
     """
     order = ORDER[model]
-    taylor = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    taylor = np.array([[1.0, dt, dt * dt / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
     transition = np.where(np.arange(3) < order, taylor, 0.0)
-    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt**2 / 2, dt, 1.0])
+    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt * dt / 2, dt, 1.0])
     axes = np.eye(dimension)
-    F, Q = np.kron(transition, axes), sigma_w**2 * np.kron(np.outer(deflection, deflection), axes)
+    F, Q = np.kron(transition, axes), sigma_w * sigma_w * np.kron(np.outer(deflection, deflection), axes)
     return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
 
 
@@ -80,13 +81,13 @@ def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float])
         Of position, and of its derivatives as far as the state has them, in SI units.
     """
     prior = np.repeat(deviations, dimension)
-    covariance = np.broadcast_to(np.diag(prior**2), (*shape, len(prior), len(prior))).copy()
+    covariance = np.broadcast_to(np.diag(prior * prior), (*shape, len(prior), len(prior))).copy()
     return np.zeros((*shape, len(prior))), covariance
 
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:
     """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S)."""
-    return mean @ F.T, F @ covariance @ F.T + Q
+    return product(mean, F.T), product(F, covariance, F.T) + Q
 
 
 def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> tuple[Array, Array]:
@@ -105,7 +106,7 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     """
     dimension = observed.shape[-1]
     innovation = observed - mean[..., :dimension]
-    gain = covariance[..., :dimension] @ inverse(covariance[..., :dimension, :dimension] + R)
+    gain = product(covariance[..., :dimension], inverse(covariance[..., :dimension, :dimension] + R))
     gain = np.where(usable[..., None, None], gain, 0.0)
-    corrected = mean + (gain @ innovation[..., None])[..., 0]
-    return corrected, covariance - gain @ covariance[..., :dimension, :]
+    corrected = mean + product(gain, innovation[..., None])[..., 0]
+    return corrected, covariance - product(gain, covariance[..., :dimension, :])

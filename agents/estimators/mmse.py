@@ -62,4 +62,4 @@ class MinimumMeanSquareError:
         return state, Estimate(state.mean, known, state.covariance, no_indicator(known))
 
     def _prior(self, brief: Brief) -> Array:
-        return self.sigma_prior**2 * identity(brief.dimension)
+        return self.sigma_prior * self.sigma_prior * identity(brief.dimension)

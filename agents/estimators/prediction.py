@@ -8,6 +8,7 @@ import numpy as np
 
 from agents.brief import Array
 from analysis import jets
+from analysis.algebra import product
 from analysis.pursuit import Target, diffusion, transition
 from netem.links import Integers
 
@@ -23,8 +24,10 @@ class Prediction(NamedTuple):
 def carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Array, Array]:
     """Mean and covariance after some time (6)."""
     A = transition(target.order, seconds)
-    spread = A @ prediction.covariance @ np.swapaxes(A, -1, -2) + diffusion(target.order, seconds, target.intensity)
-    return A @ prediction.mean, spread
+    spread = product(A, prediction.covariance, np.swapaxes(A, -1, -2)) + diffusion(
+        target.order, seconds, target.intensity
+    )
+    return product(A, prediction.mean), spread
 
 
 def predicted(target: Target, prediction: Prediction, now: Integers, dt: float) -> tuple[Array, Array]:
@@ -36,8 +39,8 @@ def predicted(target: Target, prediction: Prediction, now: Integers, dt: float) 
     driven[-1, -1] = target.intensity
     mean, covariance = [first], [spread]
     for derivative in range(order):
-        mean.append(shift @ mean[-1])
-        moved = shift @ covariance[-1]
+        mean.append(product(shift, mean[-1]))
+        moved = product(shift, covariance[-1])
         covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
     Q = jets.inverse(np.stack(covariance))
     return Q, jets.times(Q, np.stack(mean))

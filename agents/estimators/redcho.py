@@ -8,6 +8,8 @@ from functools import cache
 import numpy as np
 
 from agents.brief import Array
+from analysis.algebra import product, sum_over
+from analysis.elementary import power, whole_power
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Consensus:
 
     def outputs(self, local: Array, internal: Array) -> Array:
         """s_mu, shape (m + 1, ..., C), of jets of own signals (m + 1, ..., C) and internal variables (..., m + 1, C)."""
-        mixed = _mixing(self.order, self.gamma) @ internal
+        mixed = product(_mixing(self.order, self.gamma), internal)
         agreed: Array = local - np.moveaxis(mixed, -2, 0)
         return agreed
 
@@ -52,9 +54,11 @@ class Consensus:
         rates = []
         for mu in range(self.order + 1):
             exponent = (self.order - mu) / (self.order + 1)
-            pull = (size**exponent * sign).sum(axis=-2)
+            pull = sum_over(power(size, exponent) * sign, -2)
             higher = internal[..., mu + 1, :] if mu < self.order else 0.0
-            rates.append(self.k[mu] * self.theta ** (mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :])
+            rates.append(
+                self.k[mu] * whole_power(self.theta, mu + 1) * pull + higher - self.gamma[mu] * internal[..., mu, :]
+            )
         stepped: Array = internal + dt * np.stack(rates, axis=-2)
         return stepped
 
@@ -65,5 +69,5 @@ def _mixing(order: int, gamma: tuple[float, ...]) -> Array:
     Gamma = np.eye(order + 1, k=1) - np.diag(gamma)
     rows = [np.eye(order + 1)[0]]
     for _ in range(order):
-        rows.append(rows[-1] @ Gamma)
+        rows.append(product(rows[-1], Gamma))
     return np.stack(rows)

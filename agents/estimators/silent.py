@@ -19,6 +19,7 @@ from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicat
 from agents.estimators.edge_kf import of_edges
 from agents.estimators.geometry import identity
 from agents.estimators.small import inverse
+from analysis.algebra import product, sum_over
 from netem.channels import INPUT
 
 
@@ -77,7 +78,7 @@ class SilentEdgeFilter:
         """Everybody at the same place, as far as is known, and at rest."""
         slots, dimension = brief.relative.shape[-2:]
         kept = (*batch, self.window + 1, slots)
-        prior = 2.0 * self.prior_position**2 * identity(dimension)
+        prior = 2.0 * self.prior_position * self.prior_position * identity(dimension)
         past = Past(
             mean=np.zeros((*kept, dimension)),
             covariance=np.broadcast_to(prior, (*kept, *prior.shape)).copy(),
@@ -108,7 +109,7 @@ class SilentEdgeFilter:
         past = state.past._replace(input=_pushed(own.input, state.past.input, -2))
         theirs, doubt = self._neighbours(brief, past)
         mean = past.mean[..., 0, :, :] + brief.dt * (own.input[..., None, :] - theirs)
-        covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt**2 * doubt
+        covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt * brief.dt * doubt
         R = brief.sensor.spread(state.measured)
         mean, covariance = kalman.correct(mean, covariance, state.measured, R, state.seen)
         newer = Past(
@@ -124,17 +125,17 @@ class SilentEdgeFilter:
 
     def _neighbours(self, brief: Brief, past: Past) -> tuple[Array, Array]:
         """What the neighbours fly, shape (..., n, D), and its covariance; at rest with R_u(0) while the past is too short."""
-        R_u0, seconds = self.sigma_u**2 * identity(brief.dimension), self.window * brief.dt
-        flown = past.input[..., 1 : self.window + 1, :].mean(axis=-2)[..., None, :]
+        R_u0, seconds = self.sigma_u * self.sigma_u * identity(brief.dimension), self.window * brief.dt
+        flown = sum_over(past.input[..., 1 : self.window + 1, :], -2)[..., None, :] / self.window
         moved = past.mean[..., self.window, :, :] - past.mean[..., 0, :, :]
         observed = moved / seconds + flown
         ends = past.covariance[..., 0, :, :, :] + past.covariance[..., self.window, :, :, :]
-        noise = (self.window * of_edges(brief) + ends) / seconds**2
-        trust, a = R_u0 @ inverse(R_u0 + noise), self.coefficient
+        noise = (self.window * of_edges(brief) + ends) / (seconds * seconds)
+        trust, a = product(R_u0, inverse(R_u0 + noise)), self.coefficient
         enough = (past.length > self.window)[..., None, None]
-        theirs = np.where(enough, a * (trust @ observed[..., None])[..., 0], 0.0)
+        theirs = np.where(enough, a * product(trust, observed[..., None])[..., 0], 0.0)
         # R_u(0) - W R_u(1)^T, without the difference of two large numbers.
-        return theirs, np.where(enough[..., None], (1.0 - a**2) * R_u0 + a**2 * trust @ noise, R_u0)
+        return theirs, np.where(enough[..., None], (1.0 - a * a) * R_u0 + product(a * a * trust, noise), R_u0)
 
 
 def _pushed(newest: Array, past: Array, axis: int) -> Array:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.brief import Array
+from analysis.algebra import product
+from analysis.elementary import hypot
 
 _CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
@@ -52,13 +54,13 @@ def rotation(matrix: Array) -> Array:
     # A swarm that diverges overflows at last: LAPACK would raise, and end the flight.
     finite = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
     U, _, Vt = np.linalg.svd(np.where(finite, matrix, 0.0))
-    U[..., -1] *= np.where(determinant(U @ Vt) < 0.0, -1.0, 1.0)[..., None]
-    nearest: Array = U @ Vt
+    U[..., -1] *= np.where(determinant(product(U, Vt)) < 0.0, -1.0, 1.0)[..., None]
+    nearest: Array = product(U, Vt)
     return nearest
 
 
 def _turn(along: Array, across: Array) -> Array:
-    length = np.hypot(along, across)
+    length = hypot(along, across)
     somewhere = length > 0.0
     size = np.where(somewhere, length, 1.0)
     cosine, sine = np.where(somewhere, along, 1.0) / size, across / size

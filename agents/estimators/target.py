@@ -18,6 +18,8 @@ from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_
 from agents.estimators.prediction import Prediction, carried, predicted
 from agents.estimators.redcho import Consensus
 from analysis import jets
+from analysis.algebra import product, sum_over
+from analysis.elementary import whole_power
 from analysis.information import numbers, packed, position_jet, unpacked
 from analysis.pursuit import Target, diffusion, transition
 from analysis.unsuited import Unsuited
@@ -126,7 +128,7 @@ class TargetEstimator:
         if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
             raise Unsuited(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
-        prior = np.broadcast_to(np.diag(deviations**2), (*batch, order, order)).copy()
+        prior = np.broadcast_to(np.diag(deviations * deviations), (*batch, order, order)).copy()
         first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.zeros(batch, dtype=np.int64))
         slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
         return Track(
@@ -186,7 +188,7 @@ class TargetEstimator:
         said = heard[TARGET]
         fresh, theirs = said.fresh, said.fields["information"]
         if self.fusion == "mean":
-            counted = np.where(fresh[..., None, None], theirs, 0.0).sum(axis=-3)
+            counted = sum_over(np.where(fresh[..., None, None], theirs, 0.0), -3)
             return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
         consensus = self._consensus(brief)
         agreed = consensus.outputs(own, state.internal)
@@ -208,10 +210,14 @@ class TargetEstimator:
         lag = np.maximum(state.now - state.last.made - latency, 0)
         mean, P = carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        L = (A @ P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
-        corrected = A @ mean + L @ (sighting.position[..., None, :] - mean[..., :1, :])
-        closed = A - L @ np.eye(1, target.order)
-        covariance = closed @ P @ np.swapaxes(closed, -1, -2) + R[..., None, None] * (L @ np.swapaxes(L, -1, -2)) + W
+        L = product(A, P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
+        corrected = product(A, mean) + product(L, sighting.position[..., None, :] - mean[..., :1, :])
+        closed = A - product(L, np.eye(1, target.order))
+        covariance = (
+            product(closed, P, np.swapaxes(closed, -1, -2))
+            + R[..., None, None] * product(L, np.swapaxes(L, -1, -2))
+            + W
+        )
         done = sighting.done
 
         def replaced(new: Any, old: Any) -> Any:
@@ -242,7 +248,7 @@ class TargetEstimator:
         rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
         passed = np.clip((state.now - state.last.made) * dt / latency, 0.0, 1.0)
         rising = jets.power(passed, exponent, rate, orders)
-        falling = self.alpha**exponent * jets.power(1.0 - passed, exponent, -rate, orders)
+        falling = whole_power(self.alpha, exponent) * jets.power(1.0 - passed, exponent, -rate, orders)
         share = jets.quotient(rising, rising + falling)
         alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((orders - 1, *passed.shape))])
         return np.where(state.settled, share, alone)
