@@ -228,7 +228,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
     folder = parsed.out.absolute().parent if parsed.out else Path.cwd()
     for name, lies_in in given.own_modules.items():
         if folder != lies_in:
-            raise ScenarioError(f"--out: {name} lies in {lies_in}: write the file there")
+            raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
     file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
     with directories.unless_empty(file), show.Chase(parsed.budget) as chase:
         quarry, coverage = hunt.hunt(

@@ -217,7 +217,6 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
 
 
 def _make(given: Scenario) -> Plan:
-    limits.parameters("agents.parameters", given.agents.parameters)
     registry.check_parameters(given.agents.parameters, given.own_modules)
     formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)

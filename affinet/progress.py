@@ -6,6 +6,9 @@ import threading
 
 from rich import progress
 from rich.console import Console
+from rich.text import Text
+
+from affinet.words import one_line
 
 EVERY_S = 5.0
 
@@ -53,7 +56,7 @@ class Bar:
 
     def tell(self, line: str) -> None:
         """A line that stays, whatever the bar shows."""
-        self._console.print(line, markup=False, highlight=False)
+        self._console.print(Text(one_line(line)), soft_wrap=True)
 
     def see(self, done: int, says: str) -> None:
         """Show how far it is."""
@@ -63,4 +66,4 @@ class Bar:
     def _say(self) -> None:
         while not self._over.wait(self._every_s):
             share = f"{100 * self._done // max(self._total, 1)} %"
-            self._console.print(f"{self._title}: {share}  {self._says}", markup=False, highlight=False, soft_wrap=True)
+            self.tell(f"{self._title}: {share}  {self._says}")

@@ -9,6 +9,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from affinet import limits
 from affinet.sections import ScenarioError
 from affinet.words import among
 from agents import parameters
@@ -123,6 +124,7 @@ def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any], folde
             where, says = ".".join([key, *refused.path]), refused.says
             raise ScenarioError(f"{where}: {says}; {name} has {known}") from error
         raise
+    limits.parameters(key, given)
     choice = Choice(path, dict(given), None if folder is None else str(folder))
     with refusing(key, ValueError):
         choice.build()

@@ -95,14 +95,16 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     except OSError as error:
         flight.failure = flight.failure or f"the swarm could not be launched: {said(error)}"
     path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
-    failure, timeline = flight.failure, plan.timeline
-    if book.exists():
-        try:
+    failure, timeline, told = flight.failure, plan.timeline, None
+    try:
+        if book.exists():
             timeline = plan.facing(journal.injected(journal.read(book))).timeline
-        except journal.JournalError as error:
-            failure = "; ".join([*filter(None, [failure]), str(error)])
-    for trigger, tick in flight.fired.items():
-        timeline = timeline.fired([trigger], tick)
+        for trigger, tick in flight.fired.items():
+            timeline = timeline.fired([trigger], tick)
+        if book.exists() and not path.exists():
+            told = accounts.of_journal(plan, timeline, book)
+    except journal.JournalError as error:
+        failure = "; ".join([*filter(None, [failure]), str(error)])
     if failure and not path.exists() and recording.exists():
         try:
             mend(recording)  # the world was killed, or never got far: it could not close its recording
@@ -118,7 +120,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
         uninstructed=flight.uninstructed,
         failure=failure,
         user_code=flight.user_code,
-        accounts=None if path.exists() or not book.exists() else accounts.of_journal(plan, timeline, book),
+        accounts=told,
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,

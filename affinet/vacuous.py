@@ -39,8 +39,6 @@ def why(plan: Plan, timeline: Timeline, arrays: Arrays, number: int) -> str:
         return _never_fired(timeline.triggers[fault.trigger], arrays["error"], dt)
     if fault.start >= ticks:
         return f"it starts at {fault.start * dt:g} s, and the run ends at {ticks * dt:g} s"
-    if fault.end is not None and fault.end <= fault.start:
-        return f"it is over before the next tick: it lasts less than dt, {dt:g} s"
     if fault.verb in _BY_CHANCE and fault.probability == 0.0:
         return "its probability is 0"
     span = range(fault.start, ticks if fault.end is None else min(ticks, fault.end))

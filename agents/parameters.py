@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import json
 import math
 import types
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, MutableSequence, Sequence
@@ -109,13 +110,13 @@ def _one(hint: Any, value: Any) -> Any:
     if hint in (None, type(None)):
         raise _should("be left out", value)
     if hint is bool:
-        return _exactly(bool, "a valid boolean", value)
+        return _exactly(bool, "true or false", value)
     if hint is int:
         return _whole(value)
     if hint is float:
         return _number(value)
     if hint is str:
-        return _exactly(str, "a valid string", value)
+        return _exactly(str, 'text in quotes, like "text"', value)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return hint(_word([member.value for member in hint], value))
     if isinstance(hint, type) and is_dataclass(hint):
@@ -144,7 +145,7 @@ def _word(words: Sequence[Any], value: Any) -> Any:
     for word in words:
         if type(word) is type(value) and word == value:
             return word
-    *first, last = map(repr, words)
+    *first, last = map(_said, words)
     raise _should(f"be {', '.join(first)}{' or ' * bool(first)}{last}", value)
 
 
@@ -172,11 +173,11 @@ def _tuple(inner: Sequence[Any], value: Any) -> tuple[Any, ...]:
 
 
 def _list(value: Any) -> list[Any]:
-    return _exactly(list, "a valid list", value)
+    return _exactly(list, "a list, like [1.0, 2.0]", value)
 
 
 def _table(value: Any) -> dict[str, Any]:
-    return _exactly(dict, "a valid table", value)
+    return _exactly(dict, "a table", value)
 
 
 def _exactly(kind: type, what: str, value: Any) -> Any:
@@ -187,7 +188,7 @@ def _exactly(kind: type, what: str, value: Any) -> Any:
 
 def _whole(value: Any) -> int:
     if type(value) is not int:
-        raise _should("be a valid integer", value)
+        raise _should("be a whole number, like 3", value)
     if value.bit_length() > _BITS:
         raise ParameterError(f"should fit into {_BITS + 1} bits, got one of {value.bit_length()}")
     return value
@@ -195,12 +196,17 @@ def _whole(value: Any) -> int:
 
 def _number(value: Any) -> float:
     if type(value) not in (int, float):
-        raise _should("be a valid number", value)
+        raise _should("be a number, like 0.5", value)
     if not math.isfinite(_whole(value) if type(value) is int else value):
         raise _should("be a finite number", value)
     return float(value)
 
 
 def _should(what: str, value: Any) -> ParameterError:
-    shown = repr(value)
+    shown = _said(value)
     return ParameterError(f"should {what}, got {shown if len(shown) < 80 else f'{shown[:77]}...'}")
+
+
+def _said(value: Any) -> str:
+    """A value as a file says it."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)

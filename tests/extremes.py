@@ -4,11 +4,10 @@ from collections.abc import Iterator
 from inspect import get_annotations
 from typing import Any, get_args
 
-from affinet import scenario
 from affinet.impairments import Section
 from affinet.sections import Scenario
 
-SHORT = {"dt": 0.05, "duration": 0.25}
+SHORT = {"dt": 0.05, "duration": 0.25, "patience": 3.0}
 SQUARE = [[1.0, 0.0], [0.0, 1.0]]
 
 _LOSSES: dict[str, dict[str, Any]] = {
@@ -173,11 +172,17 @@ def numeric_fields() -> set[str]:
     """All fields of sections of a scenario that can hold a number."""
     return {
         f"{section.__name__}.{name}"
-        for section in scenario._every_section()
+        for section in _sections(Section)
         if section.__module__ != "affinet.study"
         for name, field in section.model_fields.items()
         if _numeric(field.annotation) and _declared_in(section, name) == section.__name__
     }
+
+
+def _sections(kind: type[Section]) -> Iterator[type[Section]]:
+    for section in kind.__subclasses__():
+        yield section
+        yield from _sections(section)
 
 
 def _numeric(annotation: Any) -> bool:

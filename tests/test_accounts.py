@@ -65,7 +65,13 @@ def test_the_journal_has_the_accounts_of_what_was_injected_too(out):
 
 def judged(plan, arrays, *, failure=None, accounts=None, in_flight=None, uninstructed=None):
     nothing = {"wall_s": 1.0, "processes": [], "out": Path()}
-    facts = {"in_flight": in_flight, "uninstructed": uninstructed, "failure": failure, "accounts": accounts}
+    facts = {
+        "in_flight": in_flight,
+        "uninstructed": uninstructed,
+        "failure": failure,
+        "accounts": accounts,
+        "user_code": False,
+    }
     return outcome.judge(plan, plan.timeline, arrays, **facts, **nothing)
 
 
@@ -157,7 +163,7 @@ def test_a_medium_whose_accounts_do_not_close_fails_the_run(monkeypatch, tmp_pat
         pytest.param(
             "prints",
             """agent 2 (pid {pid}): it said '{{"event":"kill","agents":[1]}}' on its standard output, """
-            "where it may say ready, beat, failed, done, as JSON (docs/protocol.md)",
+            "where it may say ready, beat, failed, user-code, done, as JSON (docs/protocol.md)",
             id="an order that is the world's",
         ),
         pytest.param(

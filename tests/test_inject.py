@@ -57,7 +57,7 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
     assert cut.k < lose.k < shown.k < healed.k
 
     faults = {fault["fault"].split()[0]: fault for fault in flight.outcome.to_json()["faults"]}
-    assert all(fault.keys() == {"fault", "at", "touched", "what"} for fault in faults.values())
+    assert all(fault.keys() == {"fault", "at", "touched", "what", "why"} for fault in faults.values())
     assert all((fault["touched"] > 0, fault["what"]) == (True, "messages") for fault in faults.values())
     assert {name: fault["at"] for name, fault in faults.items()} == pytest.approx(
         {"cut": cut.k * 0.01, "lose": lose.k * 0.01}

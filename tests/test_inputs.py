@@ -56,6 +56,12 @@ scenario = "../mine.toml"
 full = { runs = 1 }
 quick = { runs = 1 }
 [[axes]]
+name = "column"
+values = { here = [] }
+[[axes]]
+name = "row"
+values = { here = [] }
+[[axes]]
 name = "trace"
 values = { half = ['network.profiles.traced.loss=[]', 'network.profiles.traced.delay.table="half.txt"'] }
 """

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from affinet import directories, show, supervision
+from affinet import directories, progress, show, supervision
 from affinet.checks import Finding
 from affinet.run import fly
 from analysis import figures
@@ -116,9 +116,9 @@ def test_text_of_a_user_is_shown_as_it_stands(text, monkeypatch):
 @pytest.mark.parametrize("text", TEXTS)
 def test_the_progress_of_a_run_shows_its_name_as_it_stands(text, monkeypatch):
     page = io.StringIO()
-    monkeypatch.setattr(show, "Console", lambda **_: Console(file=page, width=200))
-    with show.Progress(plan_of("corridor", *SHORT), text, Path(text)) as progress:
-        progress.see(3, 0.5)
+    monkeypatch.setattr(progress, "Console", lambda **_: Console(file=page, width=200))
+    with show.Progress(plan_of("corridor", *SHORT), text, Path(text)) as shown_in:
+        shown_in.see(3, 0.5)
     shown, out = (each.replace("\x1b", "\\x1b") for each in (text, str(Path(text))))
     assert f"{shown} flies in {out}" in page.getvalue()
 

@@ -930,7 +930,7 @@ def refusal(*overrides, name=NAME):
         (("target.order=1",), "a target of order 1 needs 2 gains k and gamma"),
         (('agents.parameters.target={output="optimal"}',), "fusion = 'redcho' wants output = 'smooth'"),
         (('agents.parameters.target={output="optimal",fusion="mean"}',), "fusion = 'mean' wants output = 'smooth'"),
-        (('agents.parameters.target={fusion="median"}',), "'redcho', 'mean' or 'none', got 'median'"),
+        (('agents.parameters.target={fusion="median"}',), '"redcho", "mean" or "none", got "median"'),
         (
             (*bodies(3, 1, 3, 3), ALONE),
             "up to 3: the estimator has to report them, and the target to be of order 3 at least",
@@ -1298,7 +1298,8 @@ class Reporting(NoEstimator):
 
     def fuse(self, brief, state, heard, own):
         state, estimate = super().fuse(brief, state, heard, own)
-        number = np.arange(estimate.known.shape[0] * 3.0).reshape(-1, 3)
+        batch = estimate.known.shape[:-1]
+        number = np.arange(np.prod(batch, dtype=int) * 3.0).reshape(*batch, 3)
         return state, estimate._replace(reports={self.name: number})
 
 

@@ -71,7 +71,9 @@ def test_what_is_not_ones_own_is_refused_with_what_may_be_said(said):
         told.read("agent", said)
     shown = repr(said)[1:] if len(said) < 100 else f"({len(said):,} bytes)"
     assert shown in str(error.value)
-    assert str(error.value).endswith("on its standard output, where it may say ready, beat, failed, done, as JSON")
+    assert str(error.value).endswith(
+        "on its standard output, where it may say ready, beat, failed, user-code, done, as JSON"
+    )
     assert len(str(error.value)) < 300
 
 

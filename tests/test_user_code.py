@@ -522,11 +522,21 @@ scenario = "corridor"
 full = {{ runs = 1 }}
 quick = {{ runs = 1 }}
 [[axes]]
+name = "column"
+values = {{ here = [] }}
+[[axes]]
+name = "row"
+values = {{ here = [] }}
+[[axes]]
 name = "estimator"
 values = {{ none = ["agents.estimator=none"], own = ["agents.estimator={name}:Own"] }}
 """)
     assert main(["study", "mine.toml"]) == 3
-    assert capsys.readouterr().err.splitlines()[-1].startswith(f"case {{'estimator': 'own'}}: {name}:Own.sense: ValueE")
+    assert (
+        capsys.readouterr()
+        .err.splitlines()[-1]
+        .startswith(f"case column=here, row=here, estimator=own: {name}:Own.sense: ValueE")
+    )
 
 
 def test_a_hunt_ends_with_the_smallest_timeline_that_breaks_the_code(folder, capsys):
@@ -547,7 +557,7 @@ def test_a_hunt_ends_with_the_smallest_timeline_that_breaks_the_code(folder, cap
 
 def test_a_test_fails_by_it_even_if_it_expects_a_failure(folder, tmp_path):
     name = write(folder, broken(ESTIMATOR, LATE))
-    swarm = Hangar("inprocess", None, lambda: tmp_path)("corridor", *SIMPLE, f"agents.estimator={name}:Own")
+    swarm = Hangar("inprocess", None, lambda: tmp_path, tmp_path)("corridor", *SIMPLE, f"agents.estimator={name}:Own")
     with pytest.raises(Broken, match=rf"^{name}:Own\.fuse in tick 7: ZeroDivisionError"):
         swarm.fly("fail")
 

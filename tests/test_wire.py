@@ -351,6 +351,7 @@ AGENT = AgentBrief(
     leader_gain=1.0,
     limit=3.0,
     brief=BRIEF,
+    reports={"place": (3,)},
     checkpoint="/tmp/agent-2.npz",
     remembers=True,
 )

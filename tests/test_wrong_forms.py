@@ -102,9 +102,9 @@ WRONG_FORMS = [
         id="a loss, and no list",
     ),
     pytest.param("agents.parameters.rkf=0.5", "should be a table, like { sigma_w = 0.5 }, got 0.5", id="p"),
-    pytest.param("agents.parameters.ga-rkf.sigma_w='a'", 'should be a number, like 1.0, got "a"; ga-rkf has', id="parameter"),
-    pytest.param("agents.parameters.target.k=3", "parameters.target.k: should be a list, like [1.0], got 3", id="k"),
-    pytest.param("agents.parameters.target.k=['a']", 'parameters.target.k.1: should be a number, like 1.0, got "a"', id="k.1"),
+    pytest.param("agents.parameters.ga-rkf.sigma_w='a'", 'should be a number, like 0.5, got "a"; ga-rkf has', id="parameter"),
+    pytest.param("agents.parameters.target.k=3", "parameters.target.k: should be a list, like [1.0, 2.0], got 3", id="k"),
+    pytest.param("agents.parameters.target.k=['a']", 'parameters.target.k.1: should be a number, like 0.5, got "a"', id="k.1"),
     pytest.param("dynamics.kernel={}", "dynamics.kernel.length: is missing; it has no default: give a number", id="missing"),
     pytest.param(
         "manoeuvre={ keyframes = [{ time = 0 }, { time = 1 }] }",

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 from analysis.affine import Array, Manoeuvre
 from analysis.algebra import product
-from analysis.elementary import cos, exp, sin
+from analysis.elementary import arctan2, cos, exp, sin
 
 _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _COLLAPSE = np.array([[-1.375, -0.375], [0.0, 0.0]])
@@ -113,7 +113,7 @@ def keyframes(
     within = np.clip(seconds, times[0], times[-1])
     shape = _smooth(times, theta)(within)
     if angle is not None:
-        shape = _turn(_smooth(times, angle)(within), theta.shape[-1]) @ shape
+        shape = product(_turn(_smooth(times, angle)(within), theta.shape[-1]), shape)
     return Manoeuvre(shape, _smooth(times, offset)(within))
 
 
@@ -135,12 +135,13 @@ def turned(theta: Array, angle: Array) -> Array:
     By theta it turns the shortest way, by angle as far as that says. In three dimensions a turn by theta has no sign.
     """
     U, _, Vt = np.linalg.svd(theta)
-    rotation = U @ Vt
-    between = rotation[1:] @ np.swapaxes(rotation[:-1], -1, -2)
+    rotation = product(U, Vt)
+    between = product(rotation[1:], np.swapaxes(rotation[:-1], -1, -2))
     if theta.shape[-1] == 2:
-        by_theta = np.arctan2(between[:, 1, 0] - between[:, 0, 1], between[:, 0, 0] + between[:, 1, 1])
+        by_theta = arctan2(between[:, 1, 0] - between[:, 0, 1], between[:, 0, 0] + between[:, 1, 1])
     else:
-        by_theta = np.arccos(np.clip((np.trace(between, axis1=-2, axis2=-1) - 1.0) / 2.0, -1.0, 1.0))
+        cosine = np.clip((np.trace(between, axis1=-2, axis2=-1) - 1.0) / 2.0, -1.0, 1.0)
+        by_theta = arctan2(np.sqrt(1.0 - cosine * cosine), cosine)
     total: Array = by_theta + np.diff(angle)
     return total
 
@@ -153,7 +154,7 @@ def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
 
 def _turn(angle: Array, dimension: int) -> Array:
     """Rotations by angles (T,), shape (T, D, D)."""
-    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine, sine = cos(angle), sin(angle)
     rotation = np.broadcast_to(np.eye(dimension), (len(angle), dimension, dimension)).copy()
     rotation[:, :2, :2] = _matrix([[cosine, -sine], [sine, cosine]])
     return rotation

@@ -51,6 +51,7 @@ def make_room(path: Path) -> None:
     with system_errors.about(path):
         try:
             path.write_bytes(bytes(_BEGINNING))
+            os.truncate(path, 0)  # who is killed before the library writes leaves nothing, not zeros
         except OSError:
             if path.is_file():  # and no device
                 path.unlink()

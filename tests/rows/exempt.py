@@ -27,7 +27,9 @@ EXEMPT = {
         netem.timeline.Conditions.still netem.timeline.Conditions.coasting netem.timeline.Timeline.present
         netem.timeline.Timeline.held netem.weather.Forecast.acts netem.weather.Forecast.on
         agents.estimators.inputs.refuse_accelerations world.formation.Formation.is_leader world.history.Moments.ticks
-        world.sensors.stray world.dynamics.flown world.world.Scene.velocity analysis.sensor.Sensor.common
+        agents.returned.estimate agents.returned.said netem.broadcasts.fields netem.wire.numbers world.acts.Acts.read
+        world.acts.Acts.beliefs world.sensors.stray world.dynamics.flown world.world.Scene.velocity
+        analysis.sensor.Sensor.common
     """,
     ONE_WORLD: """
         world.pursued.Pursuit.begin world.pursued.Pursuit.sighting world.pursued.Pursuit.step world.sensors.astray
@@ -37,13 +39,15 @@ EXEMPT = {
     """,
     ONCE: """
         netem.chain.Chain.stationary netem.chain.Chain.burst_lengths netem.chain.ChainLayer.of netem.text.read
-        netem.trace.read world.disturbance.Disturbance.between world.stress.incidence world.stress.laplacian
+        netem.trace.from_csv netem.trace.table netem.trace.Measured.over netem.measured.delays netem.journal.carried
+        world.maneuver.narrowest world.maneuver.turned world.stage.origin
+        world.disturbance.Disturbance.between world.stress.incidence world.stress.laplacian
         world.stress.equilibrium world.stress.solve world.stress.stabilises analysis.cuts.smallest_cut
         analysis.localization.step analysis.localization.rates analysis.random_graphs.edges analysis.random_graphs.rates
         analysis.autoregressive.fit
     """,
     WRITTEN: """
-        netem.journal.Writer.write netem.journal.availability netem.journal.Recorded.verdicts world.history.Vigil.errors
+        netem.journal.Writer.write netem.journal.Recorded.verdicts world.history.Vigil.errors
         world.history.Vigil.see world.history.History.extend world.history.History.arrays world.history.load
         world.history.digest world.history.one_nan world.localized.FirstMeasurements.of world.localized.FirstMeasurements.tick
         world.localized.FirstMeasurements.take world.localized.FirstMeasurements.edges world.realised.Realised.stabilised
