@@ -125,6 +125,9 @@ def maneuver(times: Sequence[float], theta: Array, angle: Array | None) -> list[
     turns = manoeuvres.turned(theta, np.zeros(len(theta)) if angle is None else angle)
     told = f"the formation turns by {', '.join(f'{turn:.3g}' for turn in turns)} rad from keyframe to keyframe"
     found = [Finding("manoeuvre", "ok", told)]
+    if (most := float(np.abs(turns).max())) > 2.0 * np.pi:
+        says = f"from one keyframe to the next it turns {most / (2.0 * np.pi):.3g} times round; angles are in radians"
+        found.append(Finding("manoeuvre", "note", says))
     for number, (narrow, earlier, later) in enumerate(zip(share, theta[:-1], theta[1:], strict=True), start=1):
         legs = f"keyframes {number} to {number + 1}"
         if narrow < _NARROW:
@@ -249,6 +252,8 @@ def _edges(formation: Formation) -> Finding:
 def leaders(formation: Formation) -> Finding:
     """Whether the leaders can carry an affine formation."""
     dimension = formation.dimension
+    if twice := sorted(leader for leader in set(formation.leaders) if formation.leaders.count(leader) > 1):
+        return Finding("leaders", "error", f"agent {twice[0]} is named twice: name each leader once")
     rows = np.array(sorted(set(formation.leaders)), dtype=np.int64) - 1
     spread = formation.nominal[rows] - formation.nominal[rows].mean(axis=0) if len(rows) else np.zeros((0, dimension))
     rank = np.linalg.matrix_rank(spread) if len(rows) else 0

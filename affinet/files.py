@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -50,4 +51,10 @@ def read(name: str, folder: str, what: str) -> Read:
     try:
         return Read(path.name, text, tomllib.loads(text), Path(os.path.abspath(path)).parent)
     except (ValueError, RecursionError) as error:  # of nests and numbers that are too large, beside what is no TOML
-        raise ScenarioError(f"{path.name}: not TOML: {one_line(str(error))}") from error
+        raise ScenarioError(_not_toml(path.name, one_line(str(error)))) from error
+
+
+def _not_toml(name: str, said: str) -> str:
+    """What the parser said, with its line where ours stand."""
+    place = re.fullmatch(r"(.*?) \(at line (\d+), column (\d+)\)", said)
+    return f"{name}:{place[2]}: not TOML: {place[1]}, at column {place[3]}" if place else f"{name}: not TOML: {said}"

@@ -248,6 +248,8 @@ def _make(given: Scenario) -> Plan:
         air.degraded(given, formation, world.links, bits, *named, _ruled(played.faults, number, world.links))
         for number, named in enumerate(played.profiles, start=1)
     ]
+    found = [*findings, *aired, *(note for _, said in degraded for note in said)]
+    found += checks.timeline(played.faults, given.time.ticks, given.time.dt)
     plan = Plan(
         scenario=given,
         world=world,
@@ -259,12 +261,7 @@ def _make(given: Scenario) -> Plan:
         estimator=estimator,
         law=law,
         reports=reports,
-        findings=(
-            *findings,
-            *aired,
-            *(note for _, said in degraded for note in said),
-            *checks.timeline(played.faults, given.time.ticks, given.time.dt),
-        ),
+        findings=tuple(dict.fromkeys(found)),  # both classes of channels may have the same to say
     )
     with registry.refusing("agents", Unsuited):
         tryout.alone(plan.alone, plan.positioned)

@@ -121,7 +121,9 @@ def _validated(raw: dict[str, Any], origin: Source, folder: Path) -> Scenario:
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
-        raise ScenarioError(explained(error, Scenario, origin)) from error
+        raise ScenarioError(
+            explained(error, Scenario, origin)
+        ) from None  # it has all that pydantic says, in better words
     scenario._source = origin
     return scenario
 

@@ -123,7 +123,7 @@ class Bound(Section):
 class Size(Section):
     """How large the study is: runs of each case, and overrides for all of them."""
 
-    runs: Annotated[int, Field(ge=1)]
+    runs: Annotated[int, Field(ge=1, le=1_000_000)]
     set: list[str] = Field(default_factory=list)
 
 
@@ -221,7 +221,7 @@ def load(name: str) -> Study:
     try:
         study = Study.model_validate(file.says)
     except ValidationError as error:
-        raise ScenarioError(explained(error, Study, source)) from error
+        raise ScenarioError(explained(error, Study, source)) from None  # it has all that pydantic says, in better words
     study._source = source
     study._folder = file.folder
     study.refuse(study_checks.of_file(study))
@@ -273,7 +273,8 @@ def _planned(study: Study, case: Case) -> Plan:
             return planning.make(scenarios.load(name, case.overrides, study.folder))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
-        raise ScenarioError(f"{where}case {study_checks.named(case.labels)}: {error}") from error
+        said = str(error).removeprefix("--set: ")  # which nobody typed
+        raise ScenarioError(f"{where}case {study_checks.named(case.labels)}: {said}") from error
 
 
 @contextmanager

@@ -133,7 +133,8 @@ def _of_labels(study: Study) -> Iterator[Wrong]:
 def _of_figure(study: Study) -> Iterator[Wrong]:
     names = [axis.name for axis in study.axes]
     if (wanted := _PANELS.get(study.figure)) and len(names) != 3:
-        yield "axes", f"the figure {study.figure!r} is drawn over three axes, {wanted}; there are {len(names)}"
+        there = f"there are {len(names)}; an axis of one label, like {{ all = [] }}, fills a place"
+        yield "axes", f"the figure {study.figure!r} is drawn over three axes, {wanted}; {there}"
     if study.figure != "sweep":
         if study.along is not None:
             yield "along", f"is of a sweep, and the figure is {study.figure!r}: leave it out"

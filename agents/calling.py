@@ -99,7 +99,7 @@ def _imported(name: str, folder: str | None) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name is not None and f"{name}.".startswith(f"{error.name}."):
             raise NoSuchAlgorithm(
-                f"{error}; it is looked for beside the scenario and among installed packages"
+                f"{error}; it is looked for beside what names it, beside the scenario and among installed packages"
             ) from error
         raise _not_imported(name, error) from error
     except (Exception, SystemExit) as error:  # a module of the user's own may do anything

@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 
-from affinet import events, impairments, sections
+from affinet import events, impairments, sections, study
 from affinet.run import fly
 
 pytestmark = PROCESSES
@@ -35,6 +35,13 @@ def test_the_realised_graph_of_the_docs_is_computed(tmp_path, monkeypatch):
     exec(code, names)
     assert names["graph"].heard.shape == (100, 4, 24)
     assert not names["graph"].stabilised(plan_of("corridor", "time.duration=1").world.formation)[0].any()
+
+
+def test_the_study_of_the_docs_can_be_flown_and_judged(tmp_path):
+    (text,) = re.findall(r"```toml\n(title = .*?)```", (DOCS / "studies.md").read_text(), flags=re.DOTALL)
+    (tmp_path / "mine.toml").write_text(text)
+    planned = study.plans(study.load(str(tmp_path / "mine.toml")), quick=True)
+    assert [case.labels["estimator"] for case, _ in planned] == ["none", "rkf", "none", "rkf"]
 
 
 PROFILES = re.findall(r"^\| `(\w+)` \| (mean loss .*) \|$", (DOCS / "network.md").read_text(), flags=re.MULTILINE)

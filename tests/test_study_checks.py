@@ -62,7 +62,8 @@ def small(tmp_path, *changes):
 NOT_FLOWN = [
     pytest.param(
         [(THIRD_AXIS, ""), (', loss = "0"', ""), (', loss = "0.5"', "")],
-        "axes: the figure 'curves' is drawn over three axes, one for columns, one for rows, one for the curves; there are 2",
+        "axes: the figure 'curves' is drawn over three axes, one for columns, one for rows, one for the curves; there are 2; "
+        "an axis of one label, like { all = [] }, fills a place",
         id="two axes",
     ),
     pytest.param(

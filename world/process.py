@@ -46,7 +46,7 @@ class Theatre:
         self._numbers = Numbering()
         self._heard = dict.fromkeys(range(1, brief.world.links.agents + 1), 0)
         self._awaited: set[int] = set()
-        self._moments: list[Moment] = []
+        self._flown: list[tuple[Moment, Scene]] = []  # with where each tick led
         self._batch = brief.books.batch
         self._nobody = wire.Act(0, 0, 0, np.zeros(dimension), [], [], [], np.nan, None, {}, 0)
         self._vigil = Vigil(brief.world)
@@ -59,7 +59,13 @@ class Theatre:
         await_subscribers([self._sense])
 
     def run(self, logbook: Logbook) -> None:
-        """Fly all ticks, and write them down."""
+        """Fly all ticks, and write them down: also those before whatever ends the run early."""
+        with system_errors.afterwards(partial(self._write_down, logbook)):
+            self._fly(logbook)
+        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, None, [])
+        self._sense.put(wire.pack(end))
+
+    def _fly(self, logbook: Logbook) -> None:
         scene = self._world.begin()
         for tick in range(self._world.ticks):
             fired = self._fire(tick)
@@ -67,19 +73,16 @@ class Theatre:
             measured = self._world.measure(tick, scene, self._timeline.at(tick))
             self._publish(tick, measured, scene, fired)
             if tick % self._batch == 0:  # while the agents work on this tick
-                self._write_down(tick, scene, logbook)
+                self._write_down(logbook)
             journal = self._read_journal(tick)
             acts = self._read_acts(tick)
             self._supervisor.works(tick)
             self._hear_of_faults(journal)
             now = self._timeline.at(tick)
             moment = self._moment(scene, measured, journal, acts, now)
-            self._moments.append(moment)
             self._vigil.see(tick, scene, self._timeline)
             scene = self._world.step(tick, scene, measured, moment.input, now)
-        self._write_down(self._world.ticks, scene, logbook)
-        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, None, [])
-        self._sense.put(wire.pack(end))
+            self._flown.append((moment, scene))  # both at once: a signal may come between any two lines
 
     def _fire(self, tick: int) -> list[int]:
         fired = self._timeline.due(self._vigil.errors)
@@ -171,14 +174,14 @@ class Theatre:
             injected=journal.injected,
         )
 
-    def _write_down(self, tick: int, scene: Scene, logbook: Logbook) -> None:
-        if not self._moments:
+    def _write_down(self, logbook: Logbook) -> None:
+        if not self._flown:
             return
-        moments = gather(self._timeline, tick - len(self._moments), self._moments)
-        self._moments = []
-        self.history.extend(moments, scene.position)
+        flown, self._flown = self._flown, []
+        moments = gather(self._timeline, self.history.ticks, [moment for moment, _ in flown])
+        self.history.extend(moments, flown[-1][1].position)
         logbook.write(moments, self._timeline)
-        self._supervisor.tell("tick", k=tick, error=float(moments.error[-1]))
+        self._supervisor.tell("tick", k=self.history.ticks, error=float(moments.error[-1]))
 
     def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
         """What the agents say they heard must be what the medium says it delivered, message by message."""
