@@ -17,7 +17,7 @@ from affinet.bites import Bite, bites
 from affinet.measures import Figures
 from affinet.plan import Plan
 from netem import system_errors
-from netem.fate import Ledger
+from netem.fate import Fate, Ledger
 from netem.timeline import Timeline
 from world import history
 from world.history import Arrays, digest
@@ -226,12 +226,12 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
 def _untracked(arrays: Arrays | None) -> list[str]:
     if arrays is None or not len(arrays["error"]):
         return ["no tick was flown: it proved nothing"]
-    nobody = int(np.isnan(arrays["error"]).sum())
-    if not nobody:
-        return []
-    return [
-        f"nobody took part in {nobody} of {len(arrays['error'])} ticks: there is no tracking error, and it proved nothing"
-    ]
+    ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
+    if nobody:
+        return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
+    if (arrays["fates"][:, 1:] == Fate.SILENT).all():
+        return ["nobody was awake in any tick: it proved nothing"]
+    return []
 
 
 def _tracking(arrays: Arrays | None) -> Figures:

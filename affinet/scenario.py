@@ -16,6 +16,7 @@ from affinet import files, inputs, source
 from affinet.explain import explained
 from affinet.sections import Scenario, ScenarioError
 from affinet.source import Source
+from affinet.words import one_line
 
 FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
@@ -128,19 +129,32 @@ def _validated(raw: dict[str, Any], origin: Source, folder: Path) -> Scenario:
     return scenario
 
 
+def _value(override: str, text: str) -> Any:
+    """What the text behind the = says: a value as a file says it, or a word without quotes."""
+    try:
+        text.encode()
+        said = tomllib.loads(f"value = {text}")
+    except UnicodeEncodeError as error:
+        raise ScenarioError(f"--set {one_line(override)}: not UTF-8, as TOML must be") from error
+    except (ValueError, RecursionError):
+        return text.strip()
+    if said.keys() != {"value"}:
+        raise ScenarioError(
+            f"--set {one_line(override)}: it says more than one value; give each key a --set of its own"
+        )
+    return said["value"]
+
+
 def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
     key, equals, text = override.partition("=")
     *tables, name = source.parts(key)
     if not equals or not name:
-        raise ScenarioError(f"--set {override}: write it as key=value, like network.availability=0.5")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
-        value = text.strip()
+        raise ScenarioError(f"--set {one_line(override)}: write it as key=value, like network.availability=0.5")
+    value = _value(override, text)
     table: Any = raw
     for step in tables:
         table = table.setdefault(step, {})
         if not isinstance(table, dict):
-            raise ScenarioError(f"--set {override}: {step} is not a table")
+            raise ScenarioError(f"--set {one_line(override)}: {step} is not a table")
     said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)
     table[name] = reduce(lambda outer, step: outer[step], [*tables, name], inputs.anchored(said, folder))

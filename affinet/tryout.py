@@ -14,6 +14,7 @@ from analysis.pursuit import Sighting
 from netem import channels
 from world.history import TAKEN
 
+_LONGEST_NAME = 100  # of a file in an archive
 _NOT_FOR_A_FILE = frozenset({"file", "allow_pickle"})  # parameters of what writes arrays.npz
 
 
@@ -33,6 +34,12 @@ def silent_tick(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     if taken := sorted(reports.keys() & (TAKEN | _NOT_FOR_A_FILE)):
         said = f"the estimator reports {', '.join(taken)}, which every run has already: give it another name"
         raise ScenarioError(f"agents: {said}")
+    place = (agents.brief.dimension,)
+    if reports.get(channels.PLACE, place) != place:
+        said = f"where an agent believes it is, (..., {place[0]}), not {reports[channels.PLACE]}: give it another name"
+        raise ScenarioError(f"agents: the estimator reports {channels.PLACE!r}, which is {said}")
+    if long := [name for name in reports if len(name) > _LONGEST_NAME]:
+        raise ScenarioError(f"agents: a report has a name of {len(long[0])} letters: give it at most {_LONGEST_NAME}")
     return reports
 
 

@@ -1313,6 +1313,15 @@ def test_a_report_with_a_name_that_every_run_has_is_refused(name):
     assert f"reports {name}, which every run has already" in said
 
 
+def test_a_report_that_could_not_be_kept_or_judged_is_refused():
+    assert "the estimator reports 'place', which is where an agent believes it is, (..., 2), not (3,)" in refusal(
+        *reporting("place"), name="localization"
+    )
+    assert "a report has a name of 70000 letters: give it at most 100" in refusal(
+        *reporting("n" * 70_000), name="corridor"
+    )
+
+
 def test_reports_land_in_the_arrays_by_name_and_are_no_numbers_for_who_is_dead():
     dead = timeline({"verb": "kill", "at": 0.05, "agents": [5]}, {"verb": "restart", "at": 0.1, "agents": [5]})
     run = rehearse(plan_of("localization", "time.duration=0.2", dead, *reporting("says")))

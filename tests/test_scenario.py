@@ -281,6 +281,10 @@ WRONG_OVERRIDES = [
     ("=3", "=3", "write it as key=value"),
     ("network.=3", "network.=3", "write it as key=value"),
     ("time.dt.x=3", "time.dt.x=3", "dt is not a table"),
+    # The second line was read as another key, and dropped.
+    ("seed=1\nnetwork.availability=7", "seed=1", "it says more than one value; give each key a --set of its own"),
+    ("seed=1\n[network]\navailability=7", "seed=1", "it says more than one value"),
+    ("description=\udcff", "description=", "not UTF-8, as TOML must be"),
     ("timeline.1.at=3", "timeline.1.at=3", "timeline is not a table"),
 ]
 

@@ -89,6 +89,12 @@ def test_a_run_in_which_nobody_is_left_is_no_pass(base, verb, at, ticks):
     assert flown.outcome.reasons == (words,)
 
 
+def test_a_run_that_everybody_sleeps_through_is_no_pass():
+    asleep = timeline({"verb": "pause", "agents": ["all"], "at": 0.0})
+    done = rehearse(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", asleep)).outcome
+    assert (done.verdict, done.reasons) == ("vacuous", ("nobody was awake in any tick: it proved nothing",))
+
+
 def test_nobody_for_a_while_is_no_pass_either():
     gap = timeline({"verb": "depart", "agents": ["all"], "at": 0.1}, {"verb": "rejoin", "agents": ["all"], "at": 0.2})
     flown = rehearse(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", gap))
