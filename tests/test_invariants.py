@@ -14,7 +14,6 @@ from affinet.sections import ScenarioError
     [
         ("bounded(5)", checkers.bounded(5)),
         ("bounded(level=0.5)", checkers.bounded(0.5)),
-        ("bounded(-1)", checkers.bounded(-1)),
         ("bounded(1e6)", checkers.bounded(1e6)),
         ("converged(0.1, by=2)", checkers.converged(0.1, by=2)),
         ("converged(by=2.5, level=0.1)", checkers.converged(0.1, by=2.5)),
