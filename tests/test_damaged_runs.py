@@ -36,9 +36,10 @@ def run(flown, tmp_path):
 
 
 def said(capsys, *words, status):
-    """The one line in which it is said what is wrong."""
+    """The line in which it is said what is wrong; those above it are of a run that was under way."""
     assert cli.main([*map(str, words)]) == status
-    (line,) = capsys.readouterr().err.splitlines()
+    *under_way, line = capsys.readouterr().err.splitlines()
+    assert not under_way or status == 1
     return line
 
 
@@ -94,6 +95,11 @@ def flipped(file):
     file.write_bytes(body)
 
 
+def one_array(file):
+    with file.open("wb") as opened:
+        np.save(opened, np.zeros(3))
+
+
 def with_arrays(change):
     return lambda file: rewritten(file.parent, change)
 
@@ -103,13 +109,13 @@ DAMAGES = {
     "a byte flipped": (flipped, "Bad CRC-32"),
     "empty": (lambda file: file.write_bytes(b""), "No data left in file"),
     "a text": (lambda file: file.write_text("nothing\n"), "pickle"),
-    "one array": (lambda file: np.save(file.open("wb"), np.zeros(3)), "one array, not an archive"),
+    "one array": (one_array, "one array, not an archive"),
     "without a key": (with_arrays(lambda a: {n: v for n, v in a.items() if n != "input"}), "it has no input"),
     "objects": (with_arrays(lambda a: a | {"input": np.array([None] * 20)}), "Object arrays cannot be loaded"),
     "no axes": (with_arrays(lambda a: a | {"input": np.float64(1.0)}), "input is float64 of shape ()"),
     "no ticks": (with_arrays(lambda a: a | {"error": np.float64(1.0)}), "is float64 of shape"),
     "texts": (with_arrays(lambda a: a | {"input": np.full((20, 7, 2), "x")}), "input is <U1 of shape (20, 7, 2)"),
-    "other ticks": (with_arrays(lambda a: a | {"input": a["input"][:9]}), "input is float64 of shape (9, 7, 2), in a run of 20"),
+    "other ticks": (with_arrays(lambda a: a | {"input": a["input"][:9]}), "of shape (9, 7, 2), in a run of 20"),
     "a text beside": (with_arrays(lambda a: a | {"stranger": np.full((20, 7), "x")}), "stranger is <U1"),
 }  # fmt: skip
 
@@ -138,7 +144,7 @@ def test_a_scenario_that_is_no_table_is_no_run(text, verb, run, tmp_path, capsys
 @pytest.mark.parametrize(
     ("changes", "differs"),
     [
-        ({"agents": {"estimator": "none"}}, "measured"),
+        ({"agents": {"estimator": "none"}}, "in one run and"),
         ({"formation": {"preset": "hexa10"}, "agents": {}}, "position is float64 (7, 2) in one run and float64 (10, "),
     ],
     ids=["another estimator", "more agents"],
@@ -150,7 +156,7 @@ def test_another_scenario_than_was_flown_differs(changes, differs, run, tmp_path
     (run / SCENARIO).write_text(json.dumps(told))
     line = replayed(capsys, run, tmp_path, status=1)
     assert line.startswith("tick 0: ")
-    assert "in one run and" in line
+    assert differs in line
 
 
 @pytest.mark.parametrize("verb", ["replay", "inject"])
@@ -178,7 +184,7 @@ def test_a_book_of_inputs_that_no_run_wrote_is_named(text, why, verb, run, tmp_p
     "text",
     [
         "{}", "[]", "null", "7", "", "[" * 100_000, '{"run": 1, "login": {}}', '{"run": "r", "login": 3}', '{"run": "r"}',
-        '{"run": "r", "login": {"endpoint": "e", "name": "n"}}', '{"run": "r", "login": {"endpoint": 1, "name": "n", "password": "p"}}',
+        '{"run": "r", "login": {"endpoint": "e", "name": "n"}}', '{"run": "r", "login": {"endpoint": 1, "name": "n"}}',
     ],
     ids=lambda text: text[:40],
 )  # fmt: skip
@@ -196,9 +202,9 @@ def test_a_way_in_that_is_not_whole_is_none(text, run, capsys):
         (["cut", "1-2", "--for=-1"], "cut: --for -1: give seconds above 0"),
         (["cut", "1-2", "--for", "0"], "cut: --for 0: give seconds above 0"),
         (["cut", "1-2", "--for", "1e10"], "cut: --for 1e+10: give seconds above 0, at most 1e+09"),
-        (["partition", "1,2", "3,4", "--for", "inf"], "partition: --for inf: give seconds above 0"),
-        (["lose", "nan", "1-2"], "lose: a loss of nan: a probability lies in [0, 1]"),
-        (["lose", "1.5", "1-2"], "lose: a loss of 1.5: a probability lies in [0, 1]"),
+        (["partition", "1,2/3,4", "--for", "inf"], "partition: --for inf: give seconds above 0"),
+        (["lose", "nan"], "lose: a loss of nan: a probability lies in [0, 1]"),
+        (["lose", "1.5"], "lose: a loss of 1.5: a probability lies in [0, 1]"),
     ],
 )
 def test_numbers_that_say_nothing_are_not_injected(words, why, flown, capsys):

@@ -286,10 +286,10 @@ def load(path: Path) -> Arrays:
         When they are not whole, or not those of a run any more.
     """
     try:
-        archive = np.load(path, allow_pickle=False)
-        if not isinstance(archive, NpzFile):
-            raise ValueError("it is one array, not an archive of them")
-        with archive:
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, NpzFile):
+                raise ValueError("it is one array, not an archive of them")
             arrays = dict(archive)
         _refuse_other_forms(arrays)
     except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
