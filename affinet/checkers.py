@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from affinet.checking import Checker, Finding, every, span_of
+from affinet.checking import Checker, Finding, above_zero, every, span_of, times
 from affinet.evidence import Evidence
 from affinet.outcome import Verdict
 from agents.calling import Calling
@@ -27,11 +27,13 @@ Signal = Callable[[Evidence], Mask]
 
 def error_below(level: float) -> Signal:
     """Whether the tracking error is below a level, in square metres, in each tick."""
+    above_zero("error_below", level=level)
     return lambda evidence: evidence.error < level
 
 
 def always(signal: Signal, *, since: float = 0.0, until: float | None = None, name: str = "always") -> Checker:
     """A signal (T,) holds in every tick from `since` to `until`, in seconds."""
+    times(name, since=since, until=until)
 
     def check(evidence: Evidence) -> Finding:
         span = span_of(evidence, since, until)
@@ -45,6 +47,7 @@ def always(signal: Signal, *, since: float = 0.0, until: float | None = None, na
 
 def eventually(signal: Signal, *, since: float = 0.0, within: float | None = None, name: str = "eventually") -> Checker:
     """A signal (T,) holds in some tick from `since` on, `within` so many seconds."""
+    times(name, since=since, within=within)
 
     def check(evidence: Evidence) -> Finding:
         span = span_of(evidence, since, None if within is None else since + within)
@@ -61,12 +64,17 @@ def eventually(signal: Signal, *, since: float = 0.0, within: float | None = Non
 
 def bounded(level: float) -> Checker:
     """The tracking error stays below a level, in square metres."""
-    return always(error_below(level), name=f"bounded({level:g})")
+    name = f"bounded({level:g})"
+    above_zero(name, level=level)
+    return always(error_below(level), name=name)
 
 
 def converged(level: float, by: float) -> Checker:
     """From a time on, in seconds, the tracking error stays below a level, in square metres."""
-    return always(error_below(level), since=by, name=f"converged({level:g}, by={by:g})")
+    name = f"converged({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
+    return always(error_below(level), since=by, name=name)
 
 
 def recovers(level: float, within: float) -> Checker:
@@ -76,6 +84,8 @@ def recovers(level: float, within: float) -> Checker:
     none is left, or none of them ever lifted the error above the level.
     """
     name = f"recovers({level:g}, within={within:g})"
+    above_zero(name, level=level)
+    times(name, within=within)
 
     def check(evidence: Evidence) -> Finding:
         faults = [bite.fault for bite in evidence.bites if bite.at is not None]
@@ -134,6 +144,7 @@ def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
     name = f"consistent({level:g}, since={since:g})"
     if not 0.0 < level < 1.0:
         raise ValueError(f"{name}: level is a share of the ticks between 0 and 1")
+    times(name, since=since)
 
     def check(evidence: Evidence) -> Finding:
         span = span_of(evidence, since, None)
@@ -158,6 +169,7 @@ def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
 def collision_free(distance: float) -> Checker:
     """No two bodies come closer than a distance, in metres."""
     name = f"collision_free({distance:g})"
+    above_zero(name, distance=distance)
 
     def check(evidence: Evidence) -> Finding:
         position, agents = evidence.position, evidence.plan.world.links.agents
@@ -181,6 +193,8 @@ def agreement(level: float, by: float = 0.0) -> Checker:
     Vacuous for estimators that perceive no map.
     """
     name = f"agreement({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
 
     def check(evidence: Evidence) -> Finding:
         psi, span = evidence.arrays["psi"], span_of(evidence, by, None)
@@ -202,6 +216,7 @@ def agreement(level: float, by: float = 0.0) -> Checker:
 def energy(level: float) -> Checker:
     """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s (m2/s3 of accelerations)."""
     name = f"energy({level:g})"
+    above_zero(name, level=level)
 
     def check(evidence: Evidence) -> Finding:
         power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
@@ -217,6 +232,8 @@ def localized(level: float, by: float = 0.0) -> Checker:
     That is the root of the mean squared distance, both relative to their weighted centroid; vacuous where nobody localizes.
     """
     name = f"localized({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
 
     def check(evidence: Evidence) -> Finding:
         if channels.PLACE not in evidence.arrays:
@@ -236,6 +253,8 @@ def localized(level: float, by: float = 0.0) -> Checker:
 def smooth(share: float) -> Checker:
     """Estimated positions do not ring: no more than a share of their steps go back on the step before."""
     name = f"smooth({share:g})"
+    if not 0.0 <= share < 1.0:
+        raise ValueError(f"{name}: share is one of the steps, at least 0 and below 1")
 
     def check(evidence: Evidence) -> Finding:
         if channels.PLACE not in evidence.arrays:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,32 @@ class Checker:
             return Finding(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
 
         return Checker(name, check)
+
+
+def above_zero(checker: str, **numbers: float) -> None:
+    """Refuse what is no finite number above 0: a checker would say nothing of any run.
+
+    Raises
+    ------
+    ValueError
+        With the name of the first that is not.
+    """
+    for name, value in numbers.items():
+        if not 0.0 < value < inf:
+            raise ValueError(f"{checker}: {name} is {value:g}: give a finite number above 0")
+
+
+def times(checker: str, **seconds: float | None) -> None:
+    """Refuse what is no time of a run, in seconds; None is the end of the run.
+
+    Raises
+    ------
+    ValueError
+        With the name of the first that is not.
+    """
+    for name, value in seconds.items():
+        if value is not None and not 0.0 <= value < inf:
+            raise ValueError(f"{checker}: {name} is {value:g}: give finite seconds, at least 0")
 
 
 def span_of(evidence: Evidence, since: float, until: float | None) -> range:

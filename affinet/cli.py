@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = options.parser().parse_args(arguments)
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying, history.Damaged) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except UserCodeError as error:
@@ -139,6 +139,8 @@ def _replay(parsed: argparse.Namespace) -> int:
     from netem.journal import JournalError  # pyarrow takes a while to import
 
     plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=Path.cwd())
+    flown = parsed.directory / history.FILE
+    before = history.load(flown) if flown.exists() and not overrides else None
     for finding in plan.findings:
         if finding.check == "inputs":
             print(f"note: {finding.says}", file=sys.stderr)  # noqa: T201
@@ -146,11 +148,15 @@ def _replay(parsed: argparse.Namespace) -> int:
         status = _fly(plan, "replay", parsed)
     except JournalError as error:
         raise ScenarioError(f"{parsed.directory}: {error}") from error
-    flown, again = parsed.directory / history.FILE, parsed.out / history.FILE
-    if overrides or not flown.exists() or not again.exists():
-        return status  # it was to be another run, or one of the two left nothing to compare
+    if overrides:
+        return status  # it was to be another run
+    again = parsed.out / history.FILE
+    if before is None or not again.exists():
+        gone = flown if before is None else again
+        print(f"{gone}: not there, so no bit was compared; repeat the run with `affinet run`", file=sys.stderr)  # noqa: T201
+        return status or FAIL
     links, channels = plan.world.links, plan.channels
-    difference = compare.first_difference(history.load(flown), history.load(again), links, channels)
+    difference = compare.first_difference(before, history.load(again), links, channels)
     print(difference or f"the same bits as {parsed.directory}", file=sys.stderr)  # noqa: T201
     return status if difference is None else FAIL
 

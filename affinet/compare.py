@@ -65,9 +65,14 @@ class Difference:
 
 def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequence[str]) -> Difference | None:
     """The first difference of two runs over the same links and channels; None when every bit is the same."""
+    names = (*_MADE, *sorted((one.keys() | other.keys()) - {*_MADE, "input"}), "input")
+    for name in names:
+        forms = [_form(arrays.get(name)) for arrays in (one, other)]
+        if forms[0] != forms[1]:  # their values cannot be held against each other
+            return Difference(0, name, "", *forms)
     parted = [
         (tick, place, name)
-        for place, name in enumerate((*_MADE, *sorted(one.keys() - {*_MADE, "input"}), "input"))
+        for place, name in enumerate(names)
         if (tick := _first_tick(one[name], other[name])) is not None
     ]
     if not parted:
@@ -81,6 +86,11 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     return Difference(
         tick, name, _where(name, place[1:], links, channels), repr(here[place].item()), repr(there[place].item())
     )
+
+
+def _form(array: NDArray[Any] | None) -> str:
+    """What kind of numbers, and how many of them in a tick."""
+    return "missing" if array is None else f"{array.dtype} {array.shape[1:]}"
 
 
 def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -27,7 +26,7 @@ def inputs(directory: Path, order: int) -> Model:
     Raises
     ------
     ScenarioError
-        When it holds no run, or one of double integrators, or nothing in it moves.
+        When it holds no run, or a damaged one, or one of double integrators, or nothing in it moves.
     """
     if scenario.resolved(directory).dynamics.order != 1:
         raise ScenarioError(
@@ -36,7 +35,9 @@ def inputs(directory: Path, order: int) -> Model:
     try:
         flown = history.load(directory / history.FILE)["input"]
         return autoregressive.fit(flown[np.isfinite(flown).all(axis=(1, 2))], order)
-    except (OSError, ValueError, BadZipFile) as error:
+    except history.Damaged as error:
+        raise ScenarioError(str(error)) from error
+    except (OSError, ValueError) as error:
         raise ScenarioError(f"{directory}: {error}") from error
 
 

@@ -10,9 +10,11 @@ from functools import partial
 from pathlib import Path
 
 import zenoh
+from pydantic import TypeAdapter
 
 from affinet import selectors
 from affinet.blueprint import formation_of
+from affinet.bounds import LARGEST
 from affinet.sections import Scenario
 from netem import wire
 from netem.control import Action, Answer, Order
@@ -60,12 +62,13 @@ class Wish:
         Raises
         ------
         ValueError
-            When it selects nothing.
+            When it selects nothing, or lasts no time, or its loss is no probability.
         """
         if self.verb in (Action.HEAL, Action.SHOW):
             return Order(Action(self.verb), None)
         formation = formation_of(flown)
         chosen = selectors.pairs(self.links, formation, Links.both_ways(formation.agents, formation.edges))
+        self._refuse_numbers()
         lasts = None if self.lasts_s is None else max(1, round(self.lasts_s / flown.time.dt))
         fault = Fault(
             Verb(self.verb),
@@ -77,6 +80,14 @@ class Wish:
             probability=self.loss,
         )
         return Order(Action.INJECT, fault)
+
+    def _refuse_numbers(self) -> None:
+        if self.lasts_s is not None and not 0.0 < self.lasts_s <= LARGEST:
+            raise ValueError(
+                f"--for {self.lasts_s:g}: give seconds above 0, at most {LARGEST:g}, or leave it out: until healed"
+            )
+        if not 0.0 <= self.loss <= 1.0:
+            raise ValueError(f"a loss of {self.loss:g}: a probability lies in [0, 1]")
 
 
 class NotFlying(RuntimeError):
@@ -110,14 +121,13 @@ class Access:
             When none does.
         """
         try:
-            told = json.loads((out / _FILE).read_text())
+            return TypeAdapter(cls).validate_json((out / _FILE).read_bytes(), strict=True)
         except FileNotFoundError as error:
             raise NotFlying(
                 f"no run flies over processes in {out}; name the directory that `affinet run` printed"
             ) from error
         except ValueError as error:
             raise NotFlying(f"{out}: the run begins just now, or was broken off: {_FILE} is not whole") from error
-        return cls(told["run"], Login(**told["login"]))
 
     def ask(self, order: Order) -> Answer:
         """Give the medium an order; its answer.

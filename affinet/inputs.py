@@ -101,9 +101,23 @@ def kept(out: Path) -> Kept:
     if not file.exists():
         return Kept()
     try:
-        return Kept(**json.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+        return _whole(Kept(**json.loads(file.read_text(encoding="utf-8"))))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise ScenarioError(f"{file}: not what a run wrote there: {error}") from error
+
+
+def _whole(book: Kept) -> Kept:
+    for name in ("originals", "modules"):
+        table = getattr(book, name)
+        if not isinstance(table, dict) or not all(map(_names_a_file, table.values())):
+            raise TypeError(f"{name} must be a table of paths")
+    if book.verdicts is not None and not _names_a_file(book.verdicts):
+        raise TypeError("verdicts must be a path")
+    return book
+
+
+def _names_a_file(said: Any) -> bool:
+    return isinstance(said, str) and "\0" not in said
 
 
 def changed(out: Path) -> list[Finding]:

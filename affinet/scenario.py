@@ -69,8 +69,10 @@ def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = Non
     file = out / FILE
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"{out}: no run directory: {error}") from error
+        if not isinstance(raw, dict):
+            raise TypeError(f"{FILE} holds no table")
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise ScenarioError(f"{out}: no run directory: {error}; name one that `affinet run` printed") from error
     origin, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
     scenario = _validated(inputs.anchored(raw, out.absolute()), origin, asked_from)
     shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}

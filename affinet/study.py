@@ -20,6 +20,7 @@ from affinet import files, study_checks
 from affinet import plan as planning
 from affinet import scenario as scenarios
 from affinet.batch import Runs, fly_all
+from affinet.bounds import Finite, NotNegative
 from affinet.explain import explained, named_in
 from affinet.impairments import Section
 from affinet.plan import Plan, PlanError
@@ -81,11 +82,11 @@ class Claim(Section):
     to: Labels | None = None
     quantity: Quantity | None = None
     to_quantity: Quantity | None = None
-    level: float | None = None
-    levels: dict[str, float] | None = None
-    between: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
-    since: float = 0.0
-    until: float | None = None
+    level: Finite | None = None
+    levels: dict[str, Finite] | None = None
+    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    since: NotNegative = 0.0
+    until: NotNegative | None = None
 
     @model_validator(mode="after")
     def _compared(self) -> Claim:
@@ -116,7 +117,7 @@ class Claim(Section):
 class Bound(Section):
     """A line in the figure that no curve should cross, and what it says."""
 
-    at: float
+    at: Finite
     says: str
 
 
@@ -141,7 +142,7 @@ class Study(Section):
     quick: Size
     axes: list[Axis]
     along: str | None = None
-    since: float = 0.0
+    since: NotNegative = 0.0
     skip: list[Labels] = Field(default_factory=list)
     claims: list[Claim] = Field(default_factory=list)
     _source: Source | None = PrivateAttr(default=None)

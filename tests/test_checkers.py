@@ -1,5 +1,6 @@
 """What checkers find: that it holds, the first tick in which it does not, or that the run never put it to the test."""
 
+import re
 from dataclasses import replace
 from itertools import product
 
@@ -24,6 +25,31 @@ def all_but(*ticks):
 
 def verdict(found):
     return found.verdict, found.tick
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (lambda: checkers.bounded(np.nan), "bounded(nan): level is nan: give a finite number above 0"),
+        (lambda: checkers.bounded(np.inf), "bounded(inf): level is inf: give a finite number above 0"),
+        (lambda: checkers.error_below(np.inf), "error_below: level is inf: give a finite number above 0"),
+        (lambda: checkers.energy(np.inf), "energy(inf): level is inf: give a finite number above 0"),
+        (lambda: checkers.collision_free(-1), "collision_free(-1): distance is -1: give a finite number above 0"),
+        (lambda: checkers.converged(1.0, by=-5), "converged(1, by=-5): by is -5: give finite seconds, at least 0"),
+        (lambda: checkers.recovers(1.0, within=-1), "recovers(1, within=-1): within is -1: give finite seconds"),
+        (lambda: checkers.always(all_but(), since=np.nan), "always: since is nan: give finite seconds, at least 0"),
+        (lambda: checkers.always(all_but(), until=np.inf), "always: until is inf: give finite seconds, at least 0"),
+        (
+            lambda: checkers.eventually(all_but(), within=-1),
+            "eventually: within is -1: give finite seconds, at least 0",
+        ),
+        (lambda: checkers.smooth(2), "smooth(2): share is one of the steps, at least 0 and below 1"),
+        (lambda: checkers.smooth(np.nan), "smooth(nan): share is one of the steps, at least 0 and below 1"),
+    ],
+)
+def test_a_checker_that_could_say_nothing_is_not_made(made, says):
+    with pytest.raises(ValueError, match=f"^{re.escape(says)}"):
+        made()
 
 
 def with_error(run, error):

@@ -75,6 +75,8 @@ def test_a_hunt_that_finds_nothing_says_what_it_tried(capsys, den):
         (("--invariant", "bounded(1e-9)"), "it fails with no fault at all"),
         (("--invariant", "bounded(5)", "--invariant", "bounded(1e-9)"), "it fails with no fault at all"),
         (("--invariant", "bound(5)"), "there are bounded(level)"),
+        (("--invariant", "bounded(1e400)"), "level is inf: give a finite number above 0"),
+        (("--invariant", "converged(1, by=-5)"), "by is -5: give finite seconds, at least 0"),
         (("--invariant", "bounded(5)", "--verbs", "cut,heal,shake"), "--verbs heal,shake: there are cut, lose"),
         (("--invariant", "bounded(5)", "--estimator", "guess"), "agents.estimator"),
     ],

@@ -287,3 +287,22 @@ def test_work_that_fails_ends_all_that_is_under_way(tmp_path):
 def test_a_study_in_a_file_is_named_with_it(tmp_path):
     with pytest.raises(ScenarioError, match=r"^small\.toml:2: "):
         study.load(str(small(tmp_path, ('source = "nobody"', "source = 3"))))
+
+
+@pytest.mark.parametrize(
+    ("number", "key"),
+    [
+        ("since = nan", "since"), ("since = -1.0", "since"), ("until = inf", "until"), ("until = nan", "until"),
+        ('check = "flat"\nlevel = inf', "level"), ('check = "flat"\nlevel = nan', "level"),
+        ('check = "ratio"\nbetween = [nan, 1.0]', "between"), ('check = "ratio"\nbetween = [0.5, inf]', "between"),
+        ('check = "flat"\neach = ["loss"]\nlevels = { "0" = nan }', "levels"),
+    ],
+)  # fmt: skip
+def test_numbers_of_a_claim_that_say_nothing_are_refused(number, key, tmp_path, capsys):
+    check = 'check = "lower"'
+    path = small(tmp_path, (check, number if number.startswith("check") else f"{check}\n{number}"))
+    assert cli.main(["study", str(path), "--quick", "--out", str(tmp_path / "report")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("small.toml:")
+    assert f"claims.1.{key}" in line
+    assert "should be a finite number" in line or "should be greater than or equal to 0" in line

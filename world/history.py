@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from analysis.metrics import tracking_error
@@ -25,23 +28,24 @@ Arrays = dict[str, NDArray[Any]]
 
 FILE = "arrays.npz"  # in a run directory
 
-_BY_TICK = (
-    "position",
-    "measured",
-    "input",
-    "estimate",
-    "known",
-    "covariance",
-    "psi",
-    "feasible",
-    "fates",
-    "newest",
-    "copies",
-    "late",
-    "dropped",
-    "target",
-    "error",
-)
+# Of each array by tick the kind of its numbers, and how many axes it has.
+_BY_TICK = {
+    "position": ("f", 3),
+    "measured": ("f", 3),
+    "input": ("f", 3),
+    "estimate": ("f", 4),
+    "known": ("b", 3),
+    "covariance": ("f", 4),
+    "psi": ("f", 2),
+    "feasible": ("i", 2),
+    "fates": ("u", 3),
+    "newest": ("i", 3),
+    "copies": ("i", 1),
+    "late": ("i", 1),
+    "dropped": ("i", 2),
+    "target": ("f", 3),
+    "error": ("f", 1),
+}
 TAKEN = frozenset(_BY_TICK)  # names that no report can have
 UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
 _MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
@@ -267,6 +271,10 @@ class History:
                 unfinished.unlink(missing_ok=True)
 
 
+class Damaged(ValueError):
+    """The arrays of a run are not what it wrote."""
+
+
 def load(path: Path) -> Arrays:
     """The arrays of a run, by name.
 
@@ -274,9 +282,31 @@ def load(path: Path) -> Arrays:
     ------
     FileNotFoundError
         When the run never wrote them.
+    Damaged
+        When they are not whole, or not those of a run any more.
     """
-    with np.load(path, allow_pickle=False) as archive:
-        return dict(archive)
+    try:
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, NpzFile):
+                raise ValueError("it is one array, not an archive of them")
+            arrays = dict(archive)
+        _refuse_other_forms(arrays)
+    except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
+        why = " ".join(str(error).split())
+        raise Damaged(f"{path}: not what a run wrote there: {why}; fly the run again, or restore the file") from error
+    return arrays
+
+
+def _refuse_other_forms(arrays: Arrays) -> None:
+    if missing := [name for name in _BY_TICK if name not in arrays]:
+        raise ValueError(f"it has no {', '.join(missing)}")
+    ticks = len(arrays["error"]) if arrays["error"].ndim else 0
+    for name, array in arrays.items():
+        kind, axes = _BY_TICK.get(name, ("f", max(2, array.ndim)))
+        rows = ticks + (name == "position")
+        if (array.dtype.kind, array.ndim, array.shape[:1]) != (kind, axes, (rows,)):
+            raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, in a run of {ticks} ticks")
 
 
 def digest(arrays: Arrays) -> str:
