@@ -49,7 +49,8 @@ def command() -> NoReturn:
     terminal.settle()
     status = status_of(main)
     try:
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it was closed
+            sys.stdout.flush()
     except OSError as error:
         if status != BAD_INPUT:  # else it has said already what came in between
             print(one_line(said(error)), file=sys.stderr)  # noqa: T201

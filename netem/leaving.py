@@ -28,6 +28,7 @@ def status_of(main: Callable[[], int | None]) -> int:
 def leave(status: int) -> NoReturn:
     """End this process without waiting for its threads, as the interpreter would for those that are no daemons."""
     for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, gone or full: there is nobody to tell
-            stream.flush()
+        with contextlib.suppress(OSError, ValueError):  # gone, full or closed since: there is nobody to tell
+            if stream is not None:
+                stream.flush()
     os._exit(status)
