@@ -18,7 +18,7 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from affinet import compare, directories, fit, options, scenario, show, terminal
 from affinet import plan as planning
@@ -30,6 +30,7 @@ from affinet.rerun_command import NoViewer, open_viewer
 from affinet.run import Runtime, evidence, fly
 from affinet.sections import Scenario, ScenarioError
 from affinet.words import among, one_line
+from netem.leaving import leave, status_of
 from netem.system_errors import about, said
 from netem.user_code import UserCodeError
 from world import history
@@ -43,10 +44,18 @@ if TYPE_CHECKING:
 PASS, FAIL, BAD_INPUT, USER_CODE, INTERRUPTED = 0, 1, 2, 3, 130
 
 
-def command() -> None:
-    """What the shell starts: the process ends here, with the command's exit status."""
+def command() -> NoReturn:
+    """What the shell starts: the process ends here with the command's exit status, whatever threads a module has started."""
     terminal.settle()
-    sys.exit(main())
+    status = status_of(main)
+    try:
+        if sys.stdout is not None:  # it was closed
+            sys.stdout.flush()
+    except OSError as error:
+        if status != BAD_INPUT:  # else it has said already what came in between
+            print(one_line(said(error)), file=sys.stderr)  # noqa: T201
+        status = status or BAD_INPUT  # the answer did not get out
+    leave(status)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -79,7 +88,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _kept(error: UserCodeError) -> str:
     """The file that has the traceback: there is no run directory."""
-    with tempfile.NamedTemporaryFile("w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8") as log:
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
+    ) as log:
         traceback.print_exception(error, file=log)
     return log.name
 

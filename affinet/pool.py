@@ -27,10 +27,10 @@ def in_processes(work: Callable[[Given], Made], given: Iterable[Given]) -> Gener
             yield waiting.result()
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
-        for worker in set(multiprocessing.active_children()) - others:
-            worker.kill()
         raise
     finally:
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.kill()  # by itself it would wait for threads that a user's own code has started
         pool.shutdown()
 
 

@@ -18,7 +18,7 @@ from agents.controllers import Law
 from agents.estimators.base import Estimator
 from agents.parameters import ParameterError
 from agents.process import Choice
-from netem.user_code import UserCodeError, definition
+from netem.user_code import UserCodeError, definition, text_of
 
 ESTIMATORS = "affinet.estimators"
 LAWS = "affinet.controllers"
@@ -90,7 +90,7 @@ def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
         yield
     except UserCodeError as error:
         if isinstance(error.__cause__, refusal):
-            raise ScenarioError(f"{key}: {error.__cause__}") from error
+            raise ScenarioError(f"{key}: {text_of(error.__cause__)}") from error
         raise
 
 
@@ -140,6 +140,7 @@ def _refuse_another_kind(group: str, algorithm: type) -> None:
 
 
 def _has(algorithm: type, method: str, protocol: type) -> bool:
-    written = getattr(algorithm, method, None)
+    with Calling(algorithm, method):
+        written = getattr(algorithm, method, None)
     unwritten: frozenset[str] = getattr(algorithm, "__abstractmethods__", frozenset())
     return callable(written) and written is not getattr(protocol, method) and method not in unwritten

@@ -163,7 +163,7 @@ def _flown(swarm: Swarm, see: Callable[[Moments, Array], None], batch: int, out:
     except UserCodeError as error:
         log = out / "logs" / "inprocess.log"
         log.parent.mkdir(exist_ok=True)
-        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8", errors="backslashreplace")
         return error
     return None
 

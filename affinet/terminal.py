@@ -18,25 +18,32 @@ def settle() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # or the next file that is opened would be taken for a standard stream
-    sys.stdout, sys.stderr = _lenient(sys.stdout), _lenient(sys.stderr)
+    sys.stdout, sys.stderr = _lenient(sys.stdout, BrokenPipeError), _lenient(sys.stderr, OSError)
 
 
-class _WhileRead(io.FileIO):
-    """A descriptor; what is written after its reader has gone is dropped, as it would have been unread."""
+class _WhileTaken(io.FileIO):
+    """A descriptor; what it does not take for such an error is dropped.
+
+    What comes after its reader has gone would have been unread; and where complaints cannot be written, nor can that one.
+    """
+
+    def __init__(self, descriptor: int, dropping: type[OSError]) -> None:
+        super().__init__(descriptor, "wb", closefd=False)
+        self._dropping = dropping
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Write what is still read."""
+        """Write what is still taken."""
         try:
             return super().write(data)
-        except BrokenPipeError:
+        except self._dropping:
             return memoryview(data).nbytes
 
 
-def _lenient(stream: TextIO | None) -> TextIO | None:
+def _lenient(stream: TextIO | None, dropping: type[OSError]) -> TextIO | None:
     """The same stream; a character that it does not have is a question mark."""
     if not isinstance(stream, io.TextIOWrapper):
         return stream
-    raw = _WhileRead(stream.fileno(), "wb", closefd=False)
+    raw = _WhileTaken(stream.fileno(), dropping)
     return io.TextIOWrapper(
         io.BufferedWriter(raw),
         encoding=stream.encoding,

@@ -10,7 +10,7 @@ from typing import Any
 
 from agents import modules
 from agents.returned import WrongReturn
-from netem.user_code import UserCodeError, definition, is_of_a_signal, place_of, worded
+from netem.user_code import UserCodeError, definition, is_of_a_signal, place_of, text_of, worded
 
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
@@ -47,21 +47,24 @@ class Calling:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if not isinstance(error, Exception | SystemExit) or isinstance(error, UserCodeError) or is_of_a_signal(error):
+        if error is None or isinstance(error, UserCodeError) or is_of_a_signal(error):
             return
         where, written = self._name, self._called
         if not isinstance(written, FunctionType):
             described = written if isinstance(written, type) else type(written)
             where, written = f"{name_of(described)}.{self._name}", _written(described, self._name)
-        what, place = str(error), definition(written)
-        if not isinstance(error, WrongReturn):
+        place = definition(written)
+        if isinstance(error, WrongReturn):
+            what = text_of(error)
+        else:
             what, place = worded(error), place_of(error, written.__module__.partition(".")[0]) or place
         raise UserCodeError(where, what, place) from error
 
 
 def _written(algorithm: type, name: str) -> Any:
     """The method of this name, as far as it is written anywhere; else the class."""
-    method = inspect.unwrap(getattr(algorithm, name, algorithm))
+    method = inspect.getattr_static(algorithm, name, algorithm)  # looking it up may be what went wrong
+    method = inspect.unwrap(method.__func__ if isinstance(method, staticmethod | classmethod) else method)
     return method if isinstance(method, FunctionType) and not method.__code__.co_filename.startswith("<") else algorithm
 
 
@@ -85,9 +88,7 @@ def load(path: str, folder: str | None) -> type:
     name, _, attributes = path.partition(":")
     found: Any = _imported(name, folder)
     for attribute in attributes.split("."):
-        if not hasattr(found, attribute):
-            raise NoSuchAlgorithm(f"{name} has no {attribute!r}{_instead(found, attribute)}")
-        found = getattr(found, attribute)
+        found = _looked_up(found, attribute, name)
     if not isinstance(found, type):
         raise NoSuchAlgorithm(f"{attributes} is no class, but a {type(found).__name__}")
     return found
@@ -99,22 +100,38 @@ def _imported(name: str, folder: str | None) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name is not None and f"{name}.".startswith(f"{error.name}."):
             raise NoSuchAlgorithm(
-                f"{error}; it is looked for beside what names it, beside the scenario and among installed packages"
+                f"{text_of(error)}; it is looked for beside what names it, beside the scenario and among installed packages"
             ) from error
         raise _not_imported(name, error) from error
-    except (Exception, SystemExit) as error:  # a module of the user's own may do anything
+    except modules.NameTaken as error:
+        raise NoSuchAlgorithm(str(error)) from error
+    except BaseException as error:  # a module of the user's own may do anything
         if is_of_a_signal(error):
             raise
         raise _not_imported(name, error) from error
 
 
 def _not_imported(name: str, error: BaseException) -> UserCodeError:
-    return UserCodeError(
-        f"importing {name}", worded(error), place_of(error, name.partition(".")[0]) or f"module {name}"
-    )
+    return _failed(f"importing {name}", name, error)
+
+
+def _looked_up(found: Any, attribute: str, module: str) -> Any:
+    try:
+        return getattr(found, attribute)
+    except AttributeError as error:
+        raise NoSuchAlgorithm(f"{module} has no {attribute!r}{_instead(found, attribute)}") from error
+    except BaseException as error:  # a module's __getattr__ is the user's own code
+        if is_of_a_signal(error):
+            raise
+        raise _failed(f"looking up {attribute!r} in {module}", module, error) from error
+
+
+def _failed(where: str, module: str, error: BaseException) -> UserCodeError:
+    return UserCodeError(where, worded(error), place_of(error, module.partition(".")[0]) or f"module {module}")
 
 
 def _instead(found: Any, wanted: str) -> str:
-    offered = [name for name, each in vars(found).items() if isinstance(each, type)]
+    within = vars(found) if isinstance(found, type | ModuleType) else {}
+    offered = [name for name, each in within.items() if isinstance(each, type)]
     close = difflib.get_close_matches(wanted, offered, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""

@@ -16,6 +16,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+_OURS = frozenset({"affinet", "agents", "world", "netem", "analysis"})
+_HOME = Path(__file__).parents[1]
+
+
+class NameTaken(ValueError):
+    """A module of a user's own is called like a package of which affinet is made."""
+
 
 def imported(name: str, folder: str | None) -> ModuleType:
     """The module of this name.
@@ -31,7 +38,10 @@ def imported(name: str, folder: str | None) -> ModuleType:
     ------
     ImportError
         When there is no such module; and whatever it raises itself.
+    NameTaken
+        When it would take the place of a package of ours.
     """
+    _refuse_to_replace_ours(name.partition(".")[0], folder)
     found: ModuleType = _SHELVES.installed(name) if folder is None else _SHELVES.module(name, folder)
     return found
 
@@ -110,6 +120,14 @@ class _Shelves:
 
 
 _SHELVES = _Shelves()
+
+
+def _refuse_to_replace_ours(top: str, folder: str | None) -> None:
+    if folder is None or top not in _OURS or Path(folder).resolve() == _HOME.resolve():
+        return
+    package = Path(folder) / top
+    file = package if package.is_dir() else package.with_suffix(".py")
+    raise NameTaken(f"{file} is called like a package of affinet's own: rename it")
 
 
 def _import_top(name: str, folder: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 import zenoh
@@ -19,6 +19,7 @@ from agents.estimators.centralized import CentralizedFilter
 from analysis.pursuit import Sighting
 from netem import channels, wire
 from netem.keys import Keys
+from netem.leaving import leave, status_of
 from netem.sequence import Numbering, Sequences
 from netem.session import CENTRE, HUB, Login, await_subscribers, client
 from netem.supervised import Supervisor
@@ -53,7 +54,10 @@ class Choice:
         """
         algorithm = load(self.path, self.folder)
         with Calling(algorithm, "__init__"):
-            return algorithm(**parameters.arguments(algorithm, self.parameters))
+            made = algorithm(**parameters.arguments(algorithm, self.parameters))
+        with Calling(algorithm, "__getattribute__"):
+            isinstance(made, CentralizedFilter)  # asks it for its class, which it may refuse to tell
+        return made
 
 
 @dataclass(frozen=True)
@@ -251,8 +255,12 @@ def _sighting(said: Mapping[str, Any] | None) -> Sighting | None:
         ) from error
 
 
-def main() -> None:
-    """Fly one agent until the run is over."""
+def main() -> NoReturn:
+    """Fly one agent until the run is over; the process ends here, whatever threads the user's own code has started."""
+    leave(status_of(_fly))
+
+
+def _fly() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:

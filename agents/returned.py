@@ -6,6 +6,8 @@ These checks run in every tick, so they compare a shape and a dtype each, and lo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from math import prod
 from typing import Any, NoReturn
 
 import numpy as np
@@ -17,6 +19,8 @@ Shape = tuple[int, ...]
 _ARRAYS = (np.ndarray, np.generic)
 _FLOAT, _BOOL = np.dtype(np.float64), np.dtype(np.bool_)
 _NUMBERS = "biuf"
+_WIDEST = 8  # bytes of a number that a message can carry
+_MOST_AXES, _MOST_NUMBERS = 8, 65536
 _RESERVED = frozenset({air.SENSE, air.MEASUREMENT, air.INPUT, air.CENTRE})
 
 
@@ -56,6 +60,8 @@ def declared(given: Any) -> Channels:
         if not isinstance(fields, Mapping) or not fields:
             raise WrongReturn(f"channel {channel!r} must be a map from names to Field(shape), got {kind(fields)}")
         for name, field in fields.items():
+            if not isinstance(name, str) or not name.isidentifier():
+                raise WrongReturn(f"a field of channel {channel!r} is called by a name like 'place', not {name!r}")
             _declared(f"{channel}.{name}", field)
     return given
 
@@ -63,8 +69,11 @@ def declared(given: Any) -> Channels:
 def _declared(name: str, field: Any) -> None:
     if not isinstance(field, Field):
         raise WrongReturn(f"{name} must be a Field(shape), or Field(shape, bool), got {kind(field)}")
-    if not isinstance(field.shape, tuple) or not all(isinstance(size, int) and size >= 0 for size in field.shape):
+    if not isinstance(field.shape, tuple) or not all(type(size) is int and size >= 0 for size in field.shape):
         raise WrongReturn(f"{name} must have a shape like (2, 2), a tuple of whole numbers, got {field.shape!r}")
+    if len(field.shape) > _MOST_AXES or prod(map(partial(max, 1), field.shape)) > _MOST_NUMBERS:
+        most = f"at most {_MOST_AXES} axes and {_MOST_NUMBERS} numbers"
+        raise WrongReturn(f"{name} must have {most}, as it is sent in every tick, got {field.shape!r}")
     if field.dtype not in (float, np.float64, bool, np.bool_):
         raise WrongReturn(f"{name} holds numbers (float) or truths (bool), got {field.dtype!r}")
 
@@ -132,9 +141,11 @@ def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> No
     for name, value in given.items():
         if not isinstance(name, str) or not name.isidentifier():
             raise WrongReturn(f"a report is called by a name like 'place', not {name!r}")
-        numbers = isinstance(value, _ARRAYS) and value.dtype.kind in _NUMBERS
+        numbers = isinstance(value, _ARRAYS) and value.dtype.kind in _NUMBERS and value.dtype.itemsize <= _WIDEST
         if not numbers or value.shape[: len(batch)] != batch:
-            raise WrongReturn(f"report {name!r} must be an array of numbers (..., *), got {shown(value, batch)}")
+            raise WrongReturn(
+                f"report {name!r} must be an array of numbers (..., *) of at most 64 bits, got {shown(value, batch)}"
+            )
         if wanted is not None and value.shape[len(batch) :] != wanted[name]:
             was = _written(wanted[name])
             raise WrongReturn(f"report {name!r} must stay what it was, {was}, got {shown(value, batch)}")

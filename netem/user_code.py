@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import opcode
 import sysconfig
 import traceback
 from types import TracebackType
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 
 _LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
 _LONGEST = 400
+_RAISE = opcode.opmap["RAISE_VARARGS"]
 
 
 class UserCodeError(RuntimeError):
@@ -54,11 +56,21 @@ def worded(error: BaseException) -> str:
     """An error with its type, in one line."""
     if isinstance(error, SystemExit):
         return "it called sys.exit(), and only the run may end the run"
-    said = error.msg if isinstance(error, SyntaxError) else str(error)
-    line = " ".join(str(said).split())
+    line = " ".join(text_of(error).split())
     if len(line) > _LONGEST:
         line = f"{line[:_LONGEST]} ..."
     return f"{type(error).__name__}: {line}" if line else type(error).__name__
+
+
+def text_of(error: BaseException) -> str:
+    """What an error says, as far as it can say anything, in characters that can be written to any file."""
+    try:
+        said = str(error.msg if isinstance(error, SyntaxError) else error)
+    except BaseException as another:  # its text is the user's own code too, and may do anything
+        if is_of_a_signal(another):
+            raise
+        return f"(its text cannot be had: {type(another).__name__})"
+    return said.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def place_of(error: BaseException, package: str) -> str | None:
@@ -75,7 +87,7 @@ def place_of(error: BaseException, package: str) -> str | None:
 
 def definition(of: Any) -> str:
     """File and line where a class, method or module is written."""
-    written = inspect.unwrap(of)
+    written = of if isinstance(of, type) else inspect.unwrap(of)
     try:
         file = inspect.getsourcefile(written) or inspect.getfile(written)
         line = 1 if inspect.ismodule(written) else inspect.getsourcelines(written)[1]
@@ -85,9 +97,21 @@ def definition(of: Any) -> str:
 
 
 def is_of_a_signal(error: BaseException) -> bool:
-    """Whether it is the exit that a signal handler of ours asks for, wherever it met the user's code."""
+    """Whether it is the exit that a signal handler of ours asks for, or Ctrl-C, wherever it met the user's code."""
     steps = _steps(error.__traceback__)
-    return isinstance(error, SystemExit) and len(steps) > 1 and _is_ours(steps[-1])
+    if not isinstance(error, SystemExit | KeyboardInterrupt):
+        return False
+    if len(steps) > 1 and _is_ours(steps[-1]):
+        return True
+    return isinstance(error, KeyboardInterrupt) and not _was_raised_by_code(error)
+
+
+def _was_raised_by_code(error: BaseException) -> bool:
+    """Whether a `raise` stands where an error began; Python's own handler of signals leaves none."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return trace is not None and trace.tb_frame.f_code.co_code[trace.tb_lasti] == _RAISE
 
 
 def _steps(trace: TracebackType | None) -> list[_Step]:

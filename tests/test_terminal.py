@@ -66,6 +66,25 @@ def test_a_reader_that_has_gone_is_no_failure(command, tmp_path):
     assert b"Broken" not in quiet.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "complaints", "status", "says"),
+    [
+        # Before: a second complaint of the interpreter as it ended, or its exit status 120.
+        pytest.param(("check", "corridor"), "pipe", 2, [b"No space left on device; free some room"], id="answer"),
+        pytest.param(("--help",), "pipe", 2, [b"No space left on device; free some room"], id="help"),
+        pytest.param(("check", "corridor"), "full", 2, [], id="both"),
+        pytest.param(("check", "nowhere"), "full", 2, [], id="complaint"),
+    ],
+)
+def test_a_full_disk_under_the_streams_is_said_in_a_line(arguments, complaints, status, says, tmp_path):
+    with open("/dev/full", "wb") as full:
+        stderr = full if complaints == "full" else subprocess.PIPE
+        done = affinet(*arguments, cwd=tmp_path, stdout=full, stderr=stderr)
+    lines = (done.stderr or b"").splitlines()
+    assert done.returncode == status
+    assert [line[: len(says[0])] for line in lines] == says
+
+
 def test_closed_streams_are_not_taken_for_files_of_the_run(tmp_path):
     # The recording became descriptor 1 or 2, and the run was bad input.
     command = [sys.executable, "-m", "affinet.cli", *RUN, "--out", "run"]

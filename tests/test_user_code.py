@@ -3,6 +3,9 @@
 import json
 import pickle
 import re
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -68,6 +71,25 @@ RAISING = [
 ]
 
 
+def raised(what, says, name):
+    """A row for what an estimator raises in fuse."""
+    return pytest.param("fuse", "late = np", f"late = (_ for _ in ()).throw({what}) or np", says, id=name)
+
+
+MUTE = "type('Mute', (ValueError,), {'__str__': lambda self: SAYS})()"
+RAISING += [
+    # Before: tracebacks, exit status 1 or 130, and no summary.
+    raised("__import__('asyncio').CancelledError('later')", "CancelledError: later (", "cancelled"),
+    raised("GeneratorExit", "GeneratorExit (", "generator-exit"),
+    raised("type('Odd', (BaseException,), {})('odd')", "Odd: odd (", "base-exception"),
+    # Before: a traceback out of the words for the error.
+    raised(MUTE.replace("SAYS", "1 / 0"), "Mute: (its text cannot be had: ZeroDivisionError) (", "mute"),
+    raised(MUTE.replace("SAYS", "7"), "Mute: (its text cannot be had: TypeError) (", "no-text"),
+    # Before: a traceback of UnicodeEncodeError where the log was written.
+    raised(r"ValueError('bad \udcff name')", r"ValueError: bad \udcff name (", "surrogate"),
+]
+
+
 @pytest.mark.parametrize(("method", "old", "new", "says"), RAISING)
 def test_what_is_raised_names_class_method_file_and_line(method, old, new, says, folder):
     text = broken(ESTIMATOR, (old, new))
@@ -124,6 +146,27 @@ RETURNED = [
         "channels",
         (MINE, '{"mine": {"number": (2,)}}'),
         "mine.number must be a Field(shape), or Field(shape, bool), got",
+    ),
+    # Before: a traceback of the plan.
+    ("channels", (MINE, '{"mine": {"number": Field((True,))}}'), "mine.number must have a shape like (2, 2), a tuple"),
+    (
+        "channels",
+        (MINE, '{"mine": {"number": Field((10**12,))}}'),
+        "mine.number must have at most 8 axes and 65536 numbers, as it is sent in every tick, got (1000000000000,)",
+    ),
+    (
+        "channels",
+        (MINE, '{"mine": {"number": Field((0, 10**12))}}'),
+        "mine.number must have at most 8 axes and 65536 numbers",
+    ),
+    ("channels", (MINE, '{"mine": {"number": Field((1,) * 70)}}'), "mine.number must have at most 8 axes and 65536"),
+    # Before: flew in process, and broke over processes.
+    ("channels", (MINE, '{"mine": {5: Field(())}}'), "a field of channel 'mine' is called by a name like 'place', not"),
+    ("channels", (MINE, '{"mine": {"nu\\nmber": Field(())}}'), r"called by a name like 'place', not 'nu\nmber' ("),
+    (
+        "fuse",
+        reporting("{'mine': state.measured.astype(np.longdouble)}"),
+        "report 'mine' must be an array of numbers (..., *) of at most 64 bits, got float128 (..., 4, 2)",
     ),
     ("channels", (MINE, '{"mine": {"number": Field(2)}}'), "mine.number must have a shape like (2, 2), a tuple of"),
     ("channels", (MINE, '{"mine": {"number": Field((), int)}}'), "mine.number holds numbers (float) or truths (bool)"),
@@ -228,16 +271,20 @@ RETURNED = [
     ("fuse", estimate(("(state.known))", "(state.known), None, True)")), "feasible must be bool (...), got a bool"),
     ("fuse", reporting("[1]"), "reports must be a map from names to arrays, got a list"),
     ("fuse", reporting("{'my report': state.measured}"), "a report is called by a name like 'place', not 'my report'"),
-    ("fuse", reporting("{'mine': 3.0}"), "report 'mine' must be an array of numbers (..., *), got a float"),
+    (
+        "fuse",
+        reporting("{'mine': 3.0}"),
+        "report 'mine' must be an array of numbers (..., *) of at most 64 bits, got a float",
+    ),
     (
         "fuse",
         reporting("{'mine': np.zeros((3, 3))}"),
-        "report 'mine' must be an array of numbers (..., *), got float64",
+        "report 'mine' must be an array of numbers (..., *) of at most 64 bits, got float64",
     ),
     (
         "fuse",
         reporting("{'mine': state.measured.astype(str)}"),
-        "report 'mine' must be an array of numbers (..., *), got",
+        "report 'mine' must be an array of numbers (..., *) of at most 64 bits, got",
     ),
 ]
 
@@ -353,6 +400,10 @@ IMPORTS = [
         "import sys", "import no_such_library", "ModuleNotFoundError: No module named 'no_such_lib", id="other"
     ),
     pytest.param("import sys", "from sys import no_such", "ImportError: cannot import name 'no_such'", id="name"),
+    # Before: a traceback, or the command ended as if interrupted.
+    pytest.param("class Last(", "raise GeneratorExit\nclass Last(", "GeneratorExit", id="generator-exit"),
+    pytest.param("class Last(", "raise KeyboardInterrupt\nclass Last(", "KeyboardInterrupt", id="no-ctrl-c"),
+    pytest.param("class Last(", "raise ValueError('\\udcff')\nclass Last(", r"ValueError: \udcff", id="surrogate"),
 ]
 
 
@@ -366,7 +417,7 @@ def test_a_module_that_cannot_be_imported_says_why_and_where(old, new, says, fol
 
 
 PATHS = [
-    ("nosuch:Own", "cannot load nosuch:Own: No module named 'nosuch'; it is looked for beside the scenario and among"),
+    ("nosuch:Own", "cannot load nosuch:Own: No module named 'nosuch'; it is looked for beside what names it, beside"),
     ("NAME:Owm", "cannot load NAME:Owm: NAME has no 'Owm'; did you mean 'Own'?"),
     ("NAME:Own.Inner", "cannot load NAME:Own.Inner: NAME has no 'Inner'"),
     ("NAME:no_indicator", "cannot load NAME:no_indicator: no_indicator is no class, but a function"),
@@ -400,6 +451,70 @@ def test_what_a_module_prints_is_none_of_the_answer(folder, capsys):
     flown = capsys.readouterr()
     assert json.loads(flown.out)["verdict"] == "pass"
     assert "fused" in flown.err
+
+
+LOOKED_UP = [
+    # Before: tracebacks, exit status 1.
+    pytest.param(
+        ("class Own:", "class Another:"),
+        "\ndef __getattr__(name):\n    raise LookupError(name)\n",
+        "looking up 'Own' in NAME: LookupError: ",
+        id="module",
+    ),
+    pytest.param(
+        ("def channels(", "def __getattribute__(self, name):\n        return 1 / 0\n\n    def channels("),
+        "",
+        "NAME:Own.__getattribute__: ZeroDivisionError: division by zero",
+        id="instance",
+    ),
+    pytest.param(
+        ("    def fuse(", "    @lambda _: type('Late', (), {'__get__': lambda *_: 1 / 0})()\n    def fuse("),
+        "",
+        "NAME:Own.fuse: ",
+        id="method",
+    ),
+]
+
+
+@pytest.mark.parametrize(("change", "more", "says"), LOOKED_UP)
+def test_what_looking_up_raises_is_theirs(change, more, says, folder):
+    text = broken(ESTIMATOR, change) + more
+    name = write(folder, text)
+    said = refused("estimator", name)
+    assert said.startswith(says.replace("NAME", name))
+    assert f"{name}.py:" in said
+
+
+@pytest.mark.parametrize("package", ["affinet", "agents", "world", "netem", "analysis"])
+def test_a_module_called_like_a_package_of_ours_is_to_be_renamed(package, folder, capsys):
+    # Before: it took the place of ours, and what was imported next broke.
+    (folder / f"{package}.py").write_text(ESTIMATOR)
+    assert main(["check", "corridor", "--estimator", f"{package}:Own"]) == 2
+    file = folder / f"{package}.py"
+    assert f"{file} is called like a package of affinet's own: rename it" in capsys.readouterr().err
+    assert rehearse(plan.make(scenario.load("corridor", SIMPLE))).outcome.verdict == "pass"
+
+
+SLEEPER = "import sys\nimport threading\n\nthreading.Thread(target=threading.Event().wait).start()"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        pytest.param(["check"], id="check"),
+        pytest.param(["run", "--runtime", "processes"], id="processes", marks=PROCESSES),
+    ],
+)
+def test_a_thread_that_a_module_starts_keeps_no_process(arguments, folder):
+    # Before: the command never returned, and over processes failed for agents that had not left.
+    name = write(folder, broken(ESTIMATOR, ("import sys", SLEEPER)))
+    verb, *options = arguments
+    settings = [option for override in SIMPLE for option in ("--set", override)]
+    program = [sys.executable, "-c", "from affinet.cli import command; command()", verb, "corridor", *options]
+    done = subprocess.run(
+        [*program, "--estimator", f"{name}:Own", *settings], check=False, capture_output=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
 
 
 # ---- in flight
@@ -452,6 +567,43 @@ def test_a_run_that_it_ends_leaves_what_was_flown_and_the_traceback(folder, out)
     traceback = (out / "logs" / "inprocess.log").read_text()
     assert "return state, 1 / 0 if late else estimate" in traceback
     assert traceback.rstrip().endswith(reason)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        # Before: tracebacks, and no summary.
+        pytest.param("raise GeneratorExit", "GeneratorExit (", id="generator-exit"),
+        pytest.param("raise KeyboardInterrupt", "KeyboardInterrupt (", id="no-ctrl-c"),
+        pytest.param(r"raise ValueError('\udcff')", r"ValueError: \udcff (", id="surrogate"),
+    ],
+)
+def test_whatever_ends_a_run_leaves_a_summary(change, says, folder, out):
+    text = broken(
+        ESTIMATOR, ("return state, estimate", f"if late:\n            {change}\n        return state, estimate")
+    )
+    name = write(folder, text)
+    done = fly(made("estimator", name), "inprocess", out, lambda *_: None)
+    assert (done.verdict, done.user_code, done.ticks) == ("fail", True, 7)
+    assert done.reasons[0].startswith(f"{name}:Own.fuse in tick 7: {says}")
+    assert json.loads((out / "summary.json").read_text())["reasons"] == list(done.reasons)
+    assert says.partition(" (")[0] in (out / "logs" / "inprocess.log").read_text()
+
+
+@pytest.mark.parametrize("where", ["import", "method"])
+def test_ctrl_c_in_a_users_code_is_nobodys_mistake(where, folder):
+    interrupt = "signal.raise_signal(signal.SIGINT)"
+    change = {
+        "import": ("import sys", f"import signal\n{interrupt}"),
+        "method": ("late = np", f"import signal; late = {interrupt} or np"),
+    }[where]
+    name = write(folder, broken(ESTIMATOR, change))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            made("estimator", name)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_one_that_ends_in_the_first_tick_leaves_a_summary(folder, out):
