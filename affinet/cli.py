@@ -87,11 +87,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _kept(error: UserCodeError) -> str:
-    """The file that has the traceback: there is no run directory."""
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
-    ) as log:
-        traceback.print_exception(error, file=log)
+    """The file that has the traceback, as there is no run directory; or why none has it."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as log:
+            traceback.print_exception(error, file=log)
+    except OSError as refused:
+        return f"not kept, {said(refused)}"
     return log.name
 
 

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -98,6 +99,18 @@ def test_what_is_raised_names_class_method_file_and_line(method, old, new, says,
     assert said.startswith(f"{name}:Own.{method}: {says}")
     assert said.endswith(f"({folder / name}.py:{line_of(text, new)})")
     assert "\n" not in said
+
+
+def test_a_traceback_that_cannot_be_kept_hides_nothing(folder, monkeypatch, capsys):
+    def no_folder(*_, **__):
+        raise FileNotFoundError(2, "No usable temporary directory")
+
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", no_folder)  # as with ulimit -f 0
+    name = write(folder, broken(ESTIMATOR, (SENSED, f"{SENSED} @ np.eye(3)")))
+    assert main(["check", "corridor", "--set", f"agents.estimator={name}:Own"]) == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{name}:Own.sense: ValueError: matmul")
+    assert "; traceback: not kept, No such file or directory" in line
 
 
 def test_the_line_is_that_of_the_users_code_even_where_ours_stumbles(folder):
