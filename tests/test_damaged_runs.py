@@ -145,7 +145,7 @@ def test_a_scenario_that_is_no_table_is_no_run(text, verb, run, tmp_path, capsys
     ("changes", "differs"),
     [
         ({"agents": {"estimator": "none"}}, "in one run and"),
-        ({"formation": {"preset": "hexa10"}, "agents": {}}, "position is float64 (7, 2) in one run and float64 (10, "),
+        ({"formation": {"preset": "hexa10"}, "agents": {}}, " is float64 (7, 2) in one run and float64 (10, "),
     ],
     ids=["another estimator", "more agents"],
 )

@@ -80,7 +80,15 @@ def test_a_hunt_that_finds_nothing_says_what_it_tried(capsys, den):
         (("--invariant", "bounded(5)", "--verbs", "cut,heal,shake"), "--verbs heal,shake: there are cut, lose"),
         (("--invariant", "bounded(5)", "--estimator", "guess"), "agents.estimator"),
     ],
-    ids=["fails undisturbed", "one of two fails undisturbed", "no checker", "no such verbs", "no such estimator"],
+    ids=[
+        "fails undisturbed",
+        "one of two fails undisturbed",
+        "no checker",
+        "no level",
+        "no time",
+        "no such verbs",
+        "no such estimator",
+    ],
 )
 def test_what_cannot_be_hunted_is_refused(options, says, capsys):
     assert cli.main(["hunt", "corridor", *BRIEF, *options]) == 2

@@ -168,7 +168,7 @@ def test_a_case_that_cannot_fly_is_named_before_any_has_flown(tmp_path):
     path.write_text(MAP.replace("none = [], half", "none = ['time.dt=0.3'], half"))
     with pytest.raises(
         ScenarioError,
-        match=r"^wrong\.toml: case loss=none, law=static, estimator=none: --set: time: .*not a whole number",
+        match=r"^wrong\.toml: case loss=none, law=static, estimator=none: time: .*not a whole number",
     ):
         study.plans(study.load(str(path)), quick=True)
 
