@@ -252,8 +252,6 @@ def _edges(formation: Formation) -> Finding:
 def leaders(formation: Formation) -> Finding:
     """Whether the leaders can carry an affine formation."""
     dimension = formation.dimension
-    if twice := sorted(leader for leader in set(formation.leaders) if formation.leaders.count(leader) > 1):
-        return Finding("leaders", "error", f"agent {twice[0]} is named twice: name each leader once")
     rows = np.array(sorted(set(formation.leaders)), dtype=np.int64) - 1
     spread = formation.nominal[rows] - formation.nominal[rows].mean(axis=0) if len(rows) else np.zeros((0, dimension))
     rank = np.linalg.matrix_rank(spread) if len(rows) else 0

@@ -30,7 +30,7 @@ _PROTOCOLS: Mapping[str, tuple[type, tuple[str, ...]]] = {
 
 def names(group: str) -> list[str]:
     """The names that installed packages offer in a group."""
-    return sorted(point.name for point in entry_points(group=group))
+    return sorted(_offered(group))
 
 
 def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mapping[str, Path]) -> Choice:
@@ -72,9 +72,9 @@ def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, P
     UserCodeError
         When its module cannot be imported.
     """
-    offered = {
-        point.name: f"{point.module}:{point.attr}" for group in _PROTOCOLS for point in entry_points(group=group)
-    }
+    if not given:
+        return
+    offered = {name: path for group in _PROTOCOLS for name, path in _offered(group).items()}
     for name, table in given.items():
         key = f"agents.parameters.{name}"
         if name not in offered and ":" not in name:
@@ -94,10 +94,14 @@ def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
         raise
 
 
+def _offered(group: str) -> dict[str, str]:
+    return {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}
+
+
 def _path(group: str, key: str, name: str) -> str:
     if ":" in name:
         return name
-    offered = {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}
+    offered = _offered(group)
     if name not in offered:
         raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(offered))}, or give 'module:Class'")
     return offered[name]
