@@ -527,7 +527,7 @@ def test_of_several_mistakes_the_first_is_told_and_the_others_are_named_with_the
 
 def test_a_file_that_is_no_toml_is_named_with_the_place(file):
     file.write_text("seed = 1\ndt 0.01\n")
-    with pytest.raises(ScenarioError, match=r"^bad\.toml: not TOML: .*line 2"):
+    with pytest.raises(ScenarioError, match=r"^bad\.toml:2: not TOML: .*, at column 4$"):
         scenario.load(str(file))
 
 
