@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from agents.process import AgentBrief
 from netem import keys
 from netem.process import MediumBrief
 from netem.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
-from netem.system_errors import said
+from netem.system_errors import afterwards, said
 from world.brief import WorldBrief
 
 
@@ -95,25 +96,32 @@ class Launcher:
 
     def fly(self) -> Flight:
         """Run to the end, to the first thing that goes wrong, or until the run is asked to end."""
+        try:
+            self._fly_with_a_crew()
+        except (RunFailed, Interrupted) as failure:
+            self.flight.failure = str(failure)
+            self.flight.user_code = isinstance(failure, UserCodeFailed)
+        except OSError as error:
+            self.flight.failure = f"the swarm could not be launched: {said(error)}"
+        return self.flight
+
+    def _fly_with_a_crew(self) -> None:
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
         crew = Crew(logs, self._plan.scenario.time.patience, self._interruption)
         launched = time.perf_counter()
-        with tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private:
+        with (
+            afterwards(partial(self._note, crew), partial(_remove_unwritten, self._out)),
+            tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private,
+            crew,
+        ):
             self._private = Path(private)
-            try:
-                with crew:
-                    self._start(crew)
-                    with Access(self._run, self._logins[CONTROL]).granted(self._out):
-                        self._fly(crew, launched)
-            except (RunFailed, Interrupted) as failure:
-                self.flight.failure = str(failure)
-                self.flight.user_code = isinstance(failure, UserCodeFailed)
-            except OSError as error:
-                self.flight.failure = f"the swarm could not be launched: {said(error)}"
+            self._start(crew)
+            with Access(self._run, self._logins[CONTROL]).granted(self._out):
+                self._fly(crew, launched)
+
+    def _note(self, crew: Crew) -> None:
         self.flight.processes = [child.report() for child in crew.children]
-        _remove_unwritten(self._out)
-        return self.flight
 
     def _start(self, crew: Crew) -> None:
         private = self._private

@@ -90,10 +90,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
 
     launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
     flight = launcher.flight
-    try:
-        launcher.fly()
-    except OSError as error:
-        flight.failure = flight.failure or f"the swarm could not be launched: {said(error)}"
+    launcher.fly()
     path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
     failure, timeline, told = flight.failure, plan.timeline, None
     try:
