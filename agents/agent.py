@@ -9,14 +9,18 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents import returned, second_order
-from agents.brief import DERIVATIVES, Array, Brief, Mask, Own, Reading
-from agents.calling import Calling
-from agents.controllers import Law, hold_distances, pilot, saturated
-from agents.estimators.base import Channels, Estimate, Estimator, Field, Fields, Heard
-from analysis.affine import Manoeuvre
-from analysis.pursuit import Sighting
-from netem.channels import INPUT
+from agents.brief import DERIVATIVES, Brief, Own, Reading
+from agents.estimate import Estimate
+from agents.estimators.base import Estimator
+from agents.exchange import Channels, Field, Fields, Heard
+from agents.laws.base import Law
+from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
+from agents.loading import returned
+from agents.loading.calling import Calling
+from analysis.models.affine import Manoeuvre
+from analysis.models.arrays import Array, Mask
+from analysis.models.pursuit import Sighting
+from netem.core.channels import INPUT
 
 
 class AgentState(NamedTuple):
@@ -27,7 +31,7 @@ class AgentState(NamedTuple):
     input: Array
 
 
-class Action(NamedTuple):
+class AgentAction(NamedTuple):
     """What an agent does in a tick: its input (..., D), a velocity, an acceleration ..., and the estimate behind it."""
 
     input: Array
@@ -111,7 +115,7 @@ class Agent:
         position: Array | None,
         motion: Array | None,
         sighting: Sighting | None,
-    ) -> tuple[AgentState, Action]:
+    ) -> tuple[AgentState, AgentAction]:
         """Estimate from what was heard, and steer; `tick` is what its clock says.
 
         Only leaders, and those whose law wants it, have their own `position` (..., D); only integrators of an order m
@@ -130,7 +134,7 @@ class Agent:
             steered = np.where(brief.leader[..., None], led, steered)
         if self.limit is not None:
             steered = saturated(steered, self.limit)
-        return AgentState(estimator, law, steered), Action(steered, estimate)
+        return AgentState(estimator, law, steered), AgentAction(steered, estimate)
 
     def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
         batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
@@ -154,7 +158,7 @@ class Agent:
     def _led(self, mission: Manoeuvre, tick: Reading, position: Array, velocity: Array) -> Array:
         if self.law.order == 1:
             return pilot(self.brief, mission, self.leader_gain, tick, position)
-        return second_order.pilot(self.brief, mission, self.leader_gain, tick, position, velocity)
+        return pilot_of_accelerations(self.brief, mission, self.leader_gain, tick, position, velocity)
 
 
 def renew(state: Any, fresh: Any, which: Mask) -> Any:

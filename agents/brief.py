@@ -6,19 +6,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from analysis.models.affine import Manoeuvre
+from analysis.models.algebra import sum_over
+from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.pursuit import Sighting, Target
+from analysis.models.sensor import Sensor
 
-from analysis.affine import Manoeuvre
-from analysis.algebra import sum_over
-from analysis.pursuit import Sighting, Target
-from analysis.sensor import Sensor
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # What an input is, by the order of the bodies that fly it, up to quadruple integrators; lower derivatives are motion.
 DERIVATIVES = ("velocity", "acceleration", "jerk", "snap")
-Reading = int | NDArray[np.int64]  # of a clock, in ticks; one for all, or each its own
+Reading = int | Integers  # of a clock, in ticks; one for all, or each its own
 
 
 class Own(NamedTuple):
@@ -85,7 +81,7 @@ class Brief:
     nominal: Array
     relative: Array
     present: Mask
-    back: NDArray[np.int64]
+    back: Integers
     stress: Array
     leads: Mask
     sensor: Sensor

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.brief import Array
+from analysis.models.arrays import Array
 
 
 def save(path: Path, state: Any) -> None:

@@ -10,20 +10,23 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 import zenoh
 
-from agents import checkpoint, parameters
+from agents import checkpoint
 from agents.agent import Agent, AgentState
-from agents.brief import Array, Brief
-from agents.calling import Calling, load
-from agents.estimators.base import Heard
+from agents.brief import Brief
 from agents.estimators.centralized import CentralizedFilter
-from analysis.pursuit import Sighting
-from netem import channels, wire
-from netem.keys import Keys
-from netem.leaving import leave, status_of
-from netem.sequence import Numbering, Sequences
-from netem.session import CENTRE, HUB, Login, await_subscribers, client
-from netem.supervised import Supervisor
-from netem.user_code import UserCodeError
+from agents.exchange import Heard
+from agents.loading import parameters
+from agents.loading.calling import Calling, load
+from analysis.models.arrays import Array
+from analysis.models.pursuit import Sighting
+from netem.core import channels
+from netem.processes.leaving import leave, status_of
+from netem.processes.supervised import Supervisor
+from netem.processes.user_code import UserCodeError
+from netem.wire import messages
+from netem.wire.keys import Keys
+from netem.wire.sequence import Numbering, Sequences
+from netem.wire.session import CENTRE, HUB, Login, await_subscribers, client
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class AgentBrief:
 _KINDS = {"f": "iuf", "i": "i", "u": "iu", "b": "b"}
 
 
-class Node:
+class AgentNode:
     """One agent on the network."""
 
     def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: AgentBrief) -> None:
@@ -143,19 +146,19 @@ class Node:
 
     def run(self) -> None:
         """Sense, broadcast, hear and act until the medium says that the run is over."""
-        sensed: wire.SenseInbox | None = None
+        sensed: messages.SenseInbox | None = None
         tick = 0
         while True:
             self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
-            inbox = wire.unpack_inbox(self._inbox.recv().payload.to_bytes())
+            inbox = messages.unpack_inbox(self._inbox.recv().payload.to_bytes())
             self._inboxes.check("inbox", inbox.seq)
             tick = inbox.k
             self._supervisor.works(tick)
             try:
-                if isinstance(inbox, wire.SenseInbox):
+                if isinstance(inbox, messages.SenseInbox):
                     sensed = inbox
                     self._sense(inbox)
-                elif isinstance(inbox, wire.ExchangeInbox) and sensed is not None:
+                elif isinstance(inbox, messages.ExchangeInbox) and sensed is not None:
                     self._exchange(inbox, sensed)
                 else:
                     return
@@ -163,7 +166,7 @@ class Node:
                 error.tick = inbox.k
                 raise
 
-    def _sense(self, inbox: wire.SenseInbox) -> None:
+    def _sense(self, inbox: messages.SenseInbox) -> None:
         measured = np.zeros((self._width, self._dimension))
         seen = np.zeros(self._width, dtype=bool)
         if inbox.neighbours:
@@ -173,10 +176,10 @@ class Node:
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
             self._broadcasts[name].put(
-                wire.pack(wire.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
+                messages.pack(messages.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
             )
 
-    def _exchange(self, inbox: wire.ExchangeInbox, sensed: wire.SenseInbox) -> None:
+    def _exchange(self, inbox: messages.ExchangeInbox, sensed: messages.SenseInbox) -> None:
         self._heard += len(inbox.messages)
         heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
         position, motion = _numbers(sensed.position), _numbers(sensed.motion)
@@ -185,7 +188,7 @@ class Node:
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
-        act = wire.Act(
+        act = messages.Act(
             k=inbox.k,
             src=self._number,
             seq=self._numbers.next("act"),
@@ -198,24 +201,24 @@ class Node:
             reports=dict(estimate.reports),
             heard=self._heard,
         )
-        self._act.put(wire.pack(act))
+        self._act.put(messages.pack(act))
 
     def _from_the_centre(self, tick: int) -> Mapping[str, Heard]:
         if self._told is None:
             return {}
         self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
-        told = wire.unpack(wire.Told, self._told.recv().payload.to_bytes())
+        told = messages.unpack(messages.Told, self._told.recv().payload.to_bytes())
         self._supervisor.works(tick)
         self._tellings.check("told", told.seq)
         if told.k != tick:
-            raise wire.WireError(f"the centre told of tick {told.k} in tick {tick}")
+            raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
         fields = {name: np.array(getattr(told, name), dtype=np.float64) for name in ("relative", "covariance")}
         return {channels.CENTRE: Heard(fields, np.ones(self._width, dtype=bool))}
 
-    def _gather(self, messages: wire.Rows) -> Mapping[str, Heard]:
+    def _gather(self, arrived: messages.Rows) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.
         said: dict[str, dict[int, Any]] = {name: {} for name in self._channels}
-        for message in messages:
+        for message in arrived:
             if message["channel"] in said:
                 said[message["channel"]][self._slot[message["src"]]] = message["payload"]
         return {name: self._heard_on(name, said[name]) for name in self._channels}
@@ -235,11 +238,11 @@ class Node:
             rows = np.zeros((self._width, *field.shape))
             for slot, payload in said.items():  # one of them is wrong: which
                 whose = f"agent {self._neighbours[slot]} on {channel!r}: {name!r}"
-                rows[slot] = wire.numbers(payload.get(name), whose, field.shape, kinds)
+                rows[slot] = messages.numbers(payload.get(name), whose, field.shape, kinds)
         return rows.astype(field.dtype, copy=False)
 
 
-def _numbers(given: wire.Rows | None) -> Array | None:
+def _numbers(given: messages.Rows | None) -> Array | None:
     return None if given is None else np.array(given, dtype=np.float64)
 
 
@@ -250,7 +253,7 @@ def _sighting(said: Mapping[str, Any] | None) -> Sighting | None:
         place = np.array(said["position"], dtype=np.float64)
         return Sighting(place, np.array(bool(said["done"])), np.array(int(said["by"])), np.array(int(said["method"])))
     except (KeyError, TypeError, ValueError) as error:
-        raise wire.WireError(
+        raise messages.WireError(
             f"a sighting has position, done, by and method, not {said!r} (see docs/protocol.md)"
         ) from error
 
@@ -264,7 +267,7 @@ def _fly() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
-        node = Node(session, supervisor, brief)
+        node = AgentNode(session, supervisor, brief)
         node.await_everybody()
         supervisor.tell("ready")
         node.run()

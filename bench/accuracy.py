@@ -1,4 +1,4 @@
-"""Every model of the medium against its closed form: at least a million verdicts each, through `netem.medium.Medium`.
+"""Every model of the medium against its closed form: at least a million verdicts each, through `netem.medium.medium.Medium`.
 
     python bench/accuracy.py [--verdicts 1000000] [--seed 1] [--only loss,delay,place,independence]
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from netem.draws import Array
-from netem.links import Integers
+from analysis.models.arrays import Array, Integers
 
 SIGMAS = 3.0  # of a mean or a share
 SIGMAS_OF_MANY = 4.0  # of correlations, of which there are many

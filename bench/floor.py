@@ -8,8 +8,8 @@ import time
 
 import zenoh
 
-from netem.keys import Keys
-from netem.session import HUB, WORLD, Login, await_subscribers, client, hub
+from netem.wire.keys import Keys
+from netem.wire.session import HUB, WORLD, Login, await_subscribers, client, hub
 
 CHANNELS = ("input", "measurement", "theta")
 FIFO = zenoh.handlers.FifoChannel

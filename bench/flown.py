@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from netem.air import Verdicts
-from netem.chain import Chain, ChainLayer
-from netem.draws import Array
-from netem.fault import Fault
-from netem.links import Links, Mask
-from netem.medium import Medium
-from netem.profile import Profile
-from netem.timeline import Timeline
+from analysis.models.arrays import Array, Mask
+from netem.core.links import Links
+from netem.faults.fault import Fault
+from netem.faults.timeline import Timeline
+from netem.impairments.chain import Chain, ChainLayer
+from netem.impairments.profile import Profile
+from netem.medium.in_flight import Verdicts
+from netem.medium.medium import Medium
 
 DT = 0.01
 ONE = ("theta",)

@@ -8,10 +8,10 @@ import flown
 import numpy as np
 from against import Against, Row
 
-from netem.delay import Delay, Law
-from netem.draws import Array
-from netem.fate import Fate
-from netem.loss import bernoulli, gilbert_elliott
+from analysis.models.arrays import Array
+from netem.impairments.delay import DelayLaw, MessageDelay
+from netem.impairments.loss import bernoulli, gilbert_elliott
+from netem.medium.verdict import Fate
 
 _CHANNELS = ("sense", "input", "theta")
 
@@ -59,7 +59,7 @@ def _links(verdicts: int, seed: int) -> Iterator[Row]:
 def _layers(verdicts: int, seed: int) -> Iterator[Row]:
     """What befalls one message: if a loss chose its messages by anything else, the others would not be as they all are."""
     links, ticks = flown.size(2 * verdicts)
-    law = Delay(Law.UNIFORM, np.ones(len(links), dtype=bool), 0.105, 0.1, np.empty(0), 0.0, False)
+    law = MessageDelay(DelayLaw.UNIFORM, np.ones(len(links), dtype=bool), 0.105, 0.1, np.empty(0), 0.0, False)
     chances, corrupt = np.full(len(links), 0.3), np.tile([0.0, 0.1, 0.0, 0.2], (len(links), 1))
     chain = flown.layers(links, bernoulli(0.5))
     made = flown.fly(flown.medium(seed, links, delays=(law,), duplicate=chances, corrupt=corrupt, chains=chain), ticks)

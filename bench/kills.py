@@ -29,8 +29,8 @@ from typing import Any
 import psutil
 from rerun.chunk import RrdReader
 
-from netem import journal
-from world.logbook import RECORDING
+from netem.medium import journal
+from world.recording.logbook import RECORDING
 
 _ROLES = ("launcher", "world", "netem", "agents")
 _LIMIT_S, _FLIGHT_S, _PATIENCE_S = 5.0, 3.0, 90.0
@@ -54,7 +54,7 @@ class Run:
 
     def __init__(self, folder: Path, scenario: str) -> None:
         self._folder, self.out = folder, folder / "run"
-        command = [sys.executable, "-m", "affinet.cli", "run", scenario, "--json", "--out", str(self.out)]
+        command = [sys.executable, "-m", "affinet.cli.commands", "run", scenario, "--json", "--out", str(self.out)]
         with (folder / "said").open("w") as said, (folder / "complained").open("w") as complained:
             # The run's temporary directory is in its processes' environment: that tells them from all others.
             environment = os.environ | {"TMPDIR": str(folder)}

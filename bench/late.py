@@ -10,15 +10,15 @@ import numpy as np
 from against import Against, Row
 from scipy import stats
 
-from netem.air import Verdicts
-from netem.corrupt import Mark
-from netem.delay import Delay, Law
-from netem.draws import Array
-from netem.fate import Fate
-from netem.links import Links
-from netem.medium import Medium
-from netem.rate import Rate
-from netem.weather import Forecast
+from analysis.models.arrays import Array
+from netem.core.links import Links
+from netem.impairments.corrupt import Mark
+from netem.impairments.delay import DelayLaw, MessageDelay
+from netem.impairments.rate import Rate
+from netem.medium.by_tick import ImpairmentsByTick
+from netem.medium.in_flight import Verdicts
+from netem.medium.medium import Medium
+from netem.medium.verdict import Fate
 
 _TABLE = np.array([0.004, 0.010, 0.011, 0.015, 0.040, 0.120])
 _PARETO_SHAPE = 1.0 + (1.0 + (0.040 / 0.010) ** 2) ** 0.5
@@ -29,7 +29,7 @@ class Case(NamedTuple):
     """A delay, and its distribution by another hand."""
 
     parameters: str
-    law: Law
+    law: DelayLaw
     mean: float
     jitter: float
     correlation: float
@@ -37,16 +37,16 @@ class Case(NamedTuple):
 
 
 CASES = (
-    Case("30 ms", Law.CONSTANT, 0.030, 0.0, 0.0, stats.norm(0.030, 1e-12).cdf),
-    Case("20 +- 15 ms", Law.UNIFORM, 0.020, 0.015, 0.0, stats.uniform(0.005, 0.030).cdf),
-    Case("10 +- 20 ms, none below 0", Law.UNIFORM, 0.010, 0.020, 0.0, stats.uniform(-0.010, 0.040).cdf),
-    Case("50, 10 ms", Law.NORMAL, 0.050, 0.010, 0.0, stats.norm(0.050, 0.010).cdf),
-    Case("10, 10 ms, none below 0", Law.NORMAL, 0.010, 0.010, 0.0, stats.norm(0.010, 0.010).cdf),
-    Case("50, 10 ms, correlation 0.5", Law.NORMAL, 0.050, 0.010, 0.5, stats.norm(0.050, 0.010).cdf),
-    Case("30 ms", Law.EXPONENTIAL, 0.030, 0.0, 0.0, stats.expon(0.0, 0.030).cdf),
-    Case("30 ms, correlation 0.9", Law.EXPONENTIAL, 0.030, 0.0, 0.9, stats.expon(0.0, 0.030).cdf),
-    Case("40, 10 ms", Law.PARETO, 0.040, 0.010, 0.0, _PARETO.cdf),
-    Case("6 values", Law.TABLE, 0.0, 0.0, 0.0, lambda s: np.searchsorted(_TABLE, s, side="right") / len(_TABLE)),
+    Case("30 ms", DelayLaw.CONSTANT, 0.030, 0.0, 0.0, stats.norm(0.030, 1e-12).cdf),
+    Case("20 +- 15 ms", DelayLaw.UNIFORM, 0.020, 0.015, 0.0, stats.uniform(0.005, 0.030).cdf),
+    Case("10 +- 20 ms, none below 0", DelayLaw.UNIFORM, 0.010, 0.020, 0.0, stats.uniform(-0.010, 0.040).cdf),
+    Case("50, 10 ms", DelayLaw.NORMAL, 0.050, 0.010, 0.0, stats.norm(0.050, 0.010).cdf),
+    Case("10, 10 ms, none below 0", DelayLaw.NORMAL, 0.010, 0.010, 0.0, stats.norm(0.010, 0.010).cdf),
+    Case("50, 10 ms, correlation 0.5", DelayLaw.NORMAL, 0.050, 0.010, 0.5, stats.norm(0.050, 0.010).cdf),
+    Case("30 ms", DelayLaw.EXPONENTIAL, 0.030, 0.0, 0.0, stats.expon(0.0, 0.030).cdf),
+    Case("30 ms, correlation 0.9", DelayLaw.EXPONENTIAL, 0.030, 0.0, 0.9, stats.expon(0.0, 0.030).cdf),
+    Case("40, 10 ms", DelayLaw.PARETO, 0.040, 0.010, 0.0, _PARETO.cdf),
+    Case("6 values", DelayLaw.TABLE, 0.0, 0.0, 0.0, lambda s: np.searchsorted(_TABLE, s, side="right") / len(_TABLE)),
 )
 
 
@@ -61,21 +61,21 @@ def check(verdicts: int, seed: int) -> Iterator[Row]:
     yield from _rate(verdicts, seed + 24)
 
 
-def _law(links: Links, case: Case, *, ordered: bool = False) -> Delay:
+def _law(links: Links, case: Case, *, ordered: bool = False) -> MessageDelay:
     rows = np.ones(len(links), dtype=bool)
-    return Delay(case.law, rows, case.mean, case.jitter, _TABLE, case.correlation, ordered)
+    return MessageDelay(case.law, rows, case.mean, case.jitter, _TABLE, case.correlation, ordered)
 
 
 def _delay(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     law, against = _law(links, case), Against(f"delay, {case.law}", case.parameters)
     air = flown.medium(seed, links, delays=(law,))
-    forecast = Forecast(seed, links, flown.profile(links, delays=(law,)), np.array([0]), np.array([False]))
+    forecast = ImpairmentsByTick(seed, links, flown.profile(links, delays=(law,)), np.array([0]), np.array([False]))
     seconds = np.stack([forecast.at(tick).delay_s[0] for tick in range(ticks)])
     wait = flown.fly(air, ticks).due[:, 0] - np.arange(ticks)[:, None]
     early, late = wait < seconds / flown.DT - 1e-6, wait >= seconds / flown.DT + 1.0
     yield against.exactly("arrive before they are due, or a tick late", 0.0, float((early | late).sum()))
-    if case.law is Law.CONSTANT:
+    if case.law is DelayLaw.CONSTANT:
         yield against.exactly("ticks", 3.0, float(wait.mean()))
         return
     yield against.mean("mean, s", law.mean_delay, seconds.mean(axis=0))
@@ -83,7 +83,7 @@ def _delay(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     at_once = float(case.cdf(np.zeros(1))[0])
     if at_once > 0.01:
         yield against.share("share at once", at_once, apart == 0.0)
-    if case.law is Law.TABLE:
+    if case.law is DelayLaw.TABLE:
         counted = np.array([(apart == value).sum() for value in _TABLE])
         yield against.counts("seconds", np.full(len(_TABLE), 1.0 / len(_TABLE)), counted)
         return

@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.launcher import Launcher
-from affinet.plan import Plan
-from netem import wire
-from netem.session import ENVIRONMENT, HUB, WORLD, agent_name
+from affinet.planning import plan as planning
+from affinet.planning.plan import Plan
+from affinet.runtimes.launcher import Launcher
+from affinet.scenario import loading
+from netem.wire import messages
+from netem.wire.session import ENVIRONMENT, HUB, WORLD, agent_name
 
 
 def sizes(plan: Plan) -> dict[str, int]:
@@ -43,21 +43,30 @@ def sizes(plan: Plan) -> dict[str, int]:
         "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
         "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
     }
-    broadcasts = [wire.pack(wire.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
-    messages = {
-        "sense": wire.pack(
-            wire.Sense(
+    broadcasts = [messages.pack(messages.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
+    told = {
+        "sense": messages.pack(
+            messages.Sense(
                 500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), None, None, []
             )
         ),
-        "seen": wire.pack(
-            wire.SenseInbox(
-                500, HUB, 500, wire.Phase.SENSE, 500, [1] * heard, number(size=(heard, 2)).tolist(), None, None, None
+        "seen": messages.pack(
+            messages.SenseInbox(
+                500,
+                HUB,
+                500,
+                messages.Phase.SENSE,
+                500,
+                [1] * heard,
+                number(size=(heard, 2)).tolist(),
+                None,
+                None,
+                None,
             )
         ),
-        "heard": wire.pack_exchange(500, 500, broadcasts * heard),
-        "act": wire.pack(
-            wire.Act(
+        "heard": messages.pack_exchange(500, 500, broadcasts * heard),
+        "act": messages.pack(
+            messages.Act(
                 k=500,
                 src=1,
                 seq=500,
@@ -71,11 +80,11 @@ def sizes(plan: Plan) -> dict[str, int]:
                 heard=500,
             )
         ),
-        "journal": wire.pack(
-            wire.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [], [], 0, [], [], [9] * agents, None)
+        "journal": messages.pack(
+            messages.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [], [], 0, [], [], [9] * agents, None)
         ),
     }
-    return {name: len(data) for name, data in messages.items()} | {"said": len(broadcasts[-1])}
+    return {name: len(data) for name, data in told.items()} | {"said": len(broadcasts[-1])}
 
 
 def floor_tick(plan: Plan, ticks: int) -> float:
@@ -141,8 +150,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     for name in options.swarms:
         duration = f"time.duration={options.ticks / 100:g}"
-        on = planning.make(scenario.load(name, [duration]))
-        off = planning.make(scenario.load(name, [duration, "record.enabled=false"]))
+        on = planning.make(loading.load(name, [duration]))
+        off = planning.make(loading.load(name, [duration, "record.enabled=false"]))
         rounds = [(floor_tick(on, options.ticks), fly(on), fly(off)[0]) for _ in range(options.rounds)]
         bare = statistics.median(r[0] for r in rounds)
         tick = statistics.median(r[1][0] for r in rounds)

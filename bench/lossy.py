@@ -1,4 +1,4 @@
-"""Accuracy of the chains: mean loss, bursts, age and extra delay, as `netem.chain` gives them in closed form."""
+"""Accuracy of the chains: mean loss, bursts, age and extra delay, as `netem.impairments.chain` gives them in closed form."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import flown
 import numpy as np
 from against import Against, Row
 
-from netem.chain import Chain, all_together
-from netem.draws import Array
-from netem.fate import Fate
-from netem.fault import Fault, Verb
-from netem.links import Integers, Mask
-from netem.loss import bernoulli, bursts, gilbert_elliott, markov
+from analysis.models.arrays import Array, Integers, Mask
+from netem.faults.fault import Fault, Verb
+from netem.impairments.chain import Chain, all_together
+from netem.impairments.loss import bernoulli, bursts, gilbert_elliott, markov
+from netem.medium.verdict import Fate
 
 # Bursts longer than one message, or there is nothing to compare; and the share that is cut short.
 _ENOUGH, _HARDLY = 25, 0.002

@@ -9,14 +9,14 @@ import numpy as np
 from against import Against, Row
 from scipy.special import ndtr
 
-from netem import schedule, trace
-from netem.draws import Array
-from netem.fate import Fate
-from netem.jamming import Zone
-from netem.links import Integers, Links, Mask
-from netem.reach import Law, Reach
-from netem.schedule import Schedule
-from netem.trace import Trace
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core.links import Links
+from netem.impairments import schedule, trace
+from netem.impairments.jamming import Zone
+from netem.impairments.reach import Reach, ReachLaw
+from netem.impairments.schedule import Schedule
+from netem.impairments.trace import Trace
+from netem.medium.verdict import Fate
 
 
 def check(verdicts: int, seed: int) -> Iterator[Row]:
@@ -39,7 +39,9 @@ def _apart(links: Links, distances: Array) -> tuple[Array, Array]:
     return position, np.repeat(np.resize(distances, links.agents // 2), 2)
 
 
-def _reach(links: Links, law: Law, inner: float, outer: float, shadowing: float = 0.0, coherence: int = 1) -> Reach:
+def _reach(
+    links: Links, law: ReachLaw, inner: float, outer: float, shadowing: float = 0.0, coherence: int = 1
+) -> Reach:
     return Reach(law, np.ones(len(links), dtype=bool), inner, outer, 3.0, shadowing, coherence, True, True)
 
 
@@ -47,7 +49,7 @@ def _passing(
     verdicts: int,
     seed: int,
     distances: Array,
-    law: Law,
+    law: ReachLaw,
     inner: float,
     outer: float,
     shadowing: float = 0.0,
@@ -61,7 +63,7 @@ def _passing(
 
 def _ramp(verdicts: int, seed: int) -> Iterator[Row]:
     distances, against = np.array([9.9, 11.0, 15.0, 18.0, 19.5, 20.0]), Against("ramp", "10 to 20 m")
-    passing, length = _passing(verdicts, seed, distances, Law.RAMP, inner=10.0, outer=20.0)
+    passing, length = _passing(verdicts, seed, distances, ReachLaw.RAMP, inner=10.0, outer=20.0)
     for distance in distances:
         here, due = passing[..., length == distance], float(np.clip((20.0 - distance) / 10.0, 0.0, 1.0))
         if 0.0 < due < 1.0:
@@ -72,7 +74,7 @@ def _ramp(verdicts: int, seed: int) -> Iterator[Row]:
 
 def _disk(verdicts: int, seed: int) -> Iterator[Row]:
     distances = np.array([1.0, 20.0, 20.001, 50.0])
-    passing, length = _passing(verdicts, seed, distances, Law.RAMP, inner=20.0, outer=20.0)
+    passing, length = _passing(verdicts, seed, distances, ReachLaw.RAMP, inner=20.0, outer=20.0)
     as_due = passing == (length <= 20.0)
     yield Against("disk", "20 m").exactly("verdicts as the distance says", 1.0, float(as_due.mean()))
 
@@ -82,7 +84,7 @@ def _log_distance(verdicts: int, seed: int, coherence: int) -> Iterator[Row]:
     distances = np.array([10.0, 16.0, 20.0, 25.0, 35.0])
     against = Against("log-distance", f"20 m, exponent 3, 4 dB, {coherence} ticks")
     passing, length = _passing(
-        2 * coherence * verdicts, seed, distances, Law.LOG_DISTANCE, 0.0, 20.0, shadowing=4.0, coherence=coherence
+        2 * coherence * verdicts, seed, distances, ReachLaw.LOG_DISTANCE, 0.0, 20.0, shadowing=4.0, coherence=coherence
     )
     passing = passing[: len(passing) // coherence * coherence, 0]
     by_pair = passing.reshape(-1, coherence, passing.shape[-1] // 2, 2).swapaxes(1, 2)
@@ -176,7 +178,7 @@ def _trace(verdicts: int, seed: int) -> Iterator[Row]:
     when = np.arange(changes) * (ticks // changes)
     due = rng.uniform(0.05, 0.95, size=(changes, len(links)))
     every, time = np.arange(len(links)), np.repeat(when * flown.DT, len(links))
-    measured = trace.Measured(time, np.tile(every, changes), due.ravel())
+    measured = trace.MeasuredAvailability(time, np.tile(every, changes), due.ravel())
     read = Trace(*trace.table(measured, links, every >= 0, flown.DT, ticks), True, True)
     lost = flown.fly(flown.medium(seed, links, traces=(read,)), ticks).fate[:, 0] == Fate.LOST
     against = Against("trace", f"{changes} changes on each of {len(links)} links")

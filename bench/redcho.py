@@ -13,13 +13,14 @@ import argparse
 
 import numpy as np
 
-from affinet import plan, scenario
-from affinet.batch import fly_all
-from agents.estimators.redcho import Consensus
+from affinet.planning import plan
+from affinet.scenario import loading
+from affinet.studies.batch import fly_all
+from agents.algebra.redcho import Consensus
 from agents.estimators.target import TargetEstimator
-from analysis.information import Array, position_jet, unpacked
-from netem.links import Integers
-from world.dynamics import carried
+from analysis.models.arrays import Array, Integers
+from analysis.models.information import position_jet, unpacked
+from world.physics.bodies import carried
 
 _TICK = 1e-3  # s
 _AXES = 2
@@ -55,7 +56,7 @@ def _numbers(text: str) -> list[float]:
 def _flown(seconds: float, seed: int) -> tuple[Array, Integers]:
     """What every agent knows in every tick, with derivatives, shape (T, m + 1, N, C), and its neighbours (N, n)."""
     overrides = (f"time.dt={_TICK}", f"time.duration={seconds}", 'agents.parameters.target.fusion="none"')
-    flown = plan.make(scenario.load("target", overrides))
+    flown = plan.make(loading.load("target", overrides))
     (known,) = [fly_all(flown, [seed], 1).first["information"]]
     return np.moveaxis(known, 1, 2), flown.world.links.neighbours
 

@@ -19,17 +19,17 @@ import time
 import flown
 import numpy as np
 
-from netem import schedule
-from netem.delay import Delay
-from netem.delay import Law as DelayLaw
-from netem.fault import Fault, Verb
-from netem.jamming import Zone
-from netem.links import Links
-from netem.loss import bernoulli, gilbert_elliott
-from netem.medium import Medium
-from netem.rate import Rate
-from netem.reach import Law, Reach
-from netem.schedule import Schedule
+from netem.core.links import Links
+from netem.faults.fault import Fault, Verb
+from netem.impairments import schedule
+from netem.impairments.delay import DelayLaw as DelayLaw
+from netem.impairments.delay import MessageDelay
+from netem.impairments.jamming import Zone
+from netem.impairments.loss import bernoulli, gilbert_elliott
+from netem.impairments.rate import Rate
+from netem.impairments.reach import Reach, ReachLaw
+from netem.impairments.schedule import Schedule
+from netem.medium.medium import Medium
 
 _CHANNELS = ("sense", "measurement", "input", "theta")
 _WARM = 128
@@ -53,12 +53,12 @@ def everything(links: Links, ticks: int) -> Medium:
             Fault(Verb.LOSE, 0, None, pairs=pairs, probability=0.02),
         ),
         chains=flown.layers(links, bernoulli(0.1), gilbert_elliott(0.02, 0.25, 0.95, 0.01, 0.03)),
-        delays=(Delay(DelayLaw.NORMAL, all_, 0.015, 0.006, np.empty(0), 0.5, False),),
+        delays=(MessageDelay(DelayLaw.NORMAL, all_, 0.015, 0.006, np.empty(0), 0.5, False),),
         duplicate=np.full(size, 0.02),
         corrupt=np.tile([0.005, 0.005, 0.005, 0.005], (size, 1)),
         bias=np.ones(size),
         reorder=np.full(size, 0.05),
-        reaches=(Reach(Law.LOG_DISTANCE, all_, 0.0, 40.0, 3.0, 4.0, 10, True, True),),
+        reaches=(Reach(ReachLaw.LOG_DISTANCE, all_, 0.0, 40.0, 3.0, 4.0, 10, True, True),),
         zones=(Zone(np.array([1.0, 0.0]) * links.agents, links.agents / 3.0, 0.5, all_, True, True),),
         schedules=(Schedule(*schedule.slotted(links, 1)[:2], np.full(size, links.agents - 2), True, True),),
         listed=np.array([[0, 1000, 1, 1]]),

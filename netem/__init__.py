@@ -1,5 +1,5 @@
-"""The air between agents: keys, wire format, impairments and the medium that applies them.
+"""The network between agents: what is said of links, what impairs them, and what becomes of every message.
 
-Start at `medium.py` to see where a loss is decided and where it is counted; each impairment it composes is a
-file of its own (`loss.py`, `delay.py`, `cut.py`, `absence.py`).
+Start at `medium/medium.py` to see where a loss is decided; `medium/verdict.py` counts it, `medium/journal.py` writes it down.
+Each impairment that `medium/link_model.py` composes is a file of its own in `impairments/`, each kind of fault in `faults/`.
 """

@@ -12,23 +12,25 @@ from pathlib import Path
 import numpy as np
 import zenoh
 
-from netem import channels, lie, wire
-from netem.air import Delivery, out_of_the_ordinary
-from netem.broadcasts import Broadcasts, fields
-from netem.control import Order, obey
-from netem.corrupt import Mark, corrupted_fields
-from netem.draws import Array
-from netem.fate import Fate
-from netem.fault import Fault
-from netem.keys import Keys
-from netem.links import Integers, Links, Mask
-from netem.medium import Medium, recorded
-from netem.profile import Profile
-from netem.sequence import Numbering, Sequences
-from netem.session import HUB, WORLD, Login, await_subscribers, hub
-from netem.supervised import Supervisor, called
-from netem.timeline import Timeline
-from netem.trigger import Trigger
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core import channels
+from netem.core.links import Links
+from netem.faults import lie
+from netem.faults.control import Order, obey
+from netem.faults.fault import Fault
+from netem.faults.timeline import Timeline
+from netem.faults.trigger import Trigger
+from netem.impairments.corrupt import Mark, corrupted_fields
+from netem.impairments.profile import Profile
+from netem.medium.in_flight import Delivery, out_of_the_ordinary
+from netem.medium.medium import Medium, recorded
+from netem.medium.verdict import Fate
+from netem.processes.supervised import Supervisor, called
+from netem.wire import messages
+from netem.wire.broadcasts import Broadcasts, fields
+from netem.wire.keys import Keys
+from netem.wire.sequence import Numbering, Sequences
+from netem.wire.session import HUB, WORLD, Login, await_subscribers, hub
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Arriving:
 
 
 @dataclass(frozen=True)
-class Sentence:
+class TickVerdicts:
     """All that is decided of a tick before anybody speaks: verdicts ask who speaks to whom and when, never what is said.
 
     Parameters
@@ -101,7 +103,7 @@ class Sentence:
     journal: bytes
 
 
-class Relay:
+class MediumNode:
     """The medium of a run over Zenoh: one tick is sense, collect, deliver."""
 
     def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: MediumBrief) -> None:
@@ -144,7 +146,7 @@ class Relay:
         tick = 0
         while True:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
-            sense = wire.unpack(wire.Sense, self._sense.recv().payload.to_bytes())
+            sense = messages.unpack(messages.Sense, self._sense.recv().payload.to_bytes())
             self._from_world.check("sense", sense.seq)
             self._supervisor.works(sense.k)
             if sense.last:
@@ -166,7 +168,7 @@ class Relay:
             tick = sense.k + 1
             sentence = self._judge(tick, None) if self._medium.ahead else None
 
-    def _judge(self, tick: int, position: Array | None) -> Sentence:
+    def _judge(self, tick: int, position: Array | None) -> TickVerdicts:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
         awake = ~self._timeline.at(tick).idle
         speaks = awake[self._links.src - 1]
@@ -174,7 +176,7 @@ class Relay:
         air, verdicts = self._medium.judge(self._air, tick, offered, position)
         self._ahead, delivery = self._medium.deliver(air, tick, verdicts)
         heard = self._heard(tick, delivery)
-        journal = wire.Journal(
+        journal = messages.Journal(
             k=tick,
             src=HUB,
             seq=self._numbers.next("journal"),
@@ -188,7 +190,9 @@ class Relay:
             injected=list(self._injected) if changed else None,
         )
         awake_agents = tuple((np.flatnonzero(awake) + 1).tolist())
-        return Sentence(tick, awake_agents, self._seen(verdicts.fate[0] == Fate.DELIVERED), heard, wire.pack(journal))
+        return TickVerdicts(
+            tick, awake_agents, self._seen(verdicts.fate[0] == Fate.DELIVERED), heard, messages.pack(journal)
+        )
 
     def _take_orders(self, tick: int) -> bool:
         """Obey whoever asks to change the air from this tick on; whether anything changed."""
@@ -196,13 +200,13 @@ class Relay:
         while query := self._control.try_recv():
             with query:
                 try:
-                    order = wire.unpack(Order, query.payload.to_bytes() if query.payload else b"")
-                except wire.WireError as error:
+                    order = messages.unpack(Order, query.payload.to_bytes() if query.payload else b"")
+                except messages.WireError as error:
                     query.reply_err(str(error).encode())
                     continue
                 obeyed = obey(order, tick, self._scripted.faults, self._injected, self._links)
                 self._injected = obeyed.injected
-                query.reply(self._keys.control, wire.pack_record(obeyed.answer))
+                query.reply(self._keys.control, messages.pack_record(obeyed.answer))
         if self._injected == before:
             return False
         self._change()
@@ -240,15 +244,15 @@ class Relay:
             self._numbers.restart(f"inbox {agent}")
             self._reader.restart(agent)
 
-    def _hand_out_measurements(self, sense: wire.Sense, sentence: Sentence) -> None:
+    def _hand_out_measurements(self, sense: messages.Sense, sentence: TickVerdicts) -> None:
         clock = self._timeline.clock(sense.k).tolist()
         for agent in sentence.awake:
             neighbours, links = sentence.seen[agent]
-            inbox = wire.SenseInbox(
+            inbox = messages.SenseInbox(
                 k=sense.k,
                 src=HUB,
                 seq=self._numbers.next(f"inbox {agent}"),
-                phase=wire.Phase.SENSE,
+                phase=messages.Phase.SENSE,
                 clock=clock[agent - 1],
                 neighbours=neighbours,
                 measured=[sense.measured[link] for link in links],
@@ -256,9 +260,9 @@ class Relay:
                 motion=None if sense.motion is None else sense.motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
-            self._inboxes[agent].put(wire.pack(inbox))
+            self._inboxes[agent].put(messages.pack(inbox))
 
-    def _collect(self, sentence: Sentence) -> None:
+    def _collect(self, sentence: TickVerdicts) -> None:
         self._awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
         self._supervisor.waits(sentence.tick, "what it broadcasts", self._silent)
         while self._awaited:
@@ -272,17 +276,17 @@ class Relay:
     def _silent(self) -> list[str]:
         return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
 
-    def _hand_out_broadcasts(self, sentence: Sentence) -> None:
+    def _hand_out_broadcasts(self, sentence: TickVerdicts) -> None:
         for agent in sentence.awake:
             arriving = [self._as_it_arrives(said) for said in sentence.heard[agent]]
             seq = self._numbers.next(f"inbox {agent}")
-            self._inboxes[agent].put(wire.pack_exchange(sentence.tick, seq, arriving))
+            self._inboxes[agent].put(messages.pack_exchange(sentence.tick, seq, arriving))
 
-    def _as_told(self, said: wire.Broadcast, data: bytes) -> bytes:
+    def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
         for liar in self._timeline.at(said.k).liars:
             if said.src in liar.agents and said.channel == lie.CHANNEL:
                 said = said._replace(payload=lie.told(fields(said), liar))
-                data = wire.pack(said)
+                data = messages.pack(said)
         return data
 
     def _as_it_arrives(self, arriving: Arriving) -> bytes:
@@ -294,10 +298,10 @@ class Relay:
             np.array([arriving.mark], dtype=np.uint8),
             self._medium.bias(np.array([arriving.content]), np.array([arriving.link])),
         )
-        broadcast = wire.unpack(wire.Broadcast, data)
+        broadcast = messages.unpack(messages.Broadcast, data)
         said = {name: field[None] for name, field in fields(broadcast).items()}
         wrong = {name: field[0] for name, field in corrupted_fields(said, kind, bias, draw).items()}
-        return wire.pack(broadcast._replace(payload=wrong))
+        return messages.pack(broadcast._replace(payload=wrong))
 
     def _forget(self, tick: int) -> None:
         """Drop what nobody will hear any more; a stale message says what was said the tick before it was sent."""
@@ -306,7 +310,9 @@ class Relay:
 
     def _end(self, tick: int) -> None:
         for agent, inbox in self._inboxes.items():
-            inbox.put(wire.pack(wire.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), wire.Phase.END)))
+            inbox.put(
+                messages.pack(messages.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), messages.Phase.END))
+            )
 
 
 def main() -> None:
@@ -315,7 +321,7 @@ def main() -> None:
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
     with supervisor.confessing(), zenoh.open(config) as session:
-        relay = Relay(session, supervisor, brief)
+        relay = MediumNode(session, supervisor, brief)
         relay.await_everybody()
         supervisor.tell("ready")
         relay.run()

@@ -7,22 +7,22 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from netem import reach
-from netem.air import Air, Delivery, Verdicts
-from netem.chain import Chain, ChainLayer
-from netem.channels import SENSE
-from netem.delay import Delay, Law
-from netem.fault import Body, Fault, UnderWay, Verb
-from netem.jamming import Zone
-from netem.links import Links
-from netem.loss import bernoulli
-from netem.medium import Medium
-from netem.profile import Profile
-from netem.rate import Rate
-from netem.reach import Reach
-from netem.schedule import Schedule
-from netem.timeline import Timeline
-from netem.trace import Trace
+from netem.core.channels import SENSE
+from netem.core.links import Links
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from netem.impairments import reach
+from netem.impairments.chain import Chain, ChainLayer
+from netem.impairments.delay import DelayLaw, MessageDelay
+from netem.impairments.jamming import Zone
+from netem.impairments.loss import bernoulli
+from netem.impairments.profile import Profile
+from netem.impairments.rate import Rate
+from netem.impairments.reach import Reach
+from netem.impairments.schedule import Schedule
+from netem.impairments.trace import Trace
+from netem.medium.in_flight import Delivery, MediumState, Verdicts
+from netem.medium.medium import Medium
 
 DT = 0.1
 BITS = 100.0
@@ -66,7 +66,7 @@ def taking(ticks):
 
 def constant(seconds, rows, *, ordered=False):
     """A delay that is always the same, on the links where `rows`."""
-    return Delay(Law.CONSTANT, rows, seconds, 0.0, np.empty(0), 0.0, ordered)
+    return MessageDelay(DelayLaw.CONSTANT, rows, seconds, 0.0, np.empty(0), 0.0, ordered)
 
 
 # ---- flights
@@ -77,7 +77,7 @@ class Flown(NamedTuple):
 
     verdicts: Verdicts
     delivery: Delivery
-    air: Air
+    air: MediumState
 
 
 def everything(channels, links):
@@ -143,8 +143,8 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
         changes["schedules"] = (Schedule(period, begins, lasts, sensing=True, comms=True),)
     if "reaches" in has:
         kind = each(mix, "reach", links, lambda rng: rng.integers(3))
-        ramp = Reach(reach.Law.RAMP, kind == 1, 2.0, 8.0, 0.0, 0.0, 1, sensing=True, comms=True)
-        shadow = Reach(reach.Law.LOG_DISTANCE, kind == 2, 0.0, 6.0, 3.0, 6.0, 3, sensing=True, comms=True)
+        ramp = Reach(reach.ReachLaw.RAMP, kind == 1, 2.0, 8.0, 0.0, 0.0, 1, sensing=True, comms=True)
+        shadow = Reach(reach.ReachLaw.LOG_DISTANCE, kind == 2, 0.0, 6.0, 3.0, 6.0, 3, sensing=True, comms=True)
         changes["reaches"] = (ramp, shadow)
     if "zones" in has:
         jammed = each(mix, "zone", links, lambda rng: rng.random() < 0.7)
@@ -161,7 +161,7 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
     if "delays" in has:
         changes["delays"] = _delays(mix, links)
     if "ordered" in has:
-        queued = Delay(Law.UNIFORM, _on(mix, "ordered", links), 0.4, 0.4, np.empty(0), 0.0, ordered=True)
+        queued = MessageDelay(DelayLaw.UNIFORM, _on(mix, "ordered", links), 0.4, 0.4, np.empty(0), 0.0, ordered=True)
         changes["delays"] = (*changes.get("delays", ()), queued)
     for name in ("duplicate", "reorder"):
         if name in has:
@@ -213,16 +213,16 @@ def _chain(mix, lane, pair):
 def _delays(mix, links):
     table = np.array([0.0, 0.05, 0.1, 0.4])
     laws = {
-        Law.CONSTANT: (0.2, 0.0, 0.0),
-        Law.UNIFORM: (0.2, 0.2, 0.3),
-        Law.NORMAL: (0.1, 0.2, 0.9),
-        Law.EXPONENTIAL: (0.1, 0.0, 0.0),
-        Law.PARETO: (0.1, 0.1, 0.5),
-        Law.TABLE: (0.0, 0.0, 0.0),
+        DelayLaw.CONSTANT: (0.2, 0.0, 0.0),
+        DelayLaw.UNIFORM: (0.2, 0.2, 0.3),
+        DelayLaw.NORMAL: (0.1, 0.2, 0.9),
+        DelayLaw.EXPONENTIAL: (0.1, 0.0, 0.0),
+        DelayLaw.PARETO: (0.1, 0.1, 0.5),
+        DelayLaw.TABLE: (0.0, 0.0, 0.0),
     }
     kind = each(mix, "delay", links, lambda rng: rng.integers(len(laws) + 1))
     return tuple(
-        Delay(law, kind == n, mean, jitter, table, correlation, ordered=False)
+        MessageDelay(law, kind == n, mean, jitter, table, correlation, ordered=False)
         for n, (law, (mean, jitter, correlation)) in enumerate(laws.items())
     )
 
@@ -265,7 +265,7 @@ def faults_over(links, ticks):
             lambda t, agent, body: Fault(Verb.DEPART, *t, agents=(agent,), body=body),
             times,
             agents,
-            st.sampled_from(Body),
+            st.sampled_from(DepartedBody),
         ),
         st.builds(
             lambda t, agent, u: Fault(Verb.PAUSE, *t, agents=(agent,), under_way=u),

@@ -3,10 +3,11 @@
 import numpy as np
 
 from agents.brief import Brief, Own
-from agents.estimators.base import Estimate, Heard
-from analysis.sensor import Sensor
-from netem.channels import INPUT, THETA
-from netem.links import Links
+from agents.estimate import Estimate
+from agents.exchange import Heard
+from analysis.models.sensor import Sensor
+from netem.core.channels import INPUT, THETA
+from netem.core.links import Links
 
 HEXA4 = np.array([[-2, 0], [-1, -2], [-1, 2], [2, 0], [3, -2], [3, 2]], dtype=float)  # what agent 4 of hexa10 sees
 REST = Own(np.zeros(1), np.zeros(1))  # an agent, in any dimension, that has flown nothing

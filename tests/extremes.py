@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from inspect import get_annotations
 from typing import Any, get_args
 
-from affinet.impairments import Section
-from affinet.sections import Scenario
+from affinet.scenario.profiles import Section
+from affinet.scenario.sections import Scenario
 
 SHORT = {"dt": 0.05, "duration": 0.25, "patience": 3.0}
 SQUARE = [[1.0, 0.0], [0.0, 1.0]]
@@ -173,7 +173,7 @@ def numeric_fields() -> set[str]:
     return {
         f"{section.__name__}.{name}"
         for section in _sections(Section)
-        if section.__module__ != "affinet.study"
+        if section.__module__ != "affinet.studies.study"
         for name, field in section.model_fields.items()
         if _numeric(field.annotation) and _declared_in(section, name) == section.__name__
     }

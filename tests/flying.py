@@ -4,11 +4,11 @@ from functools import cache
 
 import pytest
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.plan import Plan
-from affinet.run import rehearse
-from world.history import digest
+from affinet.planning import plan as planning
+from affinet.planning.plan import Plan
+from affinet.runtimes.run import rehearse
+from affinet.scenario import loading
+from world.books.history import digest
 
 # Tests that fly processes stay on one worker: two swarms of processes at once are too many for two cores.
 PROCESSES = pytest.mark.xdist_group("processes")
@@ -37,7 +37,7 @@ enabled = false
 @cache
 def plan_of(name: str, *overrides: str) -> Plan:
     """The plan of a scenario, made once."""
-    return planning.make(scenario.load(name, overrides))
+    return planning.make(loading.load(name, overrides))
 
 
 @cache

@@ -5,8 +5,8 @@ from functools import cache
 
 from flying import plan_of
 
-from affinet.evidence import Evidence
-from affinet.run import rehearse
+from affinet.runtimes.run import rehearse
+from affinet.verdicts.evidence import Evidence
 
 COARSE = ("time.dt=0.05", "time.duration=4")
 

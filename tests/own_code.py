@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.estimators.base import Estimate, Field, no_indicator
+from agents.estimate import Estimate, no_indicator
+from agents.exchange import Field
 
 
 class Last(NamedTuple):

@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 from flying import PROCESSES, TRIANGLE, plan_of
 
-from affinet import accounts, cli, launcher, outcome
-from affinet.inject import Access
-from affinet.inprocess import Swarm
-from affinet.run import fly, rehearse
-from netem import journal
-from netem.fate import Ledger
-from netem.session import Login
+from affinet.cli import commands
+from affinet.runtimes import launcher
+from affinet.runtimes.inject import Access
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.run import fly, rehearse
+from affinet.verdicts import accounts, outcome
+from netem.medium import journal
+from netem.medium.verdict import Ledger
+from netem.wire.session import Login
 
 PROGRAMS = Path(__file__).parent / "programs"
 OFFERED = 10 * 6 * 3  # ticks, links, channels
@@ -80,7 +82,7 @@ def judged(plan, arrays, *, failure=None, accounts=None, in_flight=None, uninstr
 
 def flown(*overrides):
     plan = plan_of("corridor", "time.dt=0.05", "time.duration=1", "network.delay_ticks=2", *overrides)
-    swarm, done = Swarm(plan), rehearse(plan)
+    swarm, done = InProcessSwarm(plan), rehearse(plan)
     return plan, done.arrays, done.outcome.messages["in_flight"], swarm
 
 
@@ -126,7 +128,7 @@ def flies_with(monkeypatch, tmp_path, package, *program):
     honest = launcher.module
     command = [sys.executable, "-P", str(PROGRAMS / program[0]), *program[1:]]
     monkeypatch.setattr(launcher, "module", lambda name: command if name == package else honest(name))
-    status = cli.main(["run", str(scenario), "--out", str(out), "--json"])
+    status = commands.main(["run", str(scenario), "--out", str(out), "--json"])
     return status, json.loads((out / "summary.json").read_text())
 
 

@@ -21,17 +21,17 @@ from airs import (
 )
 from hypothesis import given, settings
 
-from netem.air import Verdicts, newest_of, out_of_the_ordinary
-from netem.chain import ChainLayer
-from netem.corrupt import Mark
-from netem.delay import Delay, Law
-from netem.fate import FATE_OF, REASONS, Fate, Ledger
-from netem.fault import Fault, UnderWay, Verb
-from netem.links import Links
-from netem.loss import gilbert_elliott
-from netem.medium import Medium
-from netem.rate import Rate
-from netem.timeline import Timeline
+from netem.core.links import Links
+from netem.faults.fault import Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from netem.impairments.chain import ChainLayer
+from netem.impairments.corrupt import Mark
+from netem.impairments.delay import DelayLaw, MessageDelay
+from netem.impairments.loss import gilbert_elliott
+from netem.impairments.rate import Rate
+from netem.medium.in_flight import Verdicts, newest_of, out_of_the_ordinary
+from netem.medium.medium import Medium
+from netem.medium.verdict import FATE_OF, REASONS, Fate, Ledger
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 SIZE = len(LINKS)
@@ -224,7 +224,7 @@ def test_a_message_that_is_lost_has_no_copy():
 
 def long_spread():
     """Each of 1 to 20 ticks as likely as the others."""
-    return Delay(Law.UNIFORM, ALL_ROWS, 1.0, 1.0, np.empty(0), 0.0, ordered=False)
+    return MessageDelay(DelayLaw.UNIFORM, ALL_ROWS, 1.0, 1.0, np.empty(0), 0.0, ordered=False)
 
 
 def assert_spread(waits):
@@ -283,7 +283,7 @@ def test_a_chain_of_sensing_adds_nothing_to_the_delay_of_communication(by_packet
 
 
 def spread(*, ordered):
-    return Delay(Law.UNIFORM, ALL_ROWS, 0.5, 0.5, np.empty(0), 0.0, ordered=ordered)
+    return MessageDelay(DelayLaw.UNIFORM, ALL_ROWS, 0.5, 0.5, np.empty(0), 0.0, ordered=ordered)
 
 
 def test_messages_on_an_ordered_link_wait_for_those_sent_before_them():

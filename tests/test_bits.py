@@ -7,10 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from affinet import plan, scenario
+from affinet.planning import plan
+from affinet.scenario import loading
 from agents.agent import Agent, renew
-from agents.controllers import ConstantVelocity, Rest, Static, VaryingVelocity
-from agents.estimators.base import Heard
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
@@ -22,7 +21,9 @@ from agents.estimators.none import NoEstimator
 from agents.estimators.ral import RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
 from agents.estimators.silent import SilentEdgeFilter
-from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
+from agents.exchange import Heard
+from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
+from agents.laws.single import ConstantVelocity, Rest, Static, VaryingVelocity
 
 TICKS, RUNS = 10, 3
 
@@ -102,7 +103,7 @@ def plans(tmp_path_factory):
     file.write_text(SPACE)
     return {
         2: plan.make(
-            scenario.load(
+            loading.load(
                 "hexa",
                 [
                     "sensing={covariance=[[0.01, 0.003], [0.003, 0.02]]}",
@@ -110,7 +111,7 @@ def plans(tmp_path_factory):
                 ],
             )
         ),
-        3: plan.make(scenario.load(str(file))),
+        3: plan.make(loading.load(str(file))),
     }
 
 

@@ -11,8 +11,8 @@ from rows.surface import by_entry_point
 from agents.agent import Agent
 from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.target import TargetEstimator
-from agents.pursuit import Pursuit as PursuitLaw
-from analysis.pursuit import Sighting
+from agents.laws.pursuit import Pursuit as PursuitLaw
+from analysis.models.pursuit import Sighting
 
 TICKS = 40
 ESTIMATORS = {

@@ -5,13 +5,13 @@ import pytest
 from flying import PROCESSES, plan_of
 from scipy.linalg import block_diag
 
-from affinet.batch import fly_all
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from agents.centre import Centre
-from analysis.sensor import Sensor
-from netem.links import Links
-from world.formation import PRESETS
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario.sections import ScenarioError
+from affinet.studies.batch import fly_all
+from agents.centre.filter import Centre
+from analysis.models.sensor import Sensor
+from netem.core.links import Links
+from world.formation.nominal import PRESETS
 
 HEXA = PRESETS["hexa10"]
 LINKS = Links.both_ways(HEXA.agents, HEXA.edges)

@@ -10,8 +10,8 @@ from judged import changed, evidence, tampered
 from scipy.stats import chi2
 from scripted import timeline
 
-from affinet import checkers
-from affinet.checking import Checker, Finding
+from affinet.verdicts import checkers
+from affinet.verdicts.checking import Checker, CheckResult
 
 TICKS = 80
 CUT = {"verb": "cut", "at": 1.0, "until": 2.0, "links": ["2->4"]}  # ticks 20 to 39
@@ -451,7 +451,7 @@ def test_an_input_that_is_no_number_spends_too_much():
 
 def says(verdict, tick=None):
     name = verdict if tick is None else f"{verdict}@{tick}"
-    return Checker(name, lambda _: Finding(name, verdict, tick, f"because of {name}"))
+    return Checker(name, lambda _: CheckResult(name, verdict, tick, f"because of {name}"))
 
 
 VERDICTS = ("pass", "fail", "vacuous")
@@ -497,7 +497,7 @@ def test_de_morgan_holds(one, other):
 @pytest.mark.parametrize(("run", "found"), PAIRS)
 def test_a_failure_outweighs_what_proved_nothing_and_that_outweighs_a_pass(run, found):
     judged = replace(evidence(), outcome=replace(evidence().outcome, verdict=run))
-    findings = [Finding("first", "pass", None, ""), Finding("second", found, BY_TICK[found], "")]
+    findings = [CheckResult("first", "pass", None, ""), CheckResult("second", found, BY_TICK[found], "")]
     expected = next(each for each in ("fail", "vacuous", "pass") if each in (run, found))
     assert checkers.summed_up(judged, findings) == expected
     assert checkers.summed_up(judged, []) == run

@@ -12,12 +12,12 @@ import pytest
 from flying import plan_of
 from offered import by_affinet
 
-from affinet.sections import INTEGRATORS
+from affinet.scenario.sections import INTEGRATORS
 from agents import checkpoint
 from agents.agent import Agent
-from agents.estimators.base import Heard
-from analysis.pursuit import Sighting
-from netem.channels import CENTRE
+from agents.exchange import Heard
+from analysis.models.pursuit import Sighting
+from netem.core.channels import CENTRE
 
 ESTIMATORS, LAWS = by_affinet("estimators"), by_affinet("controllers")
 SINGLE = {"edge-kf", "joint-kf", "silent-kf", "crkf"}  # they predict by inputs that are velocities
@@ -179,7 +179,7 @@ def test_estimators_of_other_packages_are_not_tested_as_ours(tmp_path):
     offers = "".join(f"[affinet.{what}]\nstranger = stranger:NoEstimator\n" for what in ("estimators", "controllers"))
     (metadata / "entry_points.txt").write_text(offers)
     program = (
-        "from affinet.registry import ESTIMATORS, LAWS, names\n"
+        "from affinet.planning.registry import ESTIMATORS, LAWS, names\n"
         "from offered import by_affinet\n"
         "for group, what in ((ESTIMATORS, 'estimators'), (LAWS, 'controllers')):\n"
         "    assert set(names(group)) - by_affinet(what).names == {'stranger'}\n"

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet import cli
-from affinet.compare import first_difference
-from affinet.run import fly, rehearse
-from netem.fate import Fate
-from world import history
+from affinet.cli import commands
+from affinet.runtimes.run import fly, rehearse
+from affinet.verdicts.compare import first_difference
+from netem.medium.verdict import Fate
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -85,15 +85,15 @@ def test_a_shorter_run_differs_where_it_ends(arrays):
 def test_a_replay_is_compared_with_what_was_flown(out, tmp_path, capsys):
     fly(PLAN, "inprocess", out, lambda *_: None)
     again = ["replay", str(out), "--runtime", "inprocess", "--json", "--out"]
-    assert cli.main([*again, str(tmp_path / "same")]) == 0
+    assert commands.main([*again, str(tmp_path / "same")]) == 0
     assert "the same bits as" in capsys.readouterr().err
     told = json.loads((out / "scenario.json").read_text())
     (out / "scenario.json").write_text(json.dumps(told | {"seed": 5}))
-    assert cli.main([*again, str(tmp_path / "other")]) == 1
+    assert commands.main([*again, str(tmp_path / "other")]) == 1
     assert "tick 0: position of agent 4 is" in capsys.readouterr().err
     assert history.load(tmp_path / "other" / history.FILE)["error"].shape == (50,)
 
 
 def test_determinism_is_checked_in_both_runtimes(capsys):
-    assert cli.main(["check-determinism", "corridor", "--duration", "0.5"]) == 0
+    assert commands.main(["check-determinism", "corridor", "--duration", "0.5"]) == 0
     assert "50 ticks, the same bits" in capsys.readouterr().out

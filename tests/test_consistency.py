@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from agents.estimators import joint_kf, kalman
-from agents.estimators.blocks import block_diagonal, diagonal_blocks
-from agents.estimators.small import triangle
-from analysis import consistency
+from agents.algebra import kalman
+from agents.algebra.blocks import block_diagonal, diagonal_blocks
+from agents.algebra.small import triangle
+from agents.estimators import joint_kf
+from analysis.metrics import consistency
 
 DRAWS = np.random.default_rng(7)
 

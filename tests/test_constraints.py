@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from agents.estimators import geometry, small
+from agents.algebra import geometry, small
+from agents.algebra.constraints import MAPS, Constraint
 from agents.estimators.conral import ConsensusLocalization
-from agents.estimators.constraints import MAPS, Constraint
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.ral import THETA, RelativeAffineLocalization
-from world.formation import PRESETS
+from world.formation.nominal import PRESETS
 
 PLACES = {2: HEXA4, 3: np.ones(3) - OCTAHEDRON}
 CLASSES = get_args(Constraint)

@@ -8,16 +8,19 @@ from briefs import BRIEF, ESTIMATE, FORCE
 
 from agents.agent import Agent
 from agents.brief import Brief, Own
-from agents.controllers import ConstantVelocity, Static, VaryingVelocity, needs_mission, pilot, stress_force
-from agents.estimators.base import Estimate, Heard
+from agents.estimate import Estimate
 from agents.estimators.none import NoEstimator
-from analysis.affine import Manoeuvre
-from analysis.sensor import Sensor
-from netem.channels import INPUT
-from netem.links import Links
-from world.formation import PRESETS
-from world.maneuver import corridor
-from world.stress import laplacian
+from agents.exchange import Heard
+from agents.laws.base import stress_force
+from agents.laws.leaders import pilot
+from agents.laws.single import ConstantVelocity, Static, VaryingVelocity, needs_mission
+from analysis.models.affine import Manoeuvre
+from analysis.models.sensor import Sensor
+from netem.core.channels import INPUT
+from netem.core.links import Links
+from world.formation.manoeuvre import corridor
+from world.formation.nominal import PRESETS
+from world.formation.stress import laplacian
 
 FLYING = np.array([0.5, -0.5])
 OWN = Own(FLYING, FLYING)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet import cli
-from affinet.run import fly
-from world import history
+from affinet.cli import commands
+from affinet.runtimes.run import fly
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -37,7 +37,7 @@ def run(flown, tmp_path):
 
 def said(capsys, *words, status):
     """The line in which it is said what is wrong; those above it are of a run that was under way."""
-    assert cli.main([*map(str, words)]) == status
+    assert commands.main([*map(str, words)]) == status
     *under_way, line = capsys.readouterr().err.splitlines()
     assert not under_way or status == 1
     return line
@@ -80,7 +80,9 @@ def test_a_replay_that_compared_nothing_fails_and_says_so(run, tmp_path, capsys)
     line = replayed(capsys, run, tmp_path, status=1)
     assert line.startswith(f"{run / ARRAYS}: not there, so no bit was compared")
     assert (
-        cli.main(["replay", str(run), "--runtime", "inprocess", "--json", "--out", str(tmp_path / "b"), "--seed", "7"])
+        commands.main(
+            ["replay", str(run), "--runtime", "inprocess", "--json", "--out", str(tmp_path / "b"), "--seed", "7"]
+        )
         == 0
     )
 

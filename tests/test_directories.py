@@ -8,9 +8,11 @@ from threading import Barrier
 import pytest
 from flying import plan_of
 
-from affinet import directories, outcome, study_report
-from affinet.cli import main
-from affinet.run import fly
+from affinet.cli.commands import main
+from affinet.runtimes import directories
+from affinet.runtimes.run import fly
+from affinet.studies import report
+from affinet.verdicts import outcome
 
 TOGETHER = 8
 SHORT = ["--set", "time.dt=0.05", "--duration", "0.2", "--runtime", "inprocess"]
@@ -97,10 +99,10 @@ def test_a_directory_with_files_of_others_is_flown_in(out):
 
 
 def test_a_study_is_not_written_over_another(out):
-    assert study_report.prepare(out) == out
+    assert report.prepare(out) == out
     (out / "claims.json").touch()
     with pytest.raises(FileExistsError, match="holds a study already; name another directory with --out"):
-        study_report.prepare(out)
+        report.prepare(out)
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, Path.touch], ids=["directory", "file"])

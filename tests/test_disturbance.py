@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from netem.timeline import Timeline
-from world.disturbance import Disturbance, Kernel
+from netem.faults.timeline import Timeline
+from world.physics.disturbance import Disturbance, Kernel
 
 Q_D = np.array([[0.04, 0.01], [0.01, 0.02]])
 PLACES = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.5], [-4.0, 1.0]])

@@ -9,8 +9,9 @@ from typing import get_args
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 
-from affinet import events, impairments, sections, study
-from affinet.run import fly
+from affinet.runtimes.run import fly
+from affinet.scenario import profiles, sections, verbs
+from affinet.studies import study
 
 pytestmark = PROCESSES
 
@@ -55,9 +56,9 @@ def test_the_profiles_come_to_what_the_docs_say(name, says):
 
 
 def test_every_profile_and_model_is_documented():
-    assert {name for name, _ in PROFILES} == set(impairments.presets())
+    assert {name for name, _ in PROFILES} == set(profiles.presets())
     text = (DOCS / "network.md").read_text()
-    for model in get_args(get_args(impairments.Loss)[0]):
+    for model in get_args(get_args(profiles.Loss)[0]):
         for key in model.model_fields:
             assert f"`{key}`" in text, key
         assert f"`{get_args(model.model_fields['model'].annotation)[0]}`" in text
@@ -76,7 +77,7 @@ def test_every_key_of_a_scenario_is_documented(section):
 
 def test_every_verb_of_the_timeline_is_documented():
     text = (DOCS / "scenario.md").read_text()
-    for verb, model in events.VERBS.items():
+    for verb, model in verbs.VERBS.items():
         assert f"| `{verb}` |" in text
         for key in set(model.model_fields) - {"verb"}:
             assert f"`{key}`" in text

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from netem import channels, draws
-from netem.draws import Purpose, Tape, philox, uniform
+from netem.core import channels, draws
+from netem.core.draws import DrawnAhead, Purpose, philox, uniform
 
 
 @pytest.mark.parametrize(
@@ -139,14 +139,14 @@ def test_a_tape_equals_the_function_it_wraps():
     def draw(ticks):
         return uniform(5, Purpose.LOSS, tick=ticks[:, None], src=[1, 2, 3])
 
-    tape = Tape(draw, span=64)
+    tape = DrawnAhead(draw, span=64)
     for tick in [0, 1, 63, 64, 1000, 5, 65]:
         assert (tape.at(tick) == draw(np.array([tick]))[0]).all()
 
 
 def test_a_tape_draws_a_span_at_once():
     drawn = []
-    tape = Tape(lambda ticks: drawn.append(ticks.tolist()) or ticks, span=4)
+    tape = DrawnAhead(lambda ticks: drawn.append(ticks.tolist()) or ticks, span=4)
     assert [tape.at(tick) for tick in range(6)] == [0, 1, 2, 3, 4, 5]
     assert drawn == [[0, 1, 2, 3], [4, 5, 6, 7]]
 
@@ -158,7 +158,7 @@ def test_a_channel_is_counted_by_its_name_alone():
 @pytest.mark.parametrize("hash_seed", ["0", "1", "4242"])
 def test_another_process_with_another_hash_seed_draws_the_same_numbers(hash_seed):
     program = (
-        "import json; from netem.channels import code; from netem.draws import Purpose, uniform; "
+        "import json; from netem.core.channels import code; from netem.core.draws import Purpose, uniform; "
         "print(json.dumps(uniform(9, Purpose.LOSS, tick=[1, 2], src=3, channel=code('theta'), lanes=2).tolist()))"
     )
     environment = os.environ | {"PYTHONHASHSEED": hash_seed}

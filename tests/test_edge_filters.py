@@ -9,22 +9,22 @@ from filterpy.kalman import KalmanFilter
 from flying import plan_of
 from offered import by_affinet
 
-from affinet import scenario
-from affinet.inprocess import Swarm
-from affinet.plan import make
-from affinet.run import rehearse
-from affinet.side_by_side import side_by_side
+from affinet.planning.plan import make
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.run import rehearse
+from affinet.runtimes.side_by_side import side_by_side
+from affinet.scenario import loading
+from agents.algebra import inputs
 from agents.brief import Own
-from agents.estimators import inputs
-from agents.estimators.base import Heard
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.joint_kf import JointEdgeFilter, corrected
 from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
-from analysis.consistency import nees
-from netem.links import Links
-from world.formation import PRESETS
-from world.history import History
+from agents.exchange import Heard
+from analysis.metrics.consistency import nees
+from netem.core.links import Links
+from world.books.history import History
+from world.formation.nominal import PRESETS
 
 DT = 0.1  # of the briefs
 BOTH = pytest.mark.parametrize("kind", [EdgeKalmanFilter, JointEdgeFilter])
@@ -376,7 +376,7 @@ def test_the_mle_is_the_mean_of_the_measurements_of_the_tick():
     mle = by_affinet("estimators")["mle"]
     assert mle.load() is NoEstimator
     short = ("time.dt=0.05", "time.duration=1", 'agents.estimator="mle"')
-    ten, forty = (make(scenario.load("rigid", [*short, f"sensing.samples={number}"])) for number in (10, 40))
+    ten, forty = (make(loading.load("rigid", [*short, f"sensing.samples={number}"])) for number in (10, 40))
     flown = rehearse(ten).arrays
     np.testing.assert_allclose(ten.world.sensor.covariance, np.array([[0.01, 0.003], [0.003, 0.01]]) / 10)
     np.testing.assert_allclose(forty.world.sensor.covariance, ten.world.sensor.covariance / 4)
@@ -423,7 +423,7 @@ def test_in_flight_the_filters_are_as_wrong_as_they_say(estimator):
     plan = plan_of("rigid", *coarse, HALF_BLIND, f"agents.estimator={estimator}")
     batch = side_by_side(plan, range(1, 1 + runs))
     links, flown = batch.world.links, History(batch.world, len(batch.channels), batch.reports)
-    Swarm(batch).fly(flown.extend, 60)
+    InProcessSwarm(batch).fly(flown.extend, 60)
     arrays = flown.arrays()
     position = arrays["position"][:-1]
     off = arrays["estimate"] - (position[:, :, None] - position[:, links.neighbours])

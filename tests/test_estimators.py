@@ -6,9 +6,9 @@ from briefs import HEXA4, OCTAHEDRON, REST, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.estimators import geometry, kalman, small
+from agents.algebra import geometry, kalman, small
+from agents.algebra.constraints import MAPS
 from agents.estimators.conral import ConsensusLocalization
-from agents.estimators.constraints import MAPS
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.imm import InteractingMultipleModel
@@ -17,7 +17,7 @@ from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import THETA, RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
-from world.formation import PRESETS
+from world.formation.nominal import PRESETS
 
 R = np.array([[0.01, 0.003], [0.003, 0.02]])
 AFFINE = MAPS["affine"]

@@ -13,7 +13,7 @@ import pytest
 from flying import PROCESSES
 from rerun.chunk import RrdReader
 
-from netem import journal
+from netem.medium import journal
 
 pytestmark = PROCESSES
 
@@ -35,7 +35,7 @@ class Running:
             [
                 sys.executable,
                 "-m",
-                "affinet.cli",
+                "affinet.cli.commands",
                 "run",
                 str(self.scenario),
                 "--duration",

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet import cli, plan, scenario
-from affinet.run import fly
-from world import history
+from affinet.cli import commands
+from affinet.planning import plan
+from affinet.runtimes.run import fly
+from affinet.scenario import loading
+from world.books import history
 
 TINY = ("time.dt=0.05", "time.duration=2", "record.enabled=false")
 
@@ -39,7 +41,7 @@ def changed(flown, tmp_path):
 def told(directory, *options):
     """The model of a run."""
     with redirect_stdout(StringIO()) as printed:
-        assert cli.main(["fit", str(directory), "--json", *options]) == 0
+        assert commands.main(["fit", str(directory), "--json", *options]) == 0
     return json.loads(printed.getvalue())
 
 
@@ -51,7 +53,7 @@ def moments(inputs, most):
 
 def refused(capsys, *arguments):
     """The one line in which it is said what is wrong."""
-    assert cli.main(["fit", *map(str, arguments)]) == 2
+    assert commands.main(["fit", *map(str, arguments)]) == 2
     printed = capsys.readouterr()
     assert not printed.out
     (line,) = printed.err.splitlines()
@@ -82,11 +84,11 @@ def test_a_model_of_order_two_solves_two_equations(flown):
 )
 def test_it_prints_overrides_that_fly(order, filters, flown, capsys):
     model = told(flown, "--order", str(order))
-    assert cli.main(["fit", str(flown), "--order", str(order)]) == 0
+    assert commands.main(["fit", str(flown), "--order", str(order)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("=")[0] for line in lines] == [f"agents.parameters.{name}" for name in filters]
     for name in filters:
-        given = scenario.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"'])
+        given = loading.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"'])
         estimator = plan.make(given).estimator.build()
         if name == "silent-kf":
             assert estimator.coefficient == pytest.approx(model["coefficients"][0], rel=1e-5)
@@ -97,9 +99,9 @@ def test_it_prints_overrides_that_fly(order, filters, flown, capsys):
 
 
 def test_without_json_nothing_but_overrides_is_printed_and_with_it_one_object(flown, capsys):
-    assert cli.main(["fit", str(flown)]) == 0
+    assert commands.main(["fit", str(flown)]) == 0
     plain = capsys.readouterr()
-    assert cli.main(["fit", str(flown), "--json"]) == 0
+    assert commands.main(["fit", str(flown), "--json"]) == 0
     whole = capsys.readouterr()
     assert len(plain.out.splitlines()) == 3
     assert len(whole.out.splitlines()) == 1
@@ -109,10 +111,10 @@ def test_without_json_nothing_but_overrides_is_printed_and_with_it_one_object(fl
 
 @pytest.mark.parametrize("size", [1e-7, 1e7])
 def test_overrides_of_small_and_large_inputs_fly_too(size, changed, capsys):
-    assert cli.main(["fit", str(changed(lambda inputs: size * inputs))]) == 0
+    assert commands.main(["fit", str(changed(lambda inputs: size * inputs))]) == 0
     lines = capsys.readouterr().out.splitlines()
     for name in ("edge-kf", "silent-kf"):
-        plan.make(scenario.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"']))
+        plan.make(loading.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"']))
 
 
 def test_what_is_no_number_any_more_is_left_out(changed, flown):
@@ -132,7 +134,7 @@ def test_a_directory_without_a_run_is_named(tmp_path, capsys):
 
 
 def test_a_run_that_left_no_arrays_is_named(flown, tmp_path, capsys):
-    shutil.copy(flown / scenario.FILE, tmp_path)
+    shutil.copy(flown / loading.FILE, tmp_path)
     assert refused(capsys, tmp_path).startswith(f"{tmp_path}: ")
 
 
@@ -155,6 +157,6 @@ def test_double_integrators_are_refused(out, capsys):
 @pytest.mark.parametrize("order", ["0", "-1", "1.5", "two"])
 def test_an_order_counts_ticks(order, flown, capsys):
     with pytest.raises(SystemExit) as ended:
-        cli.main(["fit", str(flown), f"--order={order}"])
+        commands.main(["fit", str(flown), f"--order={order}"])
     assert ended.value.code == 2
     assert "give a whole number, at least 1" in capsys.readouterr().err

@@ -5,7 +5,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from world.formation import PRESETS, Formation
+from world.formation.nominal import PRESETS, Formation
 
 
 def test_zhao7_is_graph_1_of_paper_000():

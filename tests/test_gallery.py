@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
-from affinet.testing.swarm import Hangar, Swarm
+from affinet.runtimes.run import rehearse
+from affinet.scenario.sections import ScenarioError
+from affinet.testing.swarm import Swarm, SwarmRuns
 
 FAILURES = (AssertionError, ScenarioError, LookupError)
 MODULES = [
@@ -42,7 +42,7 @@ class Censor:
         """The verbs a test asked for, with the one of this number left out."""
         self.asked, self.without = [], without
         seeds = [mark.args[0] for mark in getattr(test, "pytestmark", []) if mark.name == "affinet_seeds"]
-        test(Hangar("inprocess", next(iter(seeds), None), pytest.fail, Path(__file__).parent))
+        test(SwarmRuns("inprocess", next(iter(seeds), None), pytest.fail, Path(__file__).parent))
         return self.asked
 
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import null_space
 
-from agents.estimators import geometry
-from analysis import graph
-from netem.links import Links
-from world.formation import PRESETS
-from world.stress import equilibrium
+from agents.algebra import geometry
+from analysis.models import graph
+from netem.core.links import Links
+from world.formation.nominal import PRESETS
+from world.formation.stress import equilibrium
 
 ZHAO7, HEXA10 = PRESETS["zhao7"], PRESETS["hexa10"]
 TICKS = 5

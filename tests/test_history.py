@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from world.history import digest
+from world.books.history import digest
 
 ARRAYS = {"error": np.zeros(6), "known": np.zeros((2, 3), dtype=np.int8)}
 

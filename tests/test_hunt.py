@@ -7,15 +7,17 @@ from flying import PROCESSES, digest_of
 from hypothesis import HealthCheck, given, settings
 from scripted import timeline
 
-from affinet import checkers, cli, hunt, scenario
-from affinet.checking import Checker, Finding
-from affinet.evidence import Evidence
-from affinet.sections import ScenarioError
-from affinet.testing import strategies
+from affinet.cli import commands
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from affinet.testing import hunt, strategies
+from affinet.verdicts import checkers
+from affinet.verdicts.checking import Checker, CheckResult
+from affinet.verdicts.evidence import Evidence
 
 pytestmark = PROCESSES
 
-CORRIDOR = scenario.load("corridor", ("time.dt=0.05", "time.duration=4"))
+CORRIDOR = loading.load("corridor", ("time.dt=0.05", "time.duration=4"))
 BRIEF = ("--set", "time.dt=0.05", "--duration", "2", "--estimator", "rkf")
 
 
@@ -33,9 +35,9 @@ def entries_of(given):
 
 def test_a_hunt_shrinks_writes_and_confirms_the_smallest_fault(den, capsys):
     options = ("--invariant", "bounded(5)", "--verbs", "cut,dropout", "--budget", "20", "--duration", "4")
-    assert cli.main(["hunt", "corridor", *BRIEF, *options, "--out", "smallest.toml"]) == 1
+    assert commands.main(["hunt", "corridor", *BRIEF, *options, "--out", "smallest.toml"]) == 1
     printed = " ".join(capsys.readouterr().out.split())
-    found = scenario.load("smallest.toml")
+    found = loading.load("smallest.toml")
     (entry,) = found.timeline
     assert entry.at == 0.0
     assert entry.until is entry.lasts is None
@@ -51,16 +53,16 @@ def test_a_hunt_shrinks_writes_and_confirms_the_smallest_fault(den, capsys):
 
 
 def test_the_smallest_is_named_after_its_scenario_where_no_file_is_named(den, monkeypatch):
-    quarry = hunt.Quarry(CORRIDOR, Finding("bounded(5)", "fail", 3, "x"), "digest")
+    quarry = hunt.Counterexample(CORRIDOR, CheckResult("bounded(5)", "fail", 3, "x"), "digest")
     monkeypatch.setattr(hunt, "hunt", lambda *_, **__: (quarry, hunt.Coverage()))
-    monkeypatch.setattr(cli, "_confirm", lambda *_: 1)
-    assert cli.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
-    assert said(scenario.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
+    monkeypatch.setattr(commands, "_confirm", lambda *_: 1)
+    assert commands.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
+    assert said(loading.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
 
 
 def test_a_hunt_that_finds_nothing_says_what_it_tried(capsys, den):
     options = ("--invariant", "bounded(1e9)", "--verbs", "delay,pause", "--budget", "4")
-    assert cli.main(["hunt", "corridor", *BRIEF, *options]) == 0
+    assert commands.main(["hunt", "corridor", *BRIEF, *options]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "nothing found that breaks it" in printed
     assert "4 schedules, 0 could not tell" in printed
@@ -91,25 +93,25 @@ def test_a_hunt_that_finds_nothing_says_what_it_tried(capsys, den):
     ],
 )
 def test_what_cannot_be_hunted_is_refused(options, says, capsys):
-    assert cli.main(["hunt", "corridor", *BRIEF, *options]) == 2
+    assert commands.main(["hunt", "corridor", *BRIEF, *options]) == 2
     assert says in capsys.readouterr().err
 
 
 def touched(verb, *words):
     """Fails under a fault of this verb on what any of these words selects."""
 
-    def check(evidence: Evidence) -> Finding:
+    def check(evidence: Evidence) -> CheckResult:
         wrong = [
             entry
             for entry in entries_of(evidence.plan.scenario)
             if entry["verb"] == verb and set(words) & {*entry.get("links", ()), *entry.get("agents", ())}
         ]
-        return Finding("touched", "fail" if wrong else "pass", 0 if wrong else None, f"{len(wrong)} times")
+        return CheckResult("touched", "fail" if wrong else "pass", 0 if wrong else None, f"{len(wrong)} times")
 
     return Checker("touched", check)
 
 
-INSTANT = scenario.load("corridor", ("time.dt=0.05", "time.duration=0.2", "network.availability=1.0"))
+INSTANT = loading.load("corridor", ("time.dt=0.05", "time.duration=0.2", "network.availability=1.0"))
 
 
 def hunted(invariant, *, verbs, seed=1, budget=60, watch=lambda *_: None):
@@ -133,7 +135,7 @@ def test_the_same_seed_hunts_the_same_and_another_does_not():
 
 
 def test_no_fault_that_is_found_can_be_left_out():
-    given_to = scenario.load("corridor", ("time.dt=0.05", "time.duration=2", 'agents.estimator="rkf"'))
+    given_to = loading.load("corridor", ("time.dt=0.05", "time.duration=2", 'agents.estimator="rkf"'))
     quarry, _ = hunt.hunt(
         given_to, checkers.bounded(5), budget=20, verbs=["cut", "dropout"], seed=1, watch=lambda *_: None
     )
@@ -166,7 +168,7 @@ def test_every_schedule_flown_is_seen_and_counted():
 
 
 def test_a_fault_that_touches_nothing_breaks_nothing():
-    mute = scenario.load("corridor", ("time.dt=0.05", "time.duration=0.2", 'agents.estimator="rkf"'))
+    mute = loading.load("corridor", ("time.dt=0.05", "time.duration=0.2", 'agents.estimator="rkf"'))
     quarry, coverage = hunt.hunt(
         mute, touched("lie", 1, "leaders", "followers"), budget=10, verbs=["lie"], seed=1, watch=lambda *_: None
     )
@@ -191,13 +193,13 @@ def said(given):
 
 
 def round_trip(given, path):
-    path.write_text(scenario.to_toml(given), encoding="utf-8")
-    return said(scenario.load(str(path)))
+    path.write_text(loading.to_toml(given), encoding="utf-8")
+    return said(loading.load(str(path)))
 
 
-@pytest.mark.parametrize("name", scenario.shipped())
+@pytest.mark.parametrize("name", loading.shipped())
 def test_a_shipped_scenario_is_the_same_after_it_is_written(name, tmp_path):
-    loaded = scenario.load(name)
+    loaded = loading.load(name)
     assert round_trip(loaded, tmp_path / "again.toml") == said(loaded)
 
 
@@ -233,7 +235,7 @@ WILD = (
 
 
 def test_a_scenario_that_says_everything_is_the_same_after_it_is_written(tmp_path):
-    loaded = scenario.load("corridor", WILD)
+    loaded = loading.load("corridor", WILD)
     assert round_trip(loaded, tmp_path / "again.toml") == said(loaded)
 
 
@@ -249,7 +251,7 @@ def test_any_schedule_is_the_same_after_it_is_written(tmp_path_factory):
     )
     @given(entries=strategies.schedules(CORRIDOR, strategies.VERBS))
     def same(entries):
-        extended = scenario.extended(CORRIDOR, entries)
+        extended = loading.extended(CORRIDOR, entries)
         assert round_trip(extended, path) == said(extended)
         assert len(extended.timeline) == len(entries)
 
@@ -258,11 +260,11 @@ def test_any_schedule_is_the_same_after_it_is_written(tmp_path_factory):
 
 def test_what_is_written_flies_the_same_bits(tmp_path):
     overrides = ("time.dt=0.05", "time.duration=1", "network.coupled=false", *WILD[2:5], WILD[-1])
-    (tmp_path / "again.toml").write_text(scenario.to_toml(scenario.load("corridor", overrides)), encoding="utf-8")
+    (tmp_path / "again.toml").write_text(loading.to_toml(loading.load("corridor", overrides)), encoding="utf-8")
     assert digest_of(str(tmp_path / "again.toml")) == digest_of("corridor", *overrides)
 
 
 def test_the_smallest_is_written_into_a_toml_file_or_not_at_all(capsys):
     with pytest.raises(SystemExit):
-        cli.main(["hunt", "corridor", "--invariant", "bounded(5)", "--out", "found"])
+        commands.main(["hunt", "corridor", "--invariant", "bounded(5)", "--out", "found"])
     assert "call it found.toml" in capsys.readouterr().err

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from flying import PROCESSES
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.run import fly
-from netem import journal
-from world import history
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly
+from affinet.scenario import loading
+from netem.medium import journal
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -91,14 +91,14 @@ def combination(number):
 
 def written(folder, number):
     network, timeline = combination(number)
-    base = json.loads(planning.make(scenario.load("corridor")).scenario.model_dump_json(exclude_none=True))
+    base = json.loads(planning.make(loading.load("corridor")).scenario.model_dump_json(exclude_none=True))
     base |= {"network": network, "timeline": timeline, "seed": number + 1}
     base["time"] = {"dt": 0.05, "duration": 2.0}
     base["agents"]["law"] = "static"
     base["agents"]["parameters"] = {}
     folder.mkdir(parents=True)
-    (folder / scenario.FILE).write_text(json.dumps(base))
-    return planning.make(scenario.resolved(folder))
+    (folder / loading.FILE).write_text(json.dumps(base))
+    return planning.make(loading.resolved(folder))
 
 
 def flown(plan, runtime, out):
@@ -143,7 +143,7 @@ def test_more_combinations_agree(number, tmp_path):
 def test_poisoned_messages_arrive_alike(kind, tmp_path):
     corrupt = f'network.profiles.bad={{corrupt=[{{kind="{kind}",p=0.02}}]}}'
     overrides = ("time.duration=1", "time.dt=0.05", corrupt, 'network.profile="bad"', 'agents.law="static"')
-    plan = planning.make(scenario.load("corridor", overrides))
+    plan = planning.make(loading.load("corridor", overrides))
     one, many = (fly(plan, runtime, tmp_path / runtime, lambda *_: None) for runtime in ("inprocess", "processes"))
     assert one.digest == many.digest
     marks = journal.read(tmp_path / "processes" / journal.FILE)["mark"].drop_null().to_pylist()

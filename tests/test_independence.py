@@ -20,15 +20,15 @@ from airs import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netem import channels as channel_names
-from netem.chain import Chain, ChainLayer
-from netem.corrupt import Mark
-from netem.fate import Fate
-from netem.fault import Body, Fault, UnderWay, Verb
-from netem.links import Links
-from netem.medium import Medium
-from netem.timeline import Timeline
-from netem.weather import Forecast
+from netem.core import channels as channel_names
+from netem.core.links import Links
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from netem.impairments.chain import Chain, ChainLayer
+from netem.impairments.corrupt import Mark
+from netem.medium.by_tick import ImpairmentsByTick
+from netem.medium.medium import Medium
+from netem.medium.verdict import Fate
 
 CHANNELS = ("sense", "input", "theta")
 TICKS = 24
@@ -105,7 +105,7 @@ ONE_OF_EACH = [
     Fault(Verb.DROPOUT, 9, 14, pairs=((1, 2), (4, 3)), probability=0.7),
     *(Fault(Verb.PAUSE, 9, 14, agents=(2,), under_way=policy) for policy in (UnderWay.DROP, UnderWay.HOLD)),
     Fault(Verb.KILL, 9, 14, agents=(2,)),
-    *(Fault(Verb.DEPART, 9, 14, agents=(2,), body=body) for body in Body),
+    *(Fault(Verb.DEPART, 9, 14, agents=(2,), body=body) for body in DepartedBody),
     *(replace(what, start=9, end=14, pairs=((1, 2), (4, 3))) for what in OF_SENSORS),
     *(replace(what, start=9, end=14, agents=(2,)) for what in OF_AGENTS),
 ]
@@ -307,7 +307,7 @@ def forecast(coupled):
     profile = mixture(3, frozenset(IMPAIRMENTS), links, CHANNELS, coupled=coupled)
     names = np.array([channel_names.code(name) for name in CHANNELS])
     codes = np.zeros(1, dtype=np.int64) if coupled else names
-    return Forecast(7, links, profile, codes, np.array([True, False, False]))
+    return ImpairmentsByTick(7, links, profile, codes, np.array([True, False, False]))
 
 
 LAST = 150  # more than two spans that are computed at once

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import sem
 
-from agents.estimators import geometry
-from agents.estimators.constraints import MAPS
-from analysis import graph
-from analysis.indicator import bounds
-from analysis.metrics import tracking_error
-from netem.links import Links
-from world.formation import PRESETS
+from agents.algebra import geometry
+from agents.algebra.constraints import MAPS
+from analysis.metrics.errors import tracking_error
+from analysis.metrics.indicator import bounds
+from analysis.models import graph
+from netem.core.links import Links
+from world.formation.nominal import PRESETS
 
 R = np.array([[0.01, 0.003], [0.003, 0.02]])
 NOWHERE = np.zeros((2, 2))

@@ -5,14 +5,14 @@ import threading
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet import cli
-from affinet import plan as planning
-from affinet.inject import Access, NotFlying, Wish
-from affinet.run import fly
-from netem import journal
-from netem.control import Action, Order, obey
-from netem.fault import Fault, Verb
-from netem.links import Links
+from affinet.cli import commands
+from affinet.planning import plan as planning
+from affinet.runtimes.inject import Access, InjectRequest, NotFlying
+from affinet.runtimes.run import fly
+from netem.core.links import Links
+from netem.faults.control import Order, OrderAction, obey
+from netem.faults.fault import Fault, Verb
+from netem.medium import journal
 
 pytestmark = PROCESSES
 
@@ -44,11 +44,11 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
     plan = plan_of("corridor", "time.duration=12", "record.enabled=false")
     with Flight(plan, out) as flight:
         access = Access.to(out)
-        cut = access.ask(Wish("cut", links=("1-2",), lasts_s=0.5).order(plan.scenario))
-        lose = access.ask(Wish("lose", links=("leaders->followers",), loss=0.5).order(plan.scenario))
-        shown = access.ask(Wish("show").order(plan.scenario))
-        healed = access.ask(Wish("heal").order(plan.scenario))
-        refused = access.ask(Order(Action.INJECT, Fault(Verb.KILL, 0, None, agents=(1,))))
+        cut = access.ask(InjectRequest("cut", links=("1-2",), lasts_s=0.5).order(plan.scenario))
+        lose = access.ask(InjectRequest("lose", links=("leaders->followers",), loss=0.5).order(plan.scenario))
+        shown = access.ask(InjectRequest("show").order(plan.scenario))
+        healed = access.ask(InjectRequest("heal").order(plan.scenario))
+        refused = access.ask(Order(OrderAction.INJECT, Fault(Verb.KILL, 0, None, agents=(1,))))
     assert cut.holds == ("cut 2->1, 1->2",)
     assert "lose 0.5" in lose.holds[-1]
     assert shown.holds[-1] == lose.holds[-1]
@@ -78,7 +78,7 @@ def test_nobody_injects_into_a_run_that_does_not_fly(out, capsys):
     fly(plan_of("corridor", "time.duration=0.1"), "inprocess", out, lambda *_: None)
     with pytest.raises(NotFlying):
         Access.to(out)
-    assert cli.main(["inject", str(out), "heal"]) == 2
+    assert commands.main(["inject", str(out), "heal"]) == 2
     assert "no run flies" in capsys.readouterr().err
 
 
@@ -92,24 +92,24 @@ def test_nobody_injects_into_a_run_that_does_not_fly(out, capsys):
 )
 def test_bad_wishes_are_refused_before_they_are_sent(words, says, out, capsys):
     fly(plan_of("corridor", "time.duration=0.1"), "inprocess", out, lambda *_: None)
-    assert cli.main(["inject", str(out), *words]) == 2
+    assert commands.main(["inject", str(out), *words]) == 2
     assert says in capsys.readouterr().err
 
 
 def test_a_journal_of_other_agents_is_no_judge(out, tmp_path, capsys):
     fly(plan_of("corridor", "time.duration=0.2", 'agents.estimator="none"'), "inprocess", out, lambda *_: None)
     again = ["replay", "--verdicts", str(out), "--runtime", "inprocess", "--out", str(tmp_path / "again")]
-    assert cli.main([*again, "--estimator", "ga-rkf"]) == 2
+    assert commands.main([*again, "--estimator", "ga-rkf"]) == 2
     assert "no verdicts on theta" in capsys.readouterr().err
 
 
 def order(verb, **what):
-    return Order(Action.INJECT, Fault(verb, 0, what.pop("end", None), **what))
+    return Order(OrderAction.INJECT, Fault(verb, 0, what.pop("end", None), **what))
 
 
 def test_healing_leaves_what_is_scripted():
     injected = obey(order(Verb.LOSE, pairs=((2, 3),), probability=0.4), 5, SCRIPTED, (), LINKS).injected
-    done = obey(Order(Action.HEAL, None), 9, SCRIPTED, injected, LINKS)
+    done = obey(Order(OrderAction.HEAL, None), 9, SCRIPTED, injected, LINKS)
     assert done.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), probability=0.4),)
     assert done.answer.holds == ("cut 1->2",)
 
@@ -117,7 +117,7 @@ def test_healing_leaves_what_is_scripted():
 def test_healing_leaves_what_was_over_before():
     over = obey(order(Verb.CUT, pairs=((1, 2),), end=2), 5, SCRIPTED, (), LINKS).injected
     lasting = obey(order(Verb.CUT, pairs=((2, 3),)), 6, SCRIPTED, over, LINKS).injected
-    healed = obey(Order(Action.HEAL, None), 9, SCRIPTED, lasting, LINKS).injected
+    healed = obey(Order(OrderAction.HEAL, None), 9, SCRIPTED, lasting, LINKS).injected
     assert [(fault.start, fault.end) for fault in healed] == [(5, 7), (6, 9)]
 
 
@@ -130,7 +130,7 @@ def test_healing_leaves_what_was_over_before():
         (order(Verb.CUT, pairs=((1, 2),), end=0), "at least one tick"),
         (order(Verb.PARTITION, groups=((1,), (9,))), "does not exist"),
         (order(Verb.DEPART, agents=(1,)), "can be injected"),
-        (Order(Action.INJECT, None), "can be injected"),
+        (Order(OrderAction.INJECT, None), "can be injected"),
     ],
 )
 def test_what_cannot_be_is_refused_and_changes_nothing(asked, why):

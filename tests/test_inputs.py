@@ -6,12 +6,14 @@ import shutil
 import pytest
 from flying import PROCESSES
 
-from affinet import cli, scenario, study
-from affinet import plan as planning
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from affinet.testing.swarm import Hangar
-from world.history import digest
+from affinet.cli import commands
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from affinet.studies import study
+from affinet.testing.swarm import SwarmRuns
+from world.books.history import digest
 
 pytestmark = PROCESSES
 
@@ -68,7 +70,7 @@ values = { half = ['network.profiles.traced.loss=[]', 'network.profiles.traced.d
 
 
 def trace_text(availability):
-    links = planning.make(scenario.load("corridor")).world.links
+    links = planning.make(loading.load("corridor")).world.links
     rows = "".join(f"0,{src},{dst},{availability}\n" for src, dst in links.index)
     return f"time,src,dst,availability\n{rows}"
 
@@ -90,7 +92,7 @@ def digest_of(given):
 
 def complaint(*arguments, **keys):
     with pytest.raises(ScenarioError) as caught:
-        planning.make(scenario.load(*arguments, **keys))
+        planning.make(loading.load(*arguments, **keys))
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -107,10 +109,10 @@ def elsewhere(tmp_path, monkeypatch):
 def test_what_a_scenario_names_lies_beside_it_wherever_one_works(tmp_path, monkeypatch):
     """Before: trace and module were looked for in the working directory: other files, or none."""
     file = field(tmp_path / "home")
-    there = digest_of(scenario.load(str(file)))
+    there = digest_of(loading.load(str(file)))
     monkeypatch.chdir(tmp_path / "home")
-    assert digest_of(scenario.load("mine.toml")) == there
-    assert digest_of(scenario.load("../elsewhere/mine.toml")) != there
+    assert digest_of(loading.load("mine.toml")) == there
+    assert digest_of(loading.load("../elsewhere/mine.toml")) != there
 
 
 @pytest.mark.usefixtures("elsewhere")
@@ -128,7 +130,7 @@ def test_what_lies_only_in_the_working_directory_is_not_found(tmp_path):
 
 
 def test_two_scenarios_have_modules_of_one_name(tmp_path):
-    one, other = (scenario.load(str(field(tmp_path / name, factor=f))) for name, f in (("a", 0.9), ("b", 0.5)))
+    one, other = (loading.load(str(field(tmp_path / name, factor=f))) for name, f in (("a", 0.9), ("b", 0.5)))
     plans = [planning.make(given) for given in (one, other)]
     digests = [digest(rehearse(plan).arrays) for plan in (*plans, *plans)]
     assert digests[:2] == digests[2:]
@@ -143,11 +145,11 @@ def test_on_the_command_line_paths_and_modules_are_those_of_the_working_director
         'network.profiles.traced.loss=[{model="trace",file="field/trace.csv"}]',
         "agents.estimator=mine:Mine",
     ]
-    assert cli.main(["check", str(file), *(word for one in sets for word in ("--set", one))]) == 0
-    given = scenario.load(str(file), sets, elsewhere)
+    assert commands.main(["check", str(file), *(word for one in sets for word in ("--set", one))]) == 0
+    given = loading.load(str(file), sets, elsewhere)
     assert given.own_modules == {"mine:Mine": elsewhere}
     (elsewhere / "mine.py").unlink()
-    assert scenario.load(str(file), sets, elsewhere).own_modules == {"mine:Mine": tmp_path / "home"}
+    assert loading.load(str(file), sets, elsewhere).own_modules == {"mine:Mine": tmp_path / "home"}
 
 
 @pytest.mark.usefixtures("elsewhere")
@@ -166,12 +168,12 @@ def test_a_study_names_what_lies_beside_it(tmp_path):
 @pytest.mark.usefixtures("elsewhere")
 def test_a_test_names_what_lies_beside_it(tmp_path):
     field(tmp_path / "home")
-    swarm = Hangar("inprocess", None, lambda: tmp_path / "room", tmp_path / "home")
+    swarm = SwarmRuns("inprocess", None, lambda: tmp_path / "room", tmp_path / "home")
     shipped = swarm("corridor", "time.dt=0.05", 'agents.estimator="mine:Mine"', "time.duration=0.5")
     assert shipped.scenario.own_modules == {"mine:Mine": tmp_path / "home"}
     late = swarm("mine.toml").fault("cut", links=["1-2"], at=0.1, until=0.3)
     assert digest_of(late.scenario) == digest(late.fly().arrays)
-    assert digest_of(late.scenario) != digest_of(scenario.load(str(tmp_path / "home" / "mine.toml")))
+    assert digest_of(late.scenario) != digest_of(loading.load(str(tmp_path / "home" / "mine.toml")))
 
 
 @pytest.mark.usefixtures("elsewhere")
@@ -179,17 +181,18 @@ def test_a_test_names_what_lies_beside_it(tmp_path):
 def test_a_run_is_flown_again_from_any_folder_after_its_files_are_gone(runtime, tmp_path, capsys):
     """Before: a replay read the originals, relative to the working directory."""
     file = field(tmp_path / "home")
-    first = fly(planning.make(scenario.load(str(file))), runtime, tmp_path / "run", lambda *_: None)
+    first = fly(planning.make(loading.load(str(file))), runtime, tmp_path / "run", lambda *_: None)
     assert first.verdict == "pass", first.reasons
     shutil.rmtree(tmp_path / "home")
     shutil.move(tmp_path / "run", tmp_path / "moved")
     again = ["replay", str(tmp_path / "moved"), "--runtime", "inprocess", "--out", str(tmp_path / "again")]
-    assert cli.main(again) == 0
+    assert commands.main(again) == 0
     said = capsys.readouterr().err
     assert "the same bits as" in said
     assert "note: " not in said
     assert (
-        cli.main(["replay", str(tmp_path / "again"), "--runtime", "inprocess", "--out", str(tmp_path / "third")]) == 0
+        commands.main(["replay", str(tmp_path / "again"), "--runtime", "inprocess", "--out", str(tmp_path / "third")])
+        == 0
     )
     kept = json.loads((tmp_path / "third" / "inputs" / "inputs.json").read_text())
     assert sorted(kept["originals"]) == ["modules/helper.py", "modules/mine.py", "pings.txt", "trace.csv"]
@@ -201,9 +204,12 @@ def test_a_run_is_flown_again_from_any_folder_after_its_files_are_gone(runtime, 
 )
 def test_a_replay_says_which_original_is_not_what_it_was(name, text, tmp_path, capsys):
     file = field(tmp_path / "home")
-    fly(planning.make(scenario.load(str(file))), "inprocess", tmp_path / "run", lambda *_: None)
+    fly(planning.make(loading.load(str(file))), "inprocess", tmp_path / "run", lambda *_: None)
     (tmp_path / "home" / name).write_text(text)
-    assert cli.main(["replay", str(tmp_path / "run"), "--runtime", "inprocess", "--out", str(tmp_path / "again")]) == 0
+    assert (
+        commands.main(["replay", str(tmp_path / "run"), "--runtime", "inprocess", "--out", str(tmp_path / "again")])
+        == 0
+    )
     said = capsys.readouterr().err
     assert f"note: {tmp_path / 'home' / name} is not what it was: the copy inputs/" in said
     assert said.count("note: ") == 1
@@ -223,7 +229,7 @@ def test_files_of_one_name_do_not_collide(tmp_path):
     faults = (
         "timeline=[{verb='degrade',links=['1-2'],at=0.1,profile='a'},{verb='degrade',links=['1-3'],at=0.1,profile='b'}]"
     )
-    plan = planning.make(scenario.load(str(file), [*losses, faults]))
+    plan = planning.make(loading.load(str(file), [*losses, faults]))
     fly(plan, "inprocess", tmp_path / "run", lambda *_: None)
     again = planning.again(tmp_path / "run", (), verdicts=False)
     worth = [float(profile.traces[0].availability.min()) for profile in again.profiles]
@@ -234,10 +240,10 @@ def test_files_of_one_name_do_not_collide(tmp_path):
 
 
 def test_an_earlier_run_that_is_the_air_of_another_is_copied(tmp_path):
-    lossy = scenario.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
+    lossy = loading.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
     fly(planning.make(lossy), "inprocess", tmp_path / "before", lambda *_: None)
     traced = [f'network.profiles.t.loss=[{{model="trace",file="{tmp_path}/before"}}]', 'network.profile="t"', "seed=3"]
-    given = scenario.load("corridor", ["time.dt=0.05", "time.duration=0.5", "network.availability=1.0", *traced])
+    given = loading.load("corridor", ["time.dt=0.05", "time.duration=0.5", "network.availability=1.0", *traced])
     first = fly(planning.make(given), "inprocess", tmp_path / "run", lambda *_: None)
     shutil.rmtree(tmp_path / "before")
     again = planning.again(tmp_path / "run", (), verdicts=False)
@@ -246,7 +252,7 @@ def test_an_earlier_run_that_is_the_air_of_another_is_copied(tmp_path):
 
 def test_a_run_under_the_verdicts_of_another_is_flown_again_under_them(tmp_path):
     """Before: its own replay let the models decide, and came to other bits."""
-    given = scenario.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
+    given = loading.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
     fly(planning.make(given), "inprocess", tmp_path / "first", lambda *_: None)
     judged = planning.again(tmp_path / "first", ["seed=9"], verdicts=True)
     second = fly(judged, "inprocess", tmp_path / "second", lambda *_: None)
@@ -259,6 +265,6 @@ def test_a_run_under_the_verdicts_of_another_is_flown_again_under_them(tmp_path)
 def test_a_hunted_scenario_finds_the_estimator_of_the_hunt(tmp_path, capsys):
     file = field(tmp_path / "home")
     hunt = ["hunt", str(file), "--invariant", "bounded(1)", "--out", "smallest.toml"]
-    assert cli.main(hunt) == 2
+    assert commands.main(hunt) == 2
     said = capsys.readouterr().err
     assert f"--out smallest.toml: mine:Mine lies in {tmp_path}/home: write the file there" in said

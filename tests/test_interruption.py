@@ -10,8 +10,8 @@ import psutil
 import pytest
 from flying import PROCESSES
 
-from affinet.interruption import Interrupted, Interruption, interruptible
-from netem import journal
+from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
+from netem.medium import journal
 
 PATIENCE = 180.0
 
@@ -40,7 +40,17 @@ def private(tmp_path):
 def interrupted(number, runtime, out, private, monkeypatch, again=False):
     monkeypatch.setenv("TMPDIR", str(private))
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has its children ignore it
-    command = [sys.executable, "-m", "affinet.cli", "run", "corridor", "--duration", "600", "--estimator", "none"]
+    command = [
+        sys.executable,
+        "-m",
+        "affinet.cli.commands",
+        "run",
+        "corridor",
+        "--duration",
+        "600",
+        "--estimator",
+        "none",
+    ]
     command += ["--runtime", runtime, "--set", "record.enabled=false"]
     launcher = subprocess.Popen(
         [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

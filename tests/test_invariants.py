@@ -5,8 +5,8 @@ import inspect
 import pytest
 from judged import evidence
 
-from affinet import checkers, invariants
-from affinet.sections import ScenarioError
+from affinet.scenario.sections import ScenarioError
+from affinet.verdicts import checkers, invariants
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from pathlib import Path
 import zenoh
 from flying import PROCESSES, digest_of, plan_of
 
-from affinet.launcher import Launcher
-from world import history
+from affinet.runtimes.launcher import Launcher
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -39,7 +39,7 @@ def test_a_rogue_gets_nothing_through(out, tmp_path):
 
 
 def test_a_wrong_password_is_refused(out):
-    from netem.session import Login, client
+    from netem.wire.session import Login, client
 
     plan = plan_of("corridor", "time.duration=2")
     refused = []

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from netem import lie
-from netem.fault import Fault, Verb
+from netem.faults import lie
+from netem.faults.fault import Fault, Verb
 
 
 def liar(*rows):

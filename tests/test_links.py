@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from netem import cut
-from netem.links import Links
+from netem.core.links import Links
+from netem.faults import cut
 
 # 1 - 2 - 3, and 1 - 4; agent 5 hears nobody.
 LINKS = Links.both_ways(5, [(2, 3), (4, 1), (1, 2)])

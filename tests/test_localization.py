@@ -11,23 +11,34 @@ from flying import plan_of
 from judged import changed, tampered
 from scripted import timeline
 
-from affinet import checkers, invariants, scenario
-from affinet.batch import fly_all
-from affinet.checkers import localized, smooth
-from affinet.plan import PlanError
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
-from affinet.side_by_side import side_by_side
+from affinet.planning.plan import PlanError
+from affinet.runtimes.run import rehearse
+from affinet.runtimes.side_by_side import side_by_side
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from affinet.studies.batch import fly_all
+from affinet.verdicts import checkers, invariants
+from affinet.verdicts.checkers import localized, smooth
 from agents.estimators import jor
-from agents.estimators.base import Heard
 from agents.estimators.jor import JacobiOverRelaxation, Side
-from analysis import localization, random_graphs
-from analysis.localization import Edges, centred, centroid, optimal, ringing, spectrum, system, weights
-from analysis.sensor import Sensor
-from netem.channels import PLACE
-from netem.fate import Fate
-from netem.links import Links
-from world.localized import FirstMeasurements
+from agents.exchange import Heard
+from analysis.claims import random_graphs
+from analysis.metrics import localization
+from analysis.metrics.localization import (
+    EdgeInformation,
+    centred,
+    centroid,
+    optimal,
+    ringing,
+    spectrum,
+    system,
+    weights,
+)
+from analysis.models.sensor import Sensor
+from netem.core.channels import PLACE
+from netem.core.links import Links
+from netem.medium.verdict import Fate
+from world.books.localized import FirstMeasurements
 
 SPACES = pytest.mark.parametrize("dimension", [2, 3])
 LINE_OF_SIGHT = {D: Sensor("line-of-sight", np.diag([0.15**2] + [0.1**2] * (D - 1))) for D in (2, 3)}
@@ -132,7 +143,7 @@ def chain(agents=10, spread=None):
     for i in range(agents - 1):
         information[i, i + 1] = information[i + 1, i] = precision
         pull[i, i + 1], pull[i + 1, i] = precision @ [1.0, 0.3], -precision @ [1.0, 0.3]
-    return Edges(information, pull)
+    return EdgeInformation(information, pull)
 
 
 def iterates(edges, h, start, number):
@@ -192,7 +203,7 @@ def test_the_optimum_of_many_is_that_of_each_and_no_number_where_edges_do_not_jo
     joined = [Measurement(i, i + 1, rng.normal(size=2), covariance) for i in range(4)]
     all_of_them, split = edges_of(5, joined), edges_of(5, [joined[0], *joined[2:]])
     alone = optimal(all_of_them)
-    both = optimal(Edges(*(np.stack(each) for each in zip(all_of_them, split, strict=True))))
+    both = optimal(EdgeInformation(*(np.stack(each) for each in zip(all_of_them, split, strict=True))))
     assert np.isfinite(alone).all()
     np.testing.assert_allclose(both[0], alone, atol=1e-12)
     assert np.isnan(both[1]).all()
@@ -782,7 +793,7 @@ def test_a_mean_of_samples_spreads_less():
 )
 def test_deviations_along_and_across_go_together_and_exclude_others(sensing, says):
     with pytest.raises(ScenarioError, match=says):
-        scenario.load(NAME, [f"sensing={sensing}"])
+        loading.load(NAME, [f"sensing={sensing}"])
 
 
 def test_deviations_along_and_across_are_shares_of_the_distance():

@@ -9,11 +9,11 @@ import pytest
 import tomli_w
 from extremes import BASES, changed, numeric_fields, places
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.plan import PlanError
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
+from affinet.planning import plan as planning
+from affinet.planning.plan import PlanError
+from affinet.runtimes.run import rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
 
 BEYOND = [5e-324, 1e300, inf, nan, -(2**63), 10**30]
 EXTREMES = [*BEYOND, 0, 0.0, -1, -1.0, 1e-300, 1.7e308, 2**63, 2**64, 1e-9, 1e9, 10**9]
@@ -32,7 +32,7 @@ def flown_or_refused(file, raw, steps):
     file.write_text(tomli_w.dumps(raw))
     with suppress(PlanError):
         try:
-            made = planning.make(scenario.load(str(file)))
+            made = planning.make(loading.load(str(file)))
         except ScenarioError as error:
             (line,) = str(error).splitlines()
             assert any(step in line for step in steps if isinstance(step, str)), line
@@ -189,7 +189,7 @@ PIT = 'timeline=[{verb="cut",at=0,every=%s,lasts=%s,links=["1-2"]}]'
 )
 def test_what_cannot_fit_is_refused_with_its_bound(name, override, words):
     with pytest.raises(ScenarioError) as error:
-        planning.make(scenario.load(name, [override]))
+        planning.make(loading.load(name, [override]))
     (line,) = str(error.value).splitlines()
     assert line.endswith(words)
 
@@ -258,7 +258,7 @@ def test_what_cannot_fit_is_refused_with_its_bound(name, override, words):
 )
 def test_what_cannot_fly_is_found_before_it_does(name, overrides, check, words):
     with pytest.raises(PlanError) as error:
-        planning.make(scenario.load(name, overrides))
+        planning.make(loading.load(name, overrides))
     (finding,) = (finding for finding in error.value.findings if finding.fatal)
     assert finding.check == check
     assert finding.says.startswith(words)
@@ -266,5 +266,5 @@ def test_what_cannot_fly_is_found_before_it_does(name, overrides, check, words):
 
 @pytest.mark.parametrize(("name", "gain"), [("corridor", 199.0), ("ravine", 99.0)])
 def test_leaders_just_below_the_bound_fly(name, gain):
-    made = planning.make(scenario.load(name, [f"agents.leader_gain={gain}", "time.duration=1.0"]))
+    made = planning.make(loading.load(name, [f"agents.leader_gain={gain}", "time.duration=1.0"]))
     assert rehearse(made).outcome.tracking_error["max"] < 1.5

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from agents.process import Node
-from netem import wire
-from netem.broadcasts import Broadcasts, fields
-from netem.keys import Keys
-from netem.links import Links
-from netem.sequence import UninstructedLoss
-from netem.wire import WireError
+from agents.process import AgentNode
+from netem.core.links import Links
+from netem.wire import messages
+from netem.wire.broadcasts import Broadcasts, fields
+from netem.wire.keys import Keys
+from netem.wire.messages import WireError
+from netem.wire.sequence import UninstructedLoss
 from world.acts import Acts
 
 KEYS = Keys("r1")
@@ -225,7 +225,7 @@ def test_an_act_that_is_none_of_this_tick_names_its_agent(plain, says):
 # ---- an agent that hears them
 
 
-class Unconnected(Node):
+class Unconnected(AgentNode):
     """Agent 4 of the corridor, whose neighbours are 1, 6 and others, without a network."""
 
     def __init__(self):
@@ -264,5 +264,5 @@ def test_a_neighbour_that_leaves_a_field_out_is_named():
 
 def test_what_is_shown_of_anything_is_short():
     deep = msgpack.unpackb(nested(1000))
-    assert wire.shown("x" * 1000) == "'" + "x" * 76 + "..."
-    assert wire.shown(deep) == "a list that nests too deep"
+    assert messages.shown("x" * 1000) == "'" + "x" * 76 + "..."
+    assert messages.shown(deep) == "a list that nests too deep"

@@ -8,8 +8,9 @@ import signal
 
 import pytest
 
-from affinet import files, study
-from affinet.cli import main
+from affinet.cli.commands import main
+from affinet.scenario import files
+from affinet.studies import study
 
 CASES, QUICK = 1000, 80
 PATIENCE_S = 60  # for one file, on however busy a machine

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.affine import Manoeuvre
-from world.formation import PRESETS
-from world.maneuver import corridor, hover, keyframes, narrowest, ravine, turned
+from analysis.models.affine import Manoeuvre
+from world.formation.manoeuvre import corridor, hover, keyframes, narrowest, ravine, turned
+from world.formation.nominal import PRESETS
 
 NOMINAL = 2.0 * PRESETS["zhao7"].nominal
 OCTA10 = PRESETS["octa10"].nominal

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from netem import measured, trace
-from netem.links import Links
-from netem.measured import MeasuredError
-from netem.trace import Measured, TraceError
+from netem.core.links import Links
+from netem.impairments import measured, trace
+from netem.impairments.measured import MeasuredError
+from netem.impairments.trace import MeasuredAvailability, TraceError
 
 PAIR = Links.both_ways(2, [(1, 2)])
 WHEEL = Links.both_ways(8, [(1, n) for n in range(2, 9)])
@@ -93,7 +93,9 @@ def test_any_clock_meets_the_mean_over_time():
     rng = np.random.default_rng(1)
     links, length = 3, 4.0
     time = np.concatenate([np.zeros(links), rng.uniform(0.0, 5.0, 60)])
-    one = Measured(time, np.concatenate([np.arange(links), rng.integers(0, links, 60)]), rng.random(links + 60))
+    one = MeasuredAvailability(
+        time, np.concatenate([np.arange(links), rng.integers(0, links, 60)]), rng.random(links + 60)
+    )
     for dt in (0.001, 0.05, 0.4, 2.0):
         ticks = round(length / dt)
         changes, table = one.over(links, dt, ticks)

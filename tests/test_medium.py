@@ -7,17 +7,17 @@ import pytest
 from airs import BITS, DT, IMPAIRMENTS, constant, fates_of, fly, losing, mixture, quiet_profile, roaming, taking
 from airs import everything as everything_on
 
-from netem.fate import REASONS, Fate, Ledger
-from netem.fault import Fault, UnderWay, Verb
-from netem.jamming import Zone
-from netem.links import Links
-from netem.medium import Medium
-from netem.rate import Rate
-from netem.reach import Law, Reach
-from netem.schedule import Schedule
-from netem.timeline import Timeline
-from netem.trace import Trace
-from netem.trigger import Trigger
+from netem.core.links import Links
+from netem.faults.fault import Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from netem.faults.trigger import Trigger
+from netem.impairments.jamming import Zone
+from netem.impairments.rate import Rate
+from netem.impairments.reach import Reach, ReachLaw
+from netem.impairments.schedule import Schedule
+from netem.impairments.trace import Trace
+from netem.medium.medium import Medium
+from netem.medium.verdict import REASONS, Fate, Ledger
 
 LINKS = Links.both_ways(5, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (1, 3)])
 CHANNELS = ("sense", "input", "theta")
@@ -85,7 +85,7 @@ def with_closed(standing):
 
 
 def with_nothing_in_range(standing):
-    return replace(standing, reaches=(Reach(Law.RAMP, ON_1_2, 2.0, 2.0, 0.0, 0.0, 1, True, True),))
+    return replace(standing, reaches=(Reach(ReachLaw.RAMP, ON_1_2, 2.0, 2.0, 0.0, 0.0, 1, True, True),))
 
 
 def with_all_jammed(standing):
@@ -211,7 +211,7 @@ def test_a_zone_jams_the_links_it_can_toward_agents_inside_in_its_share_of_ticks
 
 def test_a_disk_holds_the_links_it_can_that_are_too_long():
     rows = LINKS.src != 3
-    disk = Reach(Law.RAMP, rows, 3.0, 3.0, 0.0, 0.0, 1, sensing=True, comms=False)
+    disk = Reach(ReachLaw.RAMP, rows, 3.0, 3.0, 0.0, 0.0, 1, sensing=True, comms=False)
     fates = judged(profile(reaches=(disk,), coupled=False), position=STANDING)
     neighbours = abs(LINKS.src - LINKS.dst) == 1  # 2.8 m apart, the others more
     assert (fates[0] == np.where(rows & ~neighbours, Fate.RANGE, Fate.DELIVERED)).all()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import orthogonal_procrustes
 
-from agents.estimators.small import triangle
-from analysis.metrics import covariance_trace, estimation_error, procrustes_error, tracking_error
+from agents.algebra.small import triangle
+from analysis.metrics.errors import covariance_trace, estimation_error, procrustes_error, tracking_error
 
 TARGET = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 POSITION = np.array([[3.0, 4.0], [1.0, 2.0], [1.0, 1.0]])  # 5 m, 2 m and 1 m off

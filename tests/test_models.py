@@ -10,16 +10,16 @@ import pytest
 from scipy import stats
 from scipy.special import ndtr
 
-from netem import corrupt, delay, loss, schedule
-from netem.chain import Chain, ChainLayer, all_together, steady
-from netem.corrupt import Mark
-from netem.delay import Delay
-from netem.jamming import Zone
-from netem.links import Links
-from netem.rate import Rate
-from netem.reach import Law, Reach, squared_distances
-from netem.schedule import Schedule
-from netem.trace import Trace
+from netem.core.links import Links
+from netem.impairments import corrupt, delay, loss, schedule
+from netem.impairments.chain import Chain, ChainLayer, all_together, steady
+from netem.impairments.corrupt import Mark
+from netem.impairments.delay import MessageDelay
+from netem.impairments.jamming import Zone
+from netem.impairments.rate import Rate
+from netem.impairments.reach import Reach, ReachLaw, squared_distances
+from netem.impairments.schedule import Schedule
+from netem.impairments.trace import Trace
 
 WHEEL = Links.both_ways(6, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), *((6, n) for n in range(1, 6))])
 ALL = np.ones(len(WHEEL), dtype=bool)
@@ -267,21 +267,21 @@ def test_a_walk_is_its_steps_one_after_the_other():
 
 
 def law(kind, mean=0.03, jitter=0.0, table=(), correlation=0.0):
-    return Delay(kind, ALL, mean, jitter, np.array(table), correlation, False)
+    return MessageDelay(kind, ALL, mean, jitter, np.array(table), correlation, False)
 
 
 SKEWED = [0.001, 0.002, 0.003, 0.004, 0.005, 0.006, 0.007, 0.008, 0.054, 1.0]  # seconds; their mean is .109
 
 DELAYS = {
-    "constant": law(delay.Law.CONSTANT),
-    "uniform": law(delay.Law.UNIFORM, jitter=0.02),
-    "uniform, clipped": law(delay.Law.UNIFORM, mean=0.01, jitter=0.03),
-    "normal": law(delay.Law.NORMAL, jitter=0.005),
-    "normal, clipped": law(delay.Law.NORMAL, mean=0.01, jitter=0.02),
-    "normal without jitter": law(delay.Law.NORMAL),
-    "exponential": law(delay.Law.EXPONENTIAL),
-    "pareto": law(delay.Law.PARETO, jitter=0.01),
-    "table": law(delay.Law.TABLE, mean=0.0, table=[0.001, 0.004, 0.005, 0.1]),
+    "constant": law(delay.DelayLaw.CONSTANT),
+    "uniform": law(delay.DelayLaw.UNIFORM, jitter=0.02),
+    "uniform, clipped": law(delay.DelayLaw.UNIFORM, mean=0.01, jitter=0.03),
+    "normal": law(delay.DelayLaw.NORMAL, jitter=0.005),
+    "normal, clipped": law(delay.DelayLaw.NORMAL, mean=0.01, jitter=0.02),
+    "normal without jitter": law(delay.DelayLaw.NORMAL),
+    "exponential": law(delay.DelayLaw.EXPONENTIAL),
+    "pareto": law(delay.DelayLaw.PARETO, jitter=0.01),
+    "table": law(delay.DelayLaw.TABLE, mean=0.0, table=[0.001, 0.004, 0.005, 0.1]),
 }
 
 
@@ -315,16 +315,16 @@ def test_quantiles_are_those_of_the_distribution(name, right):
 def test_a_pareto_delay_has_its_mean_and_its_standard_deviation(mean, jitter):
     share = 1.0 - 1.0 / 1.5
     # Of a Pareto distribution, two quantiles say which it is.
-    first, second = law(delay.Law.PARETO, mean, jitter).quantile(np.array([1e-12, share]))
+    first, second = law(delay.DelayLaw.PARETO, mean, jitter).quantile(np.array([1e-12, share]))
     shape = np.log(1.5) / np.log(second / first)
     right = stats.pareto(shape, scale=first)
     assert right.mean() == pytest.approx(mean, rel=1e-4)
     assert right.std() == pytest.approx(jitter, rel=1e-2)
-    np.testing.assert_allclose(law(delay.Law.PARETO, mean, jitter).quantile(U), right.ppf(U), rtol=1e-6)
+    np.testing.assert_allclose(law(delay.DelayLaw.PARETO, mean, jitter).quantile(U), right.ppf(U), rtol=1e-6)
 
 
 def test_a_table_gives_each_of_its_values_as_often_and_no_other():
-    one = law(delay.Law.TABLE, table=SKEWED)
+    one = law(delay.DelayLaw.TABLE, table=SKEWED)
     drawn, often = np.unique(one.quantile((np.arange(100_000) + 0.5) / 100_000), return_counts=True)
     assert drawn.tolist() == SKEWED
     assert often.tolist() == [10_000] * len(SKEWED)
@@ -521,25 +521,25 @@ EVENLY = ((np.arange(100_000) + 0.5) / 100_000)[:, None]
 
 @pytest.mark.parametrize(("metres", "availability"), [(0, 1), (10, 1), (12.5, 0.75), (19, 0.1), (20, 0), (30, 0)])
 def test_a_ramp_falls_straight(metres, availability):
-    passing = metres <= reaching(Law.RAMP, inner=10.0).limit(EVENLY, np.zeros(1))
+    passing = metres <= reaching(ReachLaw.RAMP, inner=10.0).limit(EVENLY, np.zeros(1))
     assert passing.mean() == pytest.approx(availability, abs=1e-5)
 
 
 def test_a_disk_passes_all_up_to_its_edge():
-    assert (reaching(Law.RAMP, inner=20.0).limit(EVENLY, np.zeros(1)) == 20.0).all()
+    assert (reaching(ReachLaw.RAMP, inner=20.0).limit(EVENLY, np.zeros(1)) == 20.0).all()
 
 
 @pytest.mark.parametrize("metres", [5.0, 15.0, 20.0, 30.0])
 def test_half_of_the_shadows_pass_at_the_range_and_the_others_by_the_normal_law(metres):
-    passing = metres <= reaching(Law.LOG_DISTANCE, shadowing=4.0).limit(np.zeros(1), stats.norm.ppf(EVENLY))
+    passing = metres <= reaching(ReachLaw.LOG_DISTANCE, shadowing=4.0).limit(np.zeros(1), stats.norm.ppf(EVENLY))
     assert passing.mean() == pytest.approx(ndtr(10 * 3.0 * np.log10(20.0 / metres) / 4.0), abs=2e-5)
 
 
 def test_without_shadows_the_log_distance_law_is_a_disk():
-    assert (reaching(Law.LOG_DISTANCE).limit(np.zeros(1), stats.norm.ppf(EVENLY)) == 20.0).all()
+    assert (reaching(ReachLaw.LOG_DISTANCE).limit(np.zeros(1), stats.norm.ppf(EVENLY)) == 20.0).all()
 
 
-@pytest.mark.parametrize("kind", Law)
+@pytest.mark.parametrize("kind", ReachLaw)
 def test_a_reach_acts_on_its_own_links_alone(kind):
     reach = reaching(kind, 1.0, 1.0, rows=(True, False))
     assert reach.limit(np.full(2, 0.5), np.zeros(2)).tolist() == [1.0, np.inf]

@@ -8,11 +8,11 @@ from briefs import REST, brief, silence
 from filterpy.common import kinematic_kf
 from filterpy.kalman import IMMEstimator, KalmanFilter
 
-from agents.estimators import kalman
+from agents.algebra import kalman
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.imm import InteractingMultipleModel
 from agents.estimators.rkf import RelativeKalmanFilter
-from analysis.consistency import band, nees
+from analysis.metrics.consistency import band, nees
 
 MODELS = list(kalman.ORDER)
 NAMES = ["constant-acceleration", "constant-velocity", "random-walk"]  # as the IMM has them

@@ -14,12 +14,13 @@ from matplotlib.figure import Figure
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from affinet import directories, progress, show, supervision
-from affinet.checks import Finding
-from affinet.run import fly
-from analysis import figures
-from netem import keys, session
-from netem.keys import Keys
+from affinet.cli import progress, show
+from affinet.runtimes import directories, supervision
+from affinet.runtimes.run import fly
+from affinet.scenario.finding import Finding
+from analysis.figures import curves
+from netem.wire import keys, session
+from netem.wire.keys import Keys
 
 pytestmark = PROCESSES
 
@@ -127,7 +128,7 @@ def test_the_progress_of_a_run_shows_its_name_as_it_stands(text, monkeypatch):
 def test_a_title_is_no_formula(title, tmp_path):
     figure = Figure()
     figure.suptitle(title)
-    assert figures.mpl.rcParams["text.parse_math"] is False
+    assert curves.mpl.rcParams["text.parse_math"] is False
     figure.savefig(tmp_path / "figure.png")  # '$\frac$' raised, two dollars set what is between them in italics
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from netem.text import NetemTextError, Reading, read
+from netem.impairments.netem_string import NetemTextError, Reading, read
 
 CHAIN_NOTE = 'step = "packet" as in netem: the chain freezes on an idle link; step = "time" steps with simulated time'
 HALF_WIDTH = "jitter is a half-width here (no distribution given)"

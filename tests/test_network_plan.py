@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet import impairments, scenario, selectors
-from affinet import plan as planning
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from netem.fate import Fate
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading, profiles, selectors
+from affinet.scenario.sections import ScenarioError
+from netem.medium.verdict import Fate
 
 CALM = ("network.availability=1.0", "time.duration=1")
 
 
 def planned(*overrides):
-    return planning.make(scenario.load("corridor", (*CALM, *overrides)))
+    return planning.make(loading.load("corridor", (*CALM, *overrides)))
 
 
 def says(*overrides):
@@ -68,10 +68,10 @@ def test_sensing_and_communication_are_said_apart_when_they_are_decided_apart():
 
 
 def test_a_profile_takes_from_another_what_it_does_not_say():
-    own = {"mine": impairments.LinkProfile.model_validate({"like": "acoustic", "loss": []})}
-    found = impairments.resolve("mine", own)
+    own = {"mine": profiles.LinkProfile.model_validate({"like": "acoustic", "loss": []})}
+    found = profiles.resolve("mine", own)
     assert found.loss == []
-    assert found.delay == impairments.presets()["acoustic"].delay
+    assert found.delay == profiles.presets()["acoustic"].delay
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_a_run_shorter_than_this_one_is_no_trace(tmp_path):
 def test_a_resolved_scenario_flies_the_same_air(tmp_path):
     plan = planned('network.profiles.x={like="wifi_busy",netem="duplicate 1%"}', 'network.profile="x"')
     first = fly(plan, "inprocess", tmp_path / "first", lambda *_: None)
-    again = planning.make(scenario.resolved(tmp_path / "first"))
+    again = planning.make(loading.resolved(tmp_path / "first"))
     assert fly(again, "inprocess", tmp_path / "again", lambda *_: None).digest == first.digest
-    told = json.loads((tmp_path / "first" / scenario.FILE).read_text())
+    told = json.loads((tmp_path / "first" / loading.FILE).read_text())
     assert told["network"]["profile"] == "x"

@@ -5,14 +5,15 @@ import re
 
 import msgpack
 import pytest
-from own_code import ESTIMATOR, broken, write
+from own_code import ESTIMATOR, broken, line_of, write
 
-from affinet import plan, registry, scenario
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
+from affinet.planning import plan, registry
+from affinet.runtimes.run import rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
 from agents.process import Choice
-from netem.plain import from_plain, to_plain
-from netem.user_code import UserCodeError
+from netem.core.plain import from_plain, to_plain
+from netem.processes.user_code import UserCodeError
 
 SIMPLE = ("agents.law=rest", "time.dt=0.05", "time.duration=0.5")
 FIELDS = """\
@@ -82,7 +83,7 @@ def own(request, folder):
 
 def given(name, values):
     """A scenario with an estimator of this name, and the file that gives these lines as its parameters."""
-    return scenario.load("corridor", (*SIMPLE, f"agents.estimator={name}", f'agents.parameters."{name}"={{{values}}}'))
+    return loading.load("corridor", (*SIMPLE, f"agents.estimator={name}", f'agents.parameters."{name}"={{{values}}}'))
 
 
 def built(name, values):
@@ -200,7 +201,7 @@ def test_the_parameters_there_are_are_listed(folder):
 def test_an_annotation_that_cannot_be_resolved_is_the_codes_own_fault(folder):
     text = broken(ESTIMATOR, ("class Own:\n", "class Own:\n    gain: 'Nowhere' = 1.0\n"))
     name = f"{write(folder, text)}:Own"
-    plan.make(scenario.load("corridor", (*SIMPLE, f"agents.estimator={name}")))  # not given, it need not be resolved
+    plan.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}")))  # not given, it need not be resolved
     with pytest.raises(UserCodeError, match=rf"^{name}.__init__: NameError: name 'Nowhere' is not defined"):
         plan.make(given(name, "gain=2.0"))
 
@@ -221,9 +222,10 @@ def test_an_inherited_parameter_is_read_by_the_annotation_of_its_own_module(fold
 @pytest.mark.parametrize("raised", ["TypeError", "IndexError", "KeyError"])
 def test_an_error_of_another_kind_while_it_is_made_is_the_codes_own_fault(raised, folder):
     post = f"class Own:\n    def __post_init__(self):\n        raise {raised}('why')\n\n"
-    name = write(folder, broken(ESTIMATOR, ("class Own:\n", post)))
-    with pytest.raises(UserCodeError, match=rf"^{name}:Own.__init__: {raised}: '?why'? \(.*{name}.py:18\)$"):
-        plan.make(scenario.load("corridor", (*SIMPLE, f"agents.estimator={name}:Own")))
+    text = broken(ESTIMATOR, ("class Own:\n", post))
+    name, line = write(folder, text), line_of(text, "raise ")
+    with pytest.raises(UserCodeError, match=rf"^{name}:Own.__init__: {raised}: '?why'? \(.*{name}.py:{line}\)$"):
+        plan.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}:Own")))
 
 
 # ---- where they are given
@@ -246,10 +248,10 @@ def test_a_table_in_quotes_is_read(header, folder):
     name = write(folder, FUTURE)
     file = folder / "own.toml"
     file.write_text(f"{WRITTEN}{header}\nneeded = 5\n".replace("NAME", name))
-    assert plan.make(scenario.load(str(file))).estimator.build().needed == 5
+    assert plan.make(loading.load(str(file))).estimator.build().needed == 5
     file.write_text(f"{WRITTEN}{header}\nneeded = 5\ngian = 5\n".replace("NAME", name))
     with pytest.raises(ScenarioError, match=rf"^own\.toml:12: agents\.parameters\.{name}:Own\.gian: unknown; did you"):
-        plan.make(scenario.load(str(file)))
+        plan.make(loading.load(str(file)))
 
 
 @pytest.mark.parametrize("key", ['"NAME:Own"', "'NAME:Own'", "NAME:Own"])
@@ -257,14 +259,14 @@ def test_an_override_in_quotes_is_read(key, folder):
     # Before: the quotes were taken for part of the name, and the parameters ignored.
     name = write(folder, FUTURE)
     overrides = (f"agents.parameters.{key}.needed=5".replace("NAME", name), f"agents.estimator={name}:Own")
-    assert plan.make(scenario.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
+    assert plan.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
 
 
 def test_a_module_in_a_package_is_named_in_quotes(folder):
     (folder / "ownpackage").mkdir()
     (folder / "ownpackage" / "inner.py").write_text(FUTURE)
     overrides = ('agents.parameters."ownpackage.inner:Own".needed=5', "agents.estimator=ownpackage.inner:Own")
-    assert plan.make(scenario.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
+    assert plan.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
 
 
 NOT_IN_USE = [
@@ -285,19 +287,19 @@ NOT_IN_USE = [
 @pytest.mark.parametrize(("override", "says"), NOT_IN_USE)
 def test_parameters_of_what_is_not_in_use_are_checked_too(override, says):
     with pytest.raises(ScenarioError) as caught:
-        plan.make(scenario.load("corridor", (*SIMPLE, "agents.estimator=none", override)))
+        plan.make(loading.load("corridor", (*SIMPLE, "agents.estimator=none", override)))
     assert says in str(caught.value)
 
 
 def test_parameters_of_what_is_not_in_use_may_be_given():
     given = ("agents.estimator=none", "agents.parameters.rkf.sigma_w=0.3", "agents.parameters.target.k=[1.0, 2.0]")
-    assert plan.make(scenario.load("corridor", (*SIMPLE, *given))).estimator.parameters == {}
+    assert plan.make(loading.load("corridor", (*SIMPLE, *given))).estimator.parameters == {}
 
 
 @pytest.mark.parametrize("group", [registry.ESTIMATORS, registry.LAWS])
 def test_every_parameter_of_every_shipped_algorithm_refuses_a_value_of_another_kind(group):
-    from agents import parameters
-    from agents.calling import load
+    from agents.loading import parameters
+    from agents.loading.calling import load
 
     for name in registry.names(group):
         for parameter in parameters.names(load(registry.choose(group, "agents", name, {}, {}).path, None)):
@@ -306,7 +308,7 @@ def test_every_parameter_of_every_shipped_algorithm_refuses_a_value_of_another_k
 
 
 def test_a_run_directory_has_them_as_they_were_given(folder, out):
-    from affinet.run import fly
+    from affinet.runtimes.run import fly
 
     name = f"{write(folder, FUTURE)}:Own"
     fly(plan.make(given(name, "needed=5, pair=[3, 4]")), "inprocess", out, lambda *_: None)
@@ -314,5 +316,5 @@ def test_a_run_directory_has_them_as_they_were_given(folder, out):
         "needed": 5,
         "pair": [3, 4],
     }
-    assert plan.make(scenario.resolved(out)).estimator.build().pair == (3.0, 4)
-    assert rehearse(plan.make(scenario.resolved(out))).outcome.verdict == "pass"
+    assert plan.make(loading.resolved(out)).estimator.build().pair == (3.0, 4)
+    assert rehearse(plan.make(loading.resolved(out))).outcome.verdict == "pass"

@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from affinet import plan, scenario, stability
-from affinet.plan import PlanError
-from affinet.sections import ScenarioError
+from affinet.planning import plan, stability
+from affinet.planning.plan import PlanError
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
 from agents.brief import Own
-from agents.controllers import ConstantVelocity, Static, VaryingVelocity
-from agents.estimators.base import Estimate, Heard
-from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity
-from world import dynamics
-from world.formation import PRESETS
-from world.stress import laplacian, solve
+from agents.estimate import Estimate
+from agents.exchange import Heard
+from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
+from agents.laws.single import ConstantVelocity, Static, VaryingVelocity
+from world.formation.nominal import PRESETS
+from world.formation.stress import laplacian, solve
+from world.physics import bodies
 
 
 @pytest.fixture(autouse=True)
@@ -28,7 +30,7 @@ def no_process(monkeypatch):
 
 
 def make(name, *overrides):
-    return plan.make(scenario.load(name, overrides))
+    return plan.make(loading.load(name, overrides))
 
 
 def findings(made):
@@ -49,7 +51,7 @@ def written(folder, nodes, edges, leaders):
 
 @pytest.fixture(scope="module")
 def shipped():
-    return {name: make(name) for name in scenario.shipped()}
+    return {name: make(name) for name in loading.shipped()}
 
 
 # What flies
@@ -272,8 +274,8 @@ def tick_of(made, law, state, position, own):
     state, flown = law.command(brief, state, 0, own, estimate, Heard(said, brief.present))
     flown = np.where(brief.leader[:, None], 0.0, flown)
     if law.order == 1:
-        return state, dynamics.carried([position, flown], brief.dt), Own(flown, flown)
-    position = dynamics.carried([position, own.velocity, flown], brief.dt)
+        return state, bodies.carried([position, flown], brief.dt), Own(flown, flown)
+    position = bodies.carried([position, own.velocity, flown], brief.dt)
     return state, position, Own(own.velocity + brief.dt * flown, flown)
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from flying import PROCESSES
 
-from affinet.cli import main
-from affinet.sections import ScenarioError
+from affinet.cli.commands import main
+from affinet.scenario.sections import ScenarioError
 
 pytestmark = PROCESSES
 
 # A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
-for module in ("affinet.testing.swarm", "netem.journal", "world.logbook", "cvxpy", "hypothesis"):
+for module in ("affinet.testing.swarm", "netem.medium.journal", "world.recording.logbook", "cvxpy", "hypothesis"):
     importlib.import_module(module)
 
 pytest_plugins = ["pytester"]
@@ -29,7 +29,7 @@ def tested(pytester):
     """Runs pytest on the text of a test file, in this process."""
 
     def run(text, *options):
-        pytester.makepyfile("from affinet.checkers import bounded, recovers\nimport pytest\n" + text)
+        pytester.makepyfile("from affinet.verdicts.checkers import bounded, recovers\nimport pytest\n" + text)
         return pytester.runpytest_inprocess(f"--basetemp={pytester.path / 'base'}", *options)
 
     return run

@@ -15,27 +15,28 @@ from rerun.chunk import RrdReader
 from scipy.linalg import expm
 from scripted import timeline
 
-from affinet.batch import fly_all
-from affinet.inprocess import Swarm
-from affinet.plan import PlanError
-from affinet.run import fly, rehearse
-from affinet.sections import INTEGRATORS, ScenarioError
-from affinet.side_by_side import side_by_side
+from affinet.planning.plan import PlanError
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.side_by_side import side_by_side
+from affinet.scenario.sections import INTEGRATORS, ScenarioError
+from affinet.studies.batch import fly_all
+from agents.algebra.redcho import Consensus
 from agents.brief import Own
-from agents.estimators.base import Estimate, Heard
+from agents.estimate import Estimate
 from agents.estimators.none import NoEstimator
-from agents.estimators.redcho import Consensus
 from agents.estimators.target import TargetEstimator
-from agents.pursuit import Pursuit
-from analysis import jets, localization
-from analysis.information import numbers, packed, position, unpacked
-from analysis.pursuit import Sighting, Target, diffusion, transition
-from netem.channels import INPUT, TARGET
-from netem.fate import Fate
-from world import pursued
-from world.history import History
-from world.localized import FirstMeasurements
-from world.recorded_target import _over_agents
+from agents.exchange import Heard
+from agents.laws.pursuit import Pursuit
+from analysis.metrics import localization
+from analysis.models import jets
+from analysis.models.information import numbers, packed, position, unpacked
+from analysis.models.pursuit import Sighting, Target, diffusion, transition
+from netem.core.channels import INPUT, TARGET
+from netem.medium.verdict import Fate
+from world.books.history import History
+from world.books.localized import FirstMeasurements
+from world.recording.target import _over_agents
 
 ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
 
@@ -173,7 +174,7 @@ class Tick(NamedTuple):
 def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2, prior=(1.0, 1.0)):
     """Agents, each after a target of its own, whose start is drawn as the prior says."""
     rng = np.random.default_rng(seed)
-    chase_of = pursued.Pursuit(target, dt, np.zeros((target.order, dimension)))
+    chase_of = target.Pursuit(target, dt, np.zeros((target.order, dimension)))
     seeds, first = np.arange(1, runs + 1, dtype=np.uint64) + np.uint64(1000 * seed), np.ones(runs, dtype=np.int64)
     deviations = np.array([prior[0]] + [prior[1]] * (target.order - 1))[:, None]
     start = deviations * rng.normal(size=(runs, target.order, dimension))
@@ -617,7 +618,7 @@ def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
     """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
     target = target_of(order, latencies)
     estimator = TargetEstimator(theta=10.0, **parameters)
-    chase_of, who = pursued.Pursuit(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
+    chase_of, who = target.Pursuit(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
     chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
     agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
     state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
@@ -1010,7 +1011,7 @@ def test_agents_say_how_they_move_up_to_their_input_and_steer_by_it(order):
 
 def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3):
     start = np.zeros((target.order, 2)) if start is None else start
-    chase_of = pursued.Pursuit(target, dt, start)
+    chase_of = target.Pursuit(target, dt, start)
     seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
     return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
 
@@ -1061,7 +1062,7 @@ class Detection(NamedTuple):
 @cache
 def detections(agents=60, ticks=400):
     target = target_of(2, (7, 3), (0.04, 0.25))
-    chase_of, who = pursued.Pursuit(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
+    chase_of, who = target.Pursuit(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
     chase, made = chase_of.begin(1, agents), []
     began, method, where = np.zeros(agents, dtype=int), None, []
     for tick in range(ticks):
@@ -1128,7 +1129,7 @@ def test_every_swarm_side_by_side_meets_the_draws_that_it_meets_alone(air):
     plan = plan_of(NAME, *short)
     batch = side_by_side(plan, SEEDS)
     together = History(batch.world, len(batch.channels), batch.reports)
-    Swarm(batch).fly(together.extend, 20)
+    InProcessSwarm(batch).fly(together.extend, 20)
     flown = together.arrays()
     for place, seed in enumerate(SEEDS):
         alone = rehearse(plan_of(NAME, *short, f"seed={seed}")).arrays

@@ -5,10 +5,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from netem.links import Links
-from netem.timeline import Timeline
-from world.formation import PRESETS
-from world.realised import Watch, realise
+from netem.core.links import Links
+from netem.faults.timeline import Timeline
+from world.books.realised import GraphWatch, realise
+from world.formation.nominal import PRESETS
 
 ZHAO7 = PRESETS["zhao7"]
 LINKS = Links.both_ways(ZHAO7.agents, ZHAO7.edges)
@@ -27,7 +27,7 @@ def arrivals():
 @pytest.mark.parametrize("batch", [1, 2, 7])
 def test_in_batches_it_is_that_of_the_whole_run(window, batch):
     newest = arrivals()
-    watch = Watch(ZHAO7, LINKS, DT, window)
+    watch = GraphWatch(ZHAO7, LINKS, DT, window)
     parts = [watch.follow(first, newest[first : first + batch], TIMELINE) for first in range(0, TICKS, batch)]
     whole = realise(newest, ZHAO7, TIMELINE, DT, window)
     for field in fields(whole):
@@ -38,7 +38,7 @@ def test_in_batches_it_is_that_of_the_whole_run(window, batch):
 def test_what_came_before_the_window_still_has_its_age():
     newest = np.full((TICKS, 1, len(LINKS)), -1, dtype=np.int32)
     newest[3, 0, 0], newest[8, 0, 0] = 3, 1  # what comes later is older
-    watch = Watch(ZHAO7, LINKS, DT, 2)
+    watch = GraphWatch(ZHAO7, LINKS, DT, 2)
     parts = [watch.follow(first, newest[first : first + 5], TIMELINE) for first in range(0, TICKS, 5)]
     ages = np.concatenate([part.age_s[:, 0, 0] for part in parts])
     assert np.isnan(ages[:3]).all()

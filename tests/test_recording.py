@@ -8,9 +8,9 @@ from flying import plan_of
 from rerun.chunk import RrdReader
 from scipy.stats import chi2
 
-from affinet.run import fly, rehearse
-from netem.fate import Fate
-from world.history import UNTOLD
+from affinet.runtimes.run import fly, rehearse
+from netem.medium.verdict import Fate
+from world.books.history import UNTOLD
 
 
 @pytest.fixture(scope="module")

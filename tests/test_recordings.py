@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet import cli, scenario
-from affinet import plan as planning
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from netem import journal
-from netem.fate import Fate
-from netem.links import Links
-from world import history
+from affinet.cli import commands
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from netem.core.links import Links
+from netem.medium import journal
+from netem.medium.verdict import Fate
+from world.books import history
 
 BEFORE = ("time.dt=0.01", "time.duration=1", "record.enabled=false", "network.availability=0.6")
 HERE = ("time.duration=1", "network.availability=1.0")
@@ -20,7 +21,7 @@ HEXA = 'formation.preset="hexa10"'
 
 def traced(file, *overrides):
     profile = f'network.profiles.t.loss=[{{model="trace",file="{file}"}}]'
-    return planning.make(scenario.load("corridor", [*HERE, profile, 'network.profile="t"', *overrides]))
+    return planning.make(loading.load("corridor", [*HERE, profile, 'network.profile="t"', *overrides]))
 
 
 def refused(file, *overrides):
@@ -229,7 +230,7 @@ def test_a_degraded_link_alone_needs_rows(csv):
 def test_a_file_of_delays_is_drawn_from(tmp_path):
     (tmp_path / "pings.txt").write_text("1.0\n0.001\n0.002\n0.003\n0.004\n0.005\n0.006\n0.007\n0.008\n0.054\n")
     table = f'network.profiles.t.delay={{model="table",table="{tmp_path}/pings.txt"}}'
-    plan = planning.make(scenario.load("corridor", [*HERE, "time.duration=5", table, 'network.profile="t"']))
+    plan = planning.make(loading.load("corridor", [*HERE, "time.duration=5", table, 'network.profile="t"']))
     (air,) = [finding.says for finding in plan.findings if finding.check == "air"]
     assert "mean delay 0.109 s" in air
     (law,) = plan.profiles[0].delays
@@ -255,7 +256,7 @@ def test_verdicts_are_of_the_ticks_and_links_of_their_run(change, says, before, 
     """Before: they were applied by tick number, and what had none got through until the run failed in flight."""
     out, _ = before
     again = ["replay", "--verdicts", str(out), "--runtime", "inprocess", "--out", str(tmp_path / "again")]
-    assert cli.main([*again, "--set", change]) == 2
+    assert commands.main([*again, "--set", change]) == 2
     said = capsys.readouterr().err
     assert says in said
     assert said.count("\n") == 1

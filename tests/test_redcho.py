@@ -9,12 +9,12 @@ import pytest
 from flying import plan_of
 from scripted import timeline
 
-from affinet import checks
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
+from affinet.planning import checks
+from affinet.runtimes.run import rehearse
+from affinet.scenario.sections import ScenarioError
 from agents.estimators.none import NoEstimator
 from agents.estimators.target import TargetEstimator
-from analysis.information import position
+from analysis.models.information import position
 
 NAME = "target"
 

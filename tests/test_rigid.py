@@ -9,17 +9,19 @@ import pytest
 from briefs import hears
 from flying import plan_of
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.checks import leaders_apart
-from affinet.plan import PlanError
-from affinet.run import rehearse
+from affinet.planning import plan as planning
+from affinet.planning.checks import leaders_apart
+from affinet.planning.plan import PlanError
+from affinet.runtimes.run import rehearse
+from affinet.scenario import loading
 from agents.agent import Agent
-from agents.controllers import Static, hold_distances, stress_force
-from agents.estimators.base import Estimate
+from agents.estimate import Estimate
 from agents.estimators.none import NoEstimator
-from analysis.metrics import procrustes_error
-from world.formation import Formation
+from agents.laws.base import stress_force
+from agents.laws.leaders import hold_distances
+from agents.laws.single import Static
+from analysis.metrics.errors import procrustes_error
+from world.formation.nominal import Formation
 
 COARSE = ("time.dt=0.01", "time.duration=12")
 NOISELESS = ("dynamics={}", "sensing={sigma=1e-6}", 'agents.estimator="mle"')
@@ -120,9 +122,9 @@ def test_nobody_is_told_where_leaders_that_keep_their_distances_should_be():
 
 def test_leaders_that_do_not_see_each_other_are_refused_by_name():
     with pytest.raises(PlanError) as refused:
-        planning.make(scenario.load("rigid", ["formation.leaders=[2, 6, 8]"]))
+        planning.make(loading.load("rigid", ["formation.leaders=[2, 6, 8]"]))
     assert "there is no edge 2-6, 2-8, 6-8" in str(refused.value)
-    assert planning.make(scenario.load("rigid", ["formation.leaders=[2, 6, 8]", 'agents.leaders="pilot"']))
+    assert planning.make(loading.load("rigid", ["formation.leaders=[2, 6, 8]", 'agents.leaders="pilot"']))
 
 
 def test_only_the_edges_that_are_missing_are_named():

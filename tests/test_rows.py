@@ -9,7 +9,7 @@ from rows import agents_floor, analysis_floor, exempt, surface, world_floor
 from rows.case import of, parted, real, share
 
 import affinet
-from analysis import elementary
+from analysis.models import elementary
 
 CASES = {**analysis_floor.CASES, **world_floor.CASES, **agents_floor.CASES}
 COVERED = {name.split(" ")[0] for name in CASES}
@@ -28,7 +28,7 @@ def test_no_array_function_is_forgotten():
 
 
 def test_no_name_is_out_of_date_or_twice():
-    assert COVERED | set(exempt.NAMES) <= set(surface.functions()) | {"netem.lie.told"}  # of fields by name
+    assert COVERED | set(exempt.NAMES) <= set(surface.functions()) | {"netem.faults.lie.told"}  # of fields by name
     assert not COVERED & set(exempt.NAMES)
     assert len(exempt.NAMES) == len(set(exempt.NAMES))
 
@@ -47,7 +47,7 @@ def test_what_numpy_rounds_apart_is_noticed(function, arguments):
     assert parted("numpy", of(function, *arguments, rows=9000 if len(arguments[0].shape) == 0 else 17))
 
 
-# Rounded by the C library or by code for some CPUs; analysis.elementary has those that are needed.
+# Rounded by the C library or by code for some CPUs; analysis.models.elementary has those that are needed.
 APART = {
     *(
         "power",
@@ -81,7 +81,7 @@ APART = {
     ),
 }
 # A colour scale; a margin of error in a label; nothing of a flight.
-PICTURES = {("analysis/figures.py", "log10"), ("analysis/target_figures.py", "**")}
+PICTURES = {("analysis/figures/curves.py", "log10"), ("analysis/figures/target.py", "**")}
 
 
 def _apart(path):
@@ -97,7 +97,7 @@ def _apart(path):
                 yield "@"
 
 
-EXACT = {ROOT / "analysis" / name for name in ("algebra.py", "elementary.py")}
+EXACT = {ROOT / "analysis" / "models" / name for name in ("algebra.py", "elementary.py")}
 
 
 def test_nothing_that_flies_calls_what_rounds_apart():
@@ -108,7 +108,7 @@ def test_nothing_that_flies_calls_what_rounds_apart():
 
 
 # Before a flight, once, by whoever plans it.
-ONCE = {("world/stress.py", "@"), ("analysis/graph.py", "**")}
+ONCE = {("world/formation/stress.py", "@"), ("analysis/models/graph.py", "**")}
 
 
 @pytest.mark.parametrize(

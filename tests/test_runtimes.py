@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 
-from affinet import scenario
-from affinet.registry import ESTIMATORS
-from affinet.run import fly, rehearse
-from world import history
+from affinet.planning.registry import ESTIMATORS
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -18,7 +18,7 @@ pytestmark = PROCESSES
 COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
 # There is no fault in these, and they are flown below, or are the same all along; the last two need other ticks, or gains.
 SHORTENED = {
-    **dict.fromkeys(("ravine", "corridor", "hexa", "rigid"), ("time.duration=15",)),
+    **dict.fromkeys(("ravine", "corridor", "hexa", "rigid"), ("time.duration=6",)),
     "switching": ("time.dt=0.1",),
     "target": (
         "time.dt=0.01",
@@ -32,7 +32,7 @@ def processes(out, name, *overrides):
     return fly(plan_of(name, *overrides), "processes", out, lambda *_: None)
 
 
-@pytest.mark.parametrize("name", scenario.shipped())
+@pytest.mark.parametrize("name", loading.shipped())
 def test_processes_give_the_bits_of_one_process(name, out):
     coarse = (*COARSE, *SHORTENED.get(name, ()))
     outcome = processes(out, name, *coarse)
@@ -40,6 +40,7 @@ def test_processes_give_the_bits_of_one_process(name, out):
     assert outcome.digest == digest_of(name, *coarse)
 
 
+@pytest.mark.slow
 def test_two_runs_over_processes_agree_and_two_seeds_do_not(tmp_path):
     short = ("time.duration=3", "time.dt=0.05")
     first, second = (processes(tmp_path / run, "partition", *short).digest for run in "ab")
@@ -58,14 +59,14 @@ AIRS = (
     ('agents.estimator="none"', 'agents.law="static"'),
     ('agents.parameters.varying-velocity.source="feed-forward"', "dynamics.disturbance=0.001"),
     ('agents.parameters.varying-velocity.source="estimated"', 'agents.parameters.ga-rkf.geometry="ral"'),
-    ('timeline=[{verb="kill",at=0.5,agents=[4,6]},{verb="restart",at=1.0,agents=[4]}]', "network.delay_ticks=3"),
+    ('timeline=[{verb="kill",at=0.2,agents=[4,6]},{verb="restart",at=0.4,agents=[4]}]', "network.delay_ticks=3"),
 )
 AIR_NAMES = ("delay", "next-tick", "uncoupled", "bare", "feed-forward", "estimated", "kill-under-delay")
 
 
 @pytest.mark.parametrize("air", AIRS, ids=AIR_NAMES)
 def test_every_kind_of_air_and_agent_agrees(air, out):
-    overrides = ("time.duration=2", *air)
+    overrides = ("time.duration=0.8", *air)
     outcome = processes(out, "corridor", *overrides)
     assert outcome.verdict == "pass", outcome.reasons
     assert outcome.digest == digest_of("corridor", *overrides)
@@ -113,7 +114,7 @@ def test_filters_that_predict_by_lost_inputs_agree_too(estimator, out):
 def flown_above():
     """The estimators, by their classes, that fly over processes above: as a scenario has it, or as said there."""
     by_name = {entry.name: entry.value for entry in entry_points(group=ESTIMATORS)}
-    shipped = {scenario.load(name).agents.estimator for name in scenario.shipped()}
+    shipped = {loading.load(name).agents.estimator for name in loading.shipped()}
     said = {name for name in by_name if any(f'agents.estimator="{name}"' in kind for kind in (*AIRS, *KINDS.values()))}
     return {by_name[name] for name in {*shipped, *said, *BY_INPUTS}}
 
@@ -222,7 +223,7 @@ def test_a_fault_that_never_bit_makes_the_run_vacuous(out):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("name", scenario.shipped())
+@pytest.mark.parametrize("name", loading.shipped())
 def test_shipped_scenarios_agree_in_full(name, seed, out):
     overrides = (f"seed={seed}",)
     outcome = processes(out, name, *overrides)

@@ -5,11 +5,12 @@ from importlib.metadata import entry_points
 import numpy as np
 import pytest
 
-from affinet import plan, scenario, selectors
-from affinet.sections import ScenarioError
-from netem.fault import Fault, UnderWay, Verb
-from netem.links import Links
-from world.formation import PRESETS
+from affinet.planning import plan
+from affinet.scenario import loading, selectors
+from affinet.scenario.sections import ScenarioError
+from netem.core.links import Links
+from netem.faults.fault import Fault, UnderWay, Verb
+from world.formation.nominal import PRESETS
 
 ESTIMATORS = f"there are {', '.join(sorted(entry_points(group='affinet.estimators').names))}"
 
@@ -81,20 +82,20 @@ def file(tmp_path):
 # ---- what is written is what flies
 
 
-@pytest.mark.parametrize("name", scenario.shipped())
+@pytest.mark.parametrize("name", loading.shipped())
 def test_every_shipped_scenario_loads_and_can_fly(name):
-    made = plan.make(scenario.load(name))
+    made = plan.make(loading.load(name))
     assert made.scenario.description
     assert not any(finding.fatal for finding in made.findings)
 
 
 def test_five_scenarios_are_shipped():
-    assert {"corridor", "hexa", "partition", "ravine", "switching"} <= set(scenario.shipped())
+    assert {"corridor", "hexa", "partition", "ravine", "switching"} <= set(loading.shipped())
 
 
 def test_a_scenario_flies_as_it_is_written(file):
     file.write_text(GOOD)
-    made = plan.make(scenario.load(str(file)))
+    made = plan.make(loading.load(str(file)))
     links = made.world.links
     row = links.index[1, 2]
     assert (made.world.dt, made.world.ticks, made.world.seed) == (0.01, 100, 1)
@@ -134,7 +135,7 @@ def test_the_faults_of_the_network_fly_as_they_are_written(file):
         loss = 0.25
     """
     file.write_text(GOOD + more)
-    assert plan.make(scenario.load(str(file))).faults[2:] == (
+    assert plan.make(loading.load(str(file))).faults[2:] == (
         Fault(Verb.CUT, 60, None, pairs=((1, 2),), under_way=UnderWay.HOLD),
         Fault(Verb.PARTITION, 60, 70, groups=((1, 2), (3,)), under_way=UnderWay.DELIVER),
         Fault(Verb.LOSE, 20, None, pairs=((4, 2),), probability=0.25),
@@ -143,7 +144,7 @@ def test_the_faults_of_the_network_fly_as_they_are_written(file):
 
 def test_a_formation_of_ones_own_flies(file):
     file.write_text(GOOD.replace('preset = "zhao7"\n', OWN).replace("agents = [5]", "agents = [4]"))
-    formation = plan.make(scenario.load(str(file))).world.formation
+    formation = plan.make(loading.load(str(file))).world.formation
     assert formation.nominal.tolist() == [[0, 0], [1, 0], [0, 1], [1, 1]]
     assert formation.edges == ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
     assert formation.leaders == (1, 2, 3)
@@ -152,7 +153,7 @@ def test_a_formation_of_ones_own_flies(file):
 @pytest.mark.parametrize(("exchange", "least"), [("same-tick", 0), ("next-tick", 1)])
 def test_next_tick_exchange_delays_every_message_by_a_tick(file, exchange, least):
     file.write_text(GOOD)
-    (air,) = plan.make(scenario.load(str(file), [f"time.exchange={exchange}"])).profiles
+    (air,) = plan.make(loading.load(str(file), [f"time.exchange={exchange}"])).profiles
     assert air.least_delay == least
 
 
@@ -162,7 +163,7 @@ def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
             'verb = "cut"\nat = 0.1\nuntil = 0.3\nlinks = ["2->4", "1-2"]', 'verb = "kill"\nat = 0.1\nagents = [5]'
         )
     )
-    timeline = plan.make(scenario.load(str(file))).timeline
+    timeline = plan.make(loading.load(str(file))).timeline
     assert timeline.at(45).dead[4]
     assert not timeline.at(50).dead[4]
 
@@ -249,20 +250,20 @@ def test_a_selector_that_matches_nothing_is_refused(selector, match):
 )
 def test_set_overrides_a_key_with_a_value_of_its_type(file, override, section, key, value):
     file.write_text(GOOD)
-    given = getattr(getattr(scenario.load(str(file), [override]), section), key)
+    given = getattr(getattr(loading.load(str(file), [override]), section), key)
     assert given == value
     assert type(given) is type(value)
 
 
 def test_set_overrides_a_shipped_scenario_and_leaves_the_rest():
-    before, after = scenario.load("corridor"), scenario.load("corridor", ["seed=7"])
+    before, after = loading.load("corridor"), loading.load("corridor", ["seed=7"])
     assert after.seed == 7
     assert after.model_dump() == before.model_dump() | {"seed": 7}
 
 
 def test_of_two_overrides_of_one_key_the_last_holds(file):
     file.write_text(GOOD)
-    assert scenario.load(str(file), ["seed=7", "seed=8"]).seed == 8
+    assert loading.load(str(file), ["seed=7", "seed=8"]).seed == 8
 
 
 WRONG_OVERRIDES = [
@@ -293,7 +294,7 @@ WRONG_OVERRIDES = [
 def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_right(file, override, key, remedy):
     file.write_text(GOOD)
     with pytest.raises(ScenarioError) as error:
-        plan.make(scenario.load(str(file), [override]))
+        plan.make(loading.load(str(file), [override]))
     (line,) = str(error.value).splitlines()
     assert line.startswith("--set")
     assert key in line
@@ -491,7 +492,7 @@ def test_what_is_wrong_in_a_file_is_one_line_that_says_the_file_the_key_and_what
     assert good in GOOD
     file.write_text(GOOD.replace(good, bad))
     with pytest.raises(ScenarioError) as error:
-        plan.make(scenario.load(str(file)))
+        plan.make(loading.load(str(file)))
     (line,) = str(error.value).splitlines()
     assert line.startswith("bad.toml:")
     assert f" {key}: " in line
@@ -513,13 +514,13 @@ def test_what_is_wrong_in_a_file_is_one_line_that_says_the_file_the_key_and_what
 def test_what_is_wrong_is_named_by_its_line(file, good, bad, number):
     file.write_text(GOOD.replace(good, bad))
     with pytest.raises(ScenarioError, match=rf"^bad\.toml:{number}: "):
-        scenario.load(str(file))
+        loading.load(str(file))
 
 
 def test_of_several_mistakes_the_first_is_told_and_the_others_are_named_with_their_lines(file):
     file.write_text(GOOD.replace("seed = 1", "seed = -1").replace("dt = 0.01", "dt = 0"))
     with pytest.raises(ScenarioError) as error:
-        scenario.load(str(file))
+        loading.load(str(file))
     assert str(error.value) == (
         "bad.toml:2: seed: should be greater than or equal to 0, got -1; 1 more mistake: time.dt (bad.toml:14)"
     )
@@ -528,13 +529,13 @@ def test_of_several_mistakes_the_first_is_told_and_the_others_are_named_with_the
 def test_a_file_that_is_no_toml_is_named_with_the_place(file):
     file.write_text("seed = 1\ndt 0.01\n")
     with pytest.raises(ScenarioError, match=r"^bad\.toml:2: not TOML: .*, at column 4$"):
-        scenario.load(str(file))
+        loading.load(str(file))
 
 
 def test_a_file_that_is_no_text_is_named(file):
     file.write_bytes(b'description = "\xff"\n')
     with pytest.raises(ScenarioError, match=r"^bad\.toml: "):
-        scenario.load(str(file))
+        loading.load(str(file))
 
 
 @pytest.mark.parametrize("name", ["nowhere.toml", "coridor"])
@@ -543,4 +544,4 @@ def test_a_scenario_that_does_not_exist_is_refused_with_those_that_are_shipped(n
         ScenarioError,
         match=rf"^{name}: no such file, and no such scenario; (did you mean 'corridor'\? )?shipped are corridor, hexa, ",
     ):
-        scenario.load(name)
+        loading.load(name)

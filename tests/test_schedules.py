@@ -9,18 +9,20 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from test_runtimes import OCTAHEDRON
 
-from affinet import checkers, events, scenario
-from affinet import plan as planning
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from affinet.scenario import verbs as verb_models
+from affinet.scenario.sections import ScenarioError
 from affinet.testing import strategies
+from affinet.verdicts import checkers
 
 pytestmark = PROCESSES
 
 ENDERS = {"heal", "restart", "resume", "rejoin", "replace"}
 ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none")
 COARSE = ("time.dt=0.05", "time.duration=4")
-CORRIDOR = scenario.load("corridor", COARSE)
+CORRIDOR = loading.load("corridor", COARSE)
 SCHEDULES = strategies.schedules(CORRIDOR, strategies.VERBS)
 
 
@@ -37,9 +39,9 @@ def some_then_all(some, everything):
 
 def plan_under(entries, estimator):
     """The corridor under a schedule; schedules that restart an agent twice at once are none."""
-    given_to = scenario.load("corridor", (*COARSE, f'agents.estimator="{estimator}"'))
+    given_to = loading.load("corridor", (*COARSE, f'agents.estimator="{estimator}"'))
     try:
-        return planning.make(scenario.extended(given_to, entries))
+        return planning.make(loading.extended(given_to, entries))
     except ScenarioError as error:
         if "is under no kill then" not in str(error):
             raise
@@ -94,7 +96,7 @@ def test_any_schedule_gives_the_same_bits_over_processes(number, tmp_path_factor
 
 
 def test_every_verb_that_begins_something_is_drawn():
-    assert set(strategies.VERBS) == set(events.VERBS) - ENDERS
+    assert set(strategies.VERBS) == set(verb_models.VERBS) - ENDERS
 
 
 def test_schedules_draw_every_verb():
@@ -117,7 +119,7 @@ def octahedron(tmp_path_factory):
     """A formation in space."""
     path = tmp_path_factory.mktemp("scenarios") / "octahedron.toml"
     path.write_text(OCTAHEDRON)
-    return scenario.load(str(path))
+    return loading.load(str(path))
 
 
 @pytest.mark.parametrize("verb", strategies.VERBS)
@@ -129,20 +131,20 @@ def test_every_fault_of_a_verb_fits_the_plane_and_space(verb, dimension, octahed
     @given(entries=strategies.faults(swarm, [verb]))
     def fits(entries):
         assert entries[0]["verb"] == verb
-        plan = planning.make(scenario.extended(swarm, entries))
+        plan = planning.make(loading.extended(swarm, entries))
         assert {fault.verb for fault in plan.faults} == {verb}
         assert all(fault.start < plan.world.ticks for fault in plan.faults)
 
     fits()
 
 
-@pytest.mark.parametrize("verbs", [["cut"], ["cut", "gust"]], ids=",".join)
-def test_schedules_keep_to_the_verbs_they_are_given(verbs):
+@pytest.mark.parametrize("chosen", [["cut"], ["cut", "gust"]], ids=",".join)
+def test_schedules_keep_to_the_verbs_they_are_given(chosen):
     @repeatable(50)
-    @given(entries=strategies.schedules(CORRIDOR, verbs, most=2))
+    @given(entries=strategies.schedules(CORRIDOR, chosen, most=2))
     def keeps(entries):
         assert 1 <= len(entries) <= 2
-        assert {entry["verb"] for entry in entries} <= set(verbs)
+        assert {entry["verb"] for entry in entries} <= set(chosen)
 
     keeps()
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from affinet import plan, scenario
-from affinet.sections import ScenarioError
-from netem.fault import Fault, UnderWay, Verb
-from netem.timeline import Timeline
-from netem.trigger import Trigger
+from affinet.planning import plan
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from netem.faults.fault import Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from netem.faults.trigger import Trigger
 
 HEAD = """\
 seed = 1
@@ -36,7 +37,7 @@ def made(tmp_path):
     def make(*entries, head=HEAD):
         file = tmp_path / "told.toml"
         file.write_text(head + "".join(f"[[timeline]]\n{keys.strip()}\n" for keys in entries))
-        return plan.make(scenario.load(str(file)))
+        return plan.make(loading.load(str(file)))
 
     return make
 

@@ -7,20 +7,23 @@ import pytest
 from briefs import BRIEF, ESTIMATE, FORCE
 from flying import plan_of
 
-from affinet import plan, scenario
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
+from affinet.planning import plan
+from affinet.runtimes.run import rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
 from agents.agent import Agent
 from agents.brief import Own
-from agents.controllers import Static, needs_mission, saturated, stress_force
-from agents.estimators.base import Heard
 from agents.estimators.none import NoEstimator
-from agents.second_order import DoubleConstantVelocity, DoubleVaryingVelocity, pilot
-from analysis.affine import Manoeuvre
-from netem.channels import INPUT
-from netem.user_code import UserCodeError
-from world.dynamics import carried
-from world.maneuver import hover, ravine
+from agents.exchange import Heard
+from agents.laws.base import stress_force
+from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
+from agents.laws.leaders import pilot_of_accelerations, saturated
+from agents.laws.single import Static, needs_mission
+from analysis.models.affine import Manoeuvre
+from netem.core.channels import INPUT
+from netem.processes.user_code import UserCodeError
+from world.formation.manoeuvre import hover, ravine
+from world.physics.bodies import carried
 
 OWN = Own(velocity=np.array([1.0, -0.5]), input=np.array([8.0, 4.0]))
 VELOCITIES = np.array([[1.0, 0.0], [2.0, 4.0], [77.0, 77.0]])
@@ -169,7 +172,7 @@ def test_pilot_flies_the_acceleration_of_the_target_and_pulls_twice():
     # Targets at 0, 0.2 and 0.8: the second gains 40, and passes at 4.
     along = np.array([[0.0, 0.0], [0.2, 0.0], [0.8, 0.0]])
     mission = Manoeuvre(np.broadcast_to(np.eye(2), (3, 2, 2)), along)
-    u = pilot(BRIEF, mission, 3.0, 1, np.array([1.0, 1.5]), np.array([3.0, 0.5]))
+    u = pilot_of_accelerations(BRIEF, mission, 3.0, 1, np.array([1.0, 1.5]), np.array([3.0, 0.5]))
     np.testing.assert_allclose(u, [40.0 + 9.0 * 0.2 + 6.0 * (4.0 - 3.0), 9.0 * -0.5 + 6.0 * -0.5])
 
 
@@ -177,7 +180,7 @@ def test_pilot_flies_the_acceleration_of_the_target_and_pulls_twice():
 def test_who_is_where_and_as_fast_as_its_target_is_on_the_target_a_tick_later(tick):
     before, here, after = (RAVINE.target(tick + by, TOLD.nominal) for by in (-1, 0, 1))
     speed = (after - before) / 0.02
-    arrived, _ = moved(here, speed, pilot(TOLD, RAVINE, 5.0, tick, here, speed), 0.01)
+    arrived, _ = moved(here, speed, pilot_of_accelerations(TOLD, RAVINE, 5.0, tick, here, speed), 0.01)
     np.testing.assert_allclose(arrived, after, atol=1e-13)
     # By coasting it would have missed.
     assert np.abs(here + 0.01 * speed - after).max() > 1e-7
@@ -188,7 +191,7 @@ def flown(mission, gain, offset, ticks):
     position, velocity, astray = mission.target(0, TOLD.nominal) + offset, np.zeros(3), []
     for tick in range(ticks):
         astray.append(position - mission.target(tick, TOLD.nominal))
-        u = pilot(TOLD, mission, gain, tick, position, velocity)
+        u = pilot_of_accelerations(TOLD, mission, gain, tick, position, velocity)
         position, velocity = moved(position, velocity, u, 0.01)
     return np.array(astray)
 
@@ -259,7 +262,7 @@ def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(oc
     agent = Agent(octa10, NoEstimator(), CONSTANT, leaders="pilot", leader_gain=1.5, limit=None)
     measured, position, velocity, heard = drawn(octa10)
     _, action = act(agent, measured, position, velocity, heard)
-    led = pilot(octa10, octa10.mission, 1.5, 2000, position, velocity)
+    led = pilot_of_accelerations(octa10, octa10.mission, 1.5, 2000, position, velocity)
     closing = velocity[:, None] - heard[INPUT].fields["velocity"]
     damping = (octa10.stress[..., None] * closing).sum(axis=1)
     law = -2.0 * stress_force(octa10, action.estimate) - 0.5 * damping
@@ -306,7 +309,7 @@ def test_the_limit_shortens_the_inputs_of_leaders_and_followers(law, octa10):
 
 
 def make(name, *overrides):
-    return plan.make(scenario.load(name, overrides))
+    return plan.make(loading.load(name, overrides))
 
 
 @pytest.mark.parametrize("law", ["static", "constant-velocity", "varying-velocity"])

@@ -9,15 +9,15 @@ from airs import edges_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from affinet import selectors
-from affinet.selectors import Lot
-from analysis import cuts
-from netem.links import Links
-from world import stress
-from world.formation import PRESETS, Formation
+from affinet.scenario import selectors
+from affinet.scenario.selectors import ChoiceKey
+from analysis.models import cuts
+from netem.core.links import Links
+from world.formation import stress
+from world.formation.nominal import PRESETS, Formation
 
 ZHAO, HEXA = PRESETS["zhao7"], PRESETS["hexa10"]
-LOT = Lot(seed=1, entry=1)
+LOT = ChoiceKey(seed=1, entry=1)
 # Two triangles on the ends of a path: 1, 2, 3 - 4 - 5, 6, 7.
 BARBELL = Formation(
     np.array([[0, 0], [0, 2], [1, 1], [2, 1], [3, 1], [4, 0], [4, 2]], dtype=np.float64),
@@ -116,13 +116,13 @@ def test_random_links_are_so_many_different_ones():
     ],
 )
 def test_random_agents_are_so_many_of_those_named(word, among, size):
-    drawn = [agents(word, lot=Lot(seed, 1)) for seed in range(40)]
+    drawn = [agents(word, lot=ChoiceKey(seed, 1)) for seed in range(40)]
     assert all(len(set(chosen)) == size and set(chosen) <= set(among) for chosen in drawn)
     assert {agent for chosen in drawn for agent in chosen} == set(among)  # anybody's turn may come
 
 
 def test_a_random_choice_is_a_function_of_the_seed_and_the_entry_alone():
-    lots = [Lot(seed, entry) for seed in range(4) for entry in range(1, 5)]
+    lots = [ChoiceKey(seed, entry) for seed in range(4) for entry in range(1, 5)]
     for choose in (lambda lot: agents("random 3", lot=lot), lambda lot: links("random 6", lot=lot)):
         drawn = [choose(lot) for lot in lots]
         assert drawn == [choose(lot) for lot in lots]
@@ -131,13 +131,15 @@ def test_a_random_choice_is_a_function_of_the_seed_and_the_entry_alone():
 
 def test_every_agent_is_as_likely():
     draws, share = 2000, 2 / 7
-    counts = np.bincount([one for seed in range(draws) for one in agents("random 2", lot=Lot(seed, 1))], minlength=8)
+    counts = np.bincount(
+        [one for seed in range(draws) for one in agents("random 2", lot=ChoiceKey(seed, 1))], minlength=8
+    )
     assert counts[1:] == pytest.approx(draws * share, abs=5 * np.sqrt(draws * share * (1 - share)))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_more_by_lot_are_those_and_others(seed):
-    drawn = [set(agents(f"random {size}", lot=Lot(seed, 1))) for size in range(1, 8)]
+    drawn = [set(agents(f"random {size}", lot=ChoiceKey(seed, 1))) for size in range(1, 8)]
     assert all(few < more for few, more in pairwise(drawn))
 
 
@@ -150,7 +152,7 @@ LARGER = replace(
 @pytest.mark.parametrize("size", [1, 3, 5])
 def test_one_agent_more_moves_nobody_elses_draw(seed, size):
     """Who is drawn among more is drawn among fewer too, unless he is new."""
-    lot = Lot(seed, 2)
+    lot = ChoiceKey(seed, 2)
     few, many = (agents(f"random {size}", formation=each, lot=lot) for each in (ZHAO, LARGER))
     assert set(many) - {8} <= set(few)
     old, new = (links(f"random {3 * size}", formation=each, lot=lot) for each in (ZHAO, LARGER))

@@ -8,16 +8,16 @@ from briefs import brief, hears
 from flying import PROCESSES, plan_of
 from offered import by_affinet
 
-from affinet.batch import fly_all
-from affinet.inprocess import Swarm
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from affinet.side_by_side import side_by_side
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.side_by_side import side_by_side
+from affinet.scenario.sections import ScenarioError
+from affinet.studies.batch import fly_all
 from agents.brief import Own
-from analysis.consistency import nees
-from analysis.sensor import Sensor, moments
-from netem.fate import Fate
-from world.history import History
+from analysis.metrics.consistency import nees
+from analysis.models.sensor import Sensor, moments
+from netem.medium.verdict import Fate
+from world.books.history import History
 
 SPACES = pytest.mark.parametrize("dimension", [2, 3])
 MILLION = 1_000_000
@@ -308,7 +308,7 @@ def test_no_covariance_for_all_is_right_for_near_and_far_neighbours():
     for believed in (plan.world.sensor, Sensor("coordinates", mean)):
         batch = side_by_side(believing(plan, believed), range(1, 61))
         flown = History(batch.world, len(batch.channels), batch.reports)
-        Swarm(batch).fly(flown.extend, 20)
+        InProcessSwarm(batch).fly(flown.extend, 20)
         arrays, neighbours = flown.arrays(), batch.world.links.neighbours
         position = arrays["position"][-2]
         off = arrays["estimate"][-1] - (position[:, None] - position[neighbours])

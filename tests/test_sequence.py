@@ -2,7 +2,7 @@
 
 import pytest
 
-from netem.sequence import Numbering, Sequences, UninstructedLoss
+from netem.wire.sequence import Numbering, Sequences, UninstructedLoss
 
 
 def test_each_stream_is_numbered_from_0():

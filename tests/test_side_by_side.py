@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet.batch import fly_all
-from affinet.inprocess import Swarm
-from affinet.run import rehearse
-from affinet.side_by_side import NotABatch, side_by_side
-from agents.estimators import kalman
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.run import rehearse
+from affinet.runtimes.side_by_side import NotABatch, side_by_side
+from affinet.studies.batch import fly_all
+from agents.algebra import kalman
 from agents.estimators.rkf import RelativeKalmanFilter
-from analysis import consistency, metrics
-from netem.fate import Fate
-from world.history import History
+from analysis.metrics import consistency, errors
+from netem.medium.verdict import Fate
+from world.books.history import History
 
 SEEDS = (1, 7, 2**63 + 5)
 SHORT = ("time.dt=0.05", "time.duration=3")
@@ -64,7 +64,7 @@ def test_every_run_of_a_batch_is_the_run_alone(name, air):
     plan = plan_of(name, *SHORT, *air)
     batch, size, width = side_by_side(plan, SEEDS), plan.world.formation.agents, len(plan.world.links)
     together = History(batch.world, len(batch.channels), batch.reports)
-    Swarm(batch).fly(together.extend, 20)
+    InProcessSwarm(batch).fly(together.extend, 20)
     flown = together.arrays()
     for place, seed in enumerate(SEEDS):
         alone = rehearse(plan_of(name, *SHORT, *air, f"seed={seed}")).arrays
@@ -88,9 +88,9 @@ def test_the_runs_of_a_study_are_those_runs():
     position, known = arrays["position"], arrays["known"]
     true = position[..., :, None, :] - position[..., links.neighbours, :]
     expected = {
-        "procrustes": metrics.procrustes_error(position, formation.nominal, np.ones((15, 7), dtype=bool)),
-        "estimation_error": metrics.estimation_error(arrays["estimate"], true, known),
-        "covariance_trace": metrics.covariance_trace(arrays["covariance"], 2),
+        "procrustes": errors.procrustes_error(position, formation.nominal, np.ones((15, 7), dtype=bool)),
+        "estimation_error": errors.estimation_error(arrays["estimate"], true, known),
+        "covariance_trace": errors.covariance_trace(arrays["covariance"], 2),
         "nees": consistency.of_errors(arrays["estimate"], true, arrays["covariance"], known).mean,
     }
     for name, values in expected.items():
@@ -152,8 +152,8 @@ def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_t
             )
             known |= heard[tick]
             position = arrays["position"][tick]
-            errors = means[:, :2] - (position[links.dst - 1] - position[links.src - 1])
-            nees = [e @ np.linalg.inv(each[:2, :2]) @ e for e, each in zip(errors, covariances, strict=True)]
+            off = means[:, :2] - (position[links.dst - 1] - position[links.src - 1])
+            nees = [e @ np.linalg.inv(each[:2, :2]) @ e for e, each in zip(off, covariances, strict=True)]
             if tick % 3 == 0:
                 assert runs.nees[row, tick // 3] == pytest.approx(np.mean(np.array(nees)[known]), rel=1e-9)
                 assert runs.nis[row, tick // 3] == pytest.approx(np.mean(np.array(nis)[heard[tick]]), rel=1e-6)

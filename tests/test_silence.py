@@ -8,11 +8,11 @@ import time
 
 import pytest
 
-from affinet.child import RunFailed
-from affinet.interruption import Interruption
-from affinet.silence import Look, Looks, holding_up, stalled
-from affinet.supervision import Crew
-from affinet.told import Beat
+from affinet.runtimes.child import RunFailed
+from affinet.runtimes.interruption import Interruption
+from affinet.runtimes.silence import ProcessStatus, StatusHistory, holding_up, stalled
+from affinet.runtimes.supervision import ProcessGroup
+from affinet.runtimes.told import Beat
 
 PATIENCE = 3.0
 AWAITED = ("world", "netem")
@@ -76,7 +76,7 @@ def test_those_are_looked_at_for_whom_everybody_waits_in_the_end(said, who):
 
 
 def looks(first, before, now):
-    return Looks(Look(*first), Look(*before), Look(*now))
+    return StatusHistory(ProcessStatus(*first), ProcessStatus(*before), ProcessStatus(*now))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def blamed(crew, awaited):
 
 @pytest.mark.parametrize("foreign", [True, False], ids=["which does not beat", "which beat before"])
 def test_a_stopped_agent_is_named_with_its_state_and_who_waits_for_it(foreign, tmp_path):
-    with Crew(tmp_path, SHORT, Interruption()) as crew:
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)
         agent = crew.start("agent", ["sleep", "600"], {}, 2) if foreign else beating(crew, "agent", "netem", number=2)
         while not all(child.doing for child in crew.children if not foreign or child is not agent):
@@ -158,7 +158,7 @@ def test_a_stopped_agent_is_named_with_its_state_and_who_waits_for_it(foreign, t
 
 
 def test_a_foreign_agent_that_sleeps_on_is_named(tmp_path):
-    with Crew(tmp_path, SHORT, Interruption()) as crew:
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)
         agent = crew.start("agent", ["sleep", "600"], {}, 2)
         with pytest.raises(
@@ -168,7 +168,7 @@ def test_a_foreign_agent_that_sleeps_on_is_named(tmp_path):
 
 
 def test_a_foreign_agent_that_computes_for_ever_is_named(tmp_path):
-    with Crew(tmp_path, SHORT, Interruption()) as crew:
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)
         crew.start("agent", [sys.executable, "-S", "-c", "while True: pass"], {}, 2)
         with pytest.raises(RunFailed, match=r"^agent 2 \(pid \d+\) computes \(state R\): nothing moved for "):
@@ -176,7 +176,7 @@ def test_a_foreign_agent_that_computes_for_ever_is_named(tmp_path):
 
 
 def test_where_all_wait_for_each_other_it_is_said_for_whom(tmp_path):
-    with Crew(tmp_path, SHORT, Interruption()) as crew:
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)
         beating(crew, "agent", "netem", number=2)
         while not all(child.doing for child in crew.children):
@@ -186,7 +186,7 @@ def test_where_all_wait_for_each_other_it_is_said_for_whom(tmp_path):
 
 
 def test_time_in_which_the_launcher_did_not_look_is_nobodys_silence(tmp_path):
-    with Crew(tmp_path, SHORT, Interruption()) as crew:
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)
         crew.start("agent", ["sleep", "600"], {}, 2)
         while not all(child.doing for child in crew.children[:3]):
@@ -200,7 +200,7 @@ def test_time_in_which_the_launcher_did_not_look_is_nobodys_silence(tmp_path):
 
 
 def test_a_process_stopped_before_it_is_ready_is_named(tmp_path):
-    with Crew(tmp_path, 0.6, Interruption()) as crew:
+    with ProcessGroup(tmp_path, 0.6, Interruption()) as crew:
         child = crew.start("agent", ["sleep", "600"], {}, 2)
         os.kill(child.process.pid, signal.SIGSTOP)
         with pytest.raises(RunFailed, match=r"^agent 2 \(pid \d+\) is stopped \(state T\), and not ready: waited "):
@@ -208,7 +208,7 @@ def test_a_process_stopped_before_it_is_ready_is_named(tmp_path):
 
 
 def test_who_does_not_leave_is_named(tmp_path):
-    with Crew(tmp_path, 0.6, Interruption()) as crew:
+    with ProcessGroup(tmp_path, 0.6, Interruption()) as crew:
         crew.start("agent", ["sleep", "600"], {}, 2)
         crew.release()
         with pytest.raises(

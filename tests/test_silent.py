@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet.batch import fly_all
-from affinet.run import rehearse
-from affinet.sections import ScenarioError
+from affinet.runtimes.run import rehearse
+from affinet.scenario.sections import ScenarioError
+from affinet.studies.batch import fly_all
 from agents.brief import Own
-from agents.estimators.base import Heard
 from agents.estimators.silent import SilentEdgeFilter
-from analysis.autoregressive import fit
-from netem.channels import INPUT
+from agents.exchange import Heard
+from analysis.models.autoregressive import fit
+from netem.core.channels import INPUT
 
 COARSE = ("time.dt=0.01", "record.enabled=false")
 MUTE = ("network.coupled=false", 'network.links=[{links="all",channels="comms",availability=0.000001}]')

@@ -6,14 +6,14 @@ from extremes import BASES
 from flying import plan_of
 from scripted import timeline
 
-from affinet import plan as planning
-from affinet import scenario
-from affinet.batch import fly_all
-from affinet.plan import PlanError
-from affinet.run import fly, rehearse
-from affinet.sections import Scenario
-from analysis import graph
-from analysis.metrics import procrustes_error, root_mean_square, tracking_error
+from affinet.planning import plan as planning
+from affinet.planning.plan import PlanError
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import Scenario
+from affinet.studies.batch import fly_all
+from analysis.metrics.errors import procrustes_error, root_mean_square, tracking_error
+from analysis.models import graph
 
 TRIANGLE = {"nodes": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], "edges": ["1-2", "1-3", "2-3"]}
 PAIR = {"nodes": [[0.0, 0.0], [1.0, 0.0]], "edges": ["1-2"]}
@@ -119,7 +119,7 @@ def test_check_says_that_half_a_turn_by_theta_collapses_the_formation():
     half = "{time=%s,theta=[[%s,0],[0,%s]],offset=[0,0]%s}"
 
     def said(first, last):
-        made = planning.make(scenario.load("corridor", [f"manoeuvre={{keyframes=[{first},{last}]}}"]))
+        made = planning.make(loading.load("corridor", [f"manoeuvre={{keyframes=[{first},{last}]}}"]))
         return [(finding.level, finding.says) for finding in made.findings if finding.check == "manoeuvre"]
 
     assert said(half % (0.0, 1, 1, ""), half % (9.0, -1, -1, ""))[1] == (

@@ -7,9 +7,9 @@ import pytest
 import tomli_w
 from flying import PROCESSES, TRIANGLE, plan_of
 
-from affinet.launcher import Launcher
-from affinet.run import fly
-from world import history
+from affinet.runtimes.launcher import Launcher
+from affinet.runtimes.run import fly
+from world.books import history
 
 pytestmark = PROCESSES
 

@@ -10,11 +10,12 @@ from matplotlib.text import Text
 from PIL import Image
 from scipy.stats import chi2
 
-from affinet import cli, judging, study, study_report
-from affinet.batch import Runs
-from affinet.quantities import NAMES, over_time
-from affinet.sections import ScenarioError
-from analysis import figures
+from affinet.cli import commands
+from affinet.scenario.sections import ScenarioError
+from affinet.studies import judging, report, study
+from affinet.studies.batch import Runs
+from affinet.studies.quantities import NAMES, over_time
+from analysis.figures import curves
 
 pytestmark = PROCESSES
 
@@ -62,9 +63,9 @@ def flown(what):
 def reported(out, what, results):
     """All that is written down of it, in a new directory."""
     out.mkdir()
-    study_report.save(out, what, results)
-    study_report.tell(out, judging.judge(what, results))
-    study_report.draw(out, what, results)
+    report.save(out, what, results)
+    report.tell(out, judging.judge(what, results))
+    report.draw(out, what, results)
 
 
 @pytest.fixture
@@ -76,15 +77,15 @@ def tiny(tmp_path):
 
 def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     out = tmp_path / "out"
-    assert cli.main(["study", str(tiny), "--quick", "--out", str(out)]) == 0
+    assert commands.main(["study", str(tiny), "--quick", "--out", str(out)]) == 0
     verdicts = json.loads((out / "claims.json").read_text())
     assert [verdict["holds"] for verdict in verdicts] == [True, False]
-    curves, runs = (pq.read_table(out / f"{name}.parquet").to_pydict() for name in ("curves", "runs"))
+    moments, runs = (pq.read_table(out / f"{name}.parquet").to_pydict() for name in ("curves", "runs"))
     assert len(runs["run"]) == 2 * 2 * 2
-    assert len(curves["seconds"]) == 2 * 2 * 20
-    assert set(curves["estimator"]) == {"none", "ga-rkf"}
+    assert len(moments["seconds"]) == 2 * 2 * 20
+    assert set(moments["estimator"]) == {"none", "ga-rkf"}
     assert np.isfinite(runs["mean_error"]).all()
-    assert {"mean_nees", "std_nees", "mean_nis", "std_nis"} <= set(curves)
+    assert {"mean_nees", "std_nees", "mean_nis", "std_nis"} <= set(moments)
     with Image.open(out / "figure.png") as figure:
         assert min(figure.size) > 300
     assert not (out / "consistency.png").exists()  # that goes with curves
@@ -431,23 +432,23 @@ def test_levels_are_for_the_labels_of_one_axis(each, tmp_path):
 
 
 def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path, monkeypatch):
-    shown, draw = [], figures.consistency
-    monkeypatch.setattr(figures, "consistency", lambda *given: shown.append(given) or draw(*given))
+    shown, draw = [], curves.consistency
+    monkeypatch.setattr(curves, "consistency", lambda *given: shown.append(given) or draw(*given))
     pair = pair.model_copy(update={"claims": pair.claims[:1]})  # the others look beyond these 0.2 s
     results = flown(pair)
     reported(tmp_path / "out", pair, results)
-    curves = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
-    assert curves["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
+    moments = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
+    assert moments["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
     for name in ("error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"):
         values = np.concatenate([getattr(one.runs, name).mean(axis=0) for one in results])
-        np.testing.assert_array_equal(curves[f"mean_{name}"], values)
+        np.testing.assert_array_equal(moments[f"mean_{name}"], values)
     # The measurement is as uncertain in every tick, and the filter less and less.
-    traces = np.array(curves["mean_covariance_trace"]).reshape(2, 20)
+    traces = np.array(moments["mean_covariance_trace"]).reshape(2, 20)
     assert np.ptp(traces[0]) < 1e-12 < 0.1 < traces[1, 0] / traces[0, 0]
     assert traces[1, -1] < 0.2 * traces[0, -1]
     assert json.loads((tmp_path / "out" / "claims.json").read_text())[0]["found"].startswith("ratio")
     # Nothing is filtered by MLE; the filter, and the measurement as an estimate, are as wrong as they say.
-    nees, nis = (np.array(curves[f"mean_{name}"]).reshape(2, 20) for name in ("nees", "nis"))
+    nees, nis = (np.array(moments[f"mean_{name}"]).reshape(2, 20) for name in ("nees", "nis"))
     assert np.isnan(nis[0]).all()
     for means in (nees[0], nees[1], nis[1]):
         assert 1.5 < means.mean() < 2.5
@@ -468,12 +469,12 @@ def drawn(monkeypatch):
     """The figures that are drawn from now on."""
     kept = []
 
-    class Kept(figures.Figure):  # type: ignore[name-defined]
+    class Kept(curves.Figure):  # type: ignore[name-defined]
         def __init__(self, **how):
             super().__init__(**how)
             kept.append(self)
 
-    monkeypatch.setattr(figures, "Figure", Kept)
+    monkeypatch.setattr(curves, "Figure", Kept)
     return kept
 
 
@@ -520,10 +521,10 @@ def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, dra
 )
 def test_a_sweep_over_decades_is_drawn_on_a_logarithmic_axis(labels, scale, tmp_path, drawn):
     cases = [
-        figures.Curve({"W": W, "graph": "ring", "filter": "SOE"}, np.arange(3.0), np.ones((2, 3)), np.array([1.0, 2.0]))
+        curves.Curve({"W": W, "graph": "ring", "filter": "SOE"}, np.arange(3.0), np.ones((2, 3)), np.array([1.0, 2.0]))
         for W in labels
     ]
-    figures.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
+    curves.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
     ((panel,),) = (figure.axes for figure in drawn)
     assert panel.get_xscale() == scale
 
@@ -534,10 +535,10 @@ def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_
     values = {what: rng.uniform(1.0, 3.0, (4, 5, 6)) for what in ("NEES", "NIS")}
     values["NIS"][0] = np.nan  # MLE has none
     cases = {
-        what: [figures.Curve(*one, np.zeros(5)) for one in zip(labels, [seconds] * 4, of_cases, strict=True)]
+        what: [curves.Curve(*one, np.zeros(5)) for one in zip(labels, [seconds] * 4, of_cases, strict=True)]
         for what, of_cases in values.items()
     }
-    figures.consistency(tmp_path / "consistency.png", "Title", cases, ["graph", "air", "filter"], 3)
+    curves.consistency(tmp_path / "consistency.png", "Title", cases, ["graph", "air", "filter"], 3)
     (figure,) = drawn
     panels = {panel.get_title(): panel for panel in figure.axes}
     assert list(panels) == [f"{what}: hexa10, {air}" for what in ("NEES", "NIS") for air in ("clear", "lossy")]

@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from flying import PROCESSES
 
-from affinet import cli, study
-from affinet.sections import ScenarioError
-from analysis import figures
+from affinet.cli import commands
+from affinet.scenario.sections import ScenarioError
+from affinet.studies import study
+from analysis.figures import curves
 
 pytestmark = PROCESSES
 
@@ -181,7 +182,7 @@ NOT_FLOWN = [
 def test_what_cannot_be_drawn_or_judged_is_one_line_before_anything_flies(changes, says, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study, "fly", lambda *_: pytest.fail("it flew"))
     out = tmp_path / "out"
-    assert cli.main(["study", str(small(tmp_path, *changes)), "--quick", "--out", str(out)]) == 2
+    assert commands.main(["study", str(small(tmp_path, *changes)), "--quick", "--out", str(out)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("small.toml") or "no such scenario" in line
     assert says in line
@@ -210,9 +211,9 @@ class Done:
 
 def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study, "in_processes", Done())
-    monkeypatch.setattr(figures, "curves", lambda *_: [][0])
+    monkeypatch.setattr(curves, "curves", lambda *_: [][0])
     out = tmp_path / "out"
-    assert cli.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 1
+    assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 1
     assert len(pq.read_table(out / "runs.parquet")) == 4 * 2
     assert (out / "claims.json").exists()
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line]
@@ -226,7 +227,7 @@ def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monk
 def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "in_processes", Done(fail_after=3))
     out = tmp_path / "out"
-    assert cli.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 130
+    assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 130
     assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
 
 
@@ -234,7 +235,7 @@ def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, mo
 
 WAITS = """
 import os, sys, time
-from affinet.pool import in_processes
+from affinet.studies.pool import in_processes
 
 def work(fifo):
     with open(fifo, "w") as tell:
@@ -273,7 +274,7 @@ def test_no_worker_outlives_the_process_that_waits_for_it(number, tmp_path):
 def test_work_that_fails_ends_all_that_is_under_way(tmp_path):
     script = tmp_path / "fails.py"
     script.write_text(
-        "from affinet.pool import in_processes\n"
+        "from affinet.studies.pool import in_processes\n"
         "def work(number):\n    return 1 // number\n"
         'if __name__ == "__main__":\n'
         "    print(list(in_processes(work, [1, 1])))\n    list(in_processes(work, [0, 1, 1]))\n"
@@ -301,7 +302,7 @@ def test_a_study_in_a_file_is_named_with_it(tmp_path):
 def test_numbers_of_a_claim_that_say_nothing_are_refused(number, key, tmp_path, capsys):
     check = 'check = "lower"'
     path = small(tmp_path, (check, number if number.startswith("check") else f"{check}\n{number}"))
-    assert cli.main(["study", str(path), "--quick", "--out", str(tmp_path / "report")]) == 2
+    assert commands.main(["study", str(path), "--quick", "--out", str(tmp_path / "report")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("small.toml:")
     assert f"claims.1.{key}" in line

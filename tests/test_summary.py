@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet import show
-from affinet.checkers import localized
-from affinet.run import rehearse
+from affinet.cli import show
+from affinet.runtimes.run import rehearse
+from affinet.verdicts.checkers import localized
 
 VERSIONS = {
     "affinet": version("affinet"),

@@ -11,17 +11,17 @@ from pathlib import Path
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet import rerun_command
-from affinet import run as running
-from affinet.cli import main
-from affinet.inject import Access
-from affinet.rerun_command import NotMended, NoViewer
-from affinet.run import fly
-from netem.session import Login
-from netem.system_errors import about, afterwards, said
-from world.history import History
-from world.logbook import Logbook
-from world.recording import wrong_with
+from affinet.cli.commands import main
+from affinet.runtimes import rerun_command
+from affinet.runtimes import run as running
+from affinet.runtimes.inject import Access
+from affinet.runtimes.rerun_command import NotMended, NoViewer
+from affinet.runtimes.run import fly
+from netem.processes.system_errors import about, afterwards, said
+from netem.wire.session import Login
+from world.books.history import History
+from world.recording.file import wrong_with
+from world.recording.logbook import RunWriter
 
 pytestmark = PROCESSES
 
@@ -138,7 +138,7 @@ def test_a_system_without_threads_for_the_display_is_bad_input(monkeypatch, caps
     def refuse(_):
         raise RuntimeError("can't start new thread")
 
-    monkeypatch.setattr("affinet.show.Progress.__enter__", refuse)
+    monkeypatch.setattr("affinet.cli.show.Progress.__enter__", refuse)
     assert main([*RUN, "--out", "nowhere"]) == 2
     assert in_one_line(capsys).startswith("Resource temporarily unavailable; raise the limit (ulimit -u, or memory)")
 
@@ -250,7 +250,7 @@ def test_a_recording_is_whole_to_its_last_byte(hurt, wrong, whole, tmp_path):
 
 
 def test_a_device_that_is_full_is_told_where_the_recording_begins(out, monkeypatch):
-    monkeypatch.setattr("world.logbook.RECORDING", "/dev/full")
+    monkeypatch.setattr("world.recording.logbook.RECORDING", "/dev/full")
     done = fly(plan_of("corridor", *SHORT), "inprocess", out, lambda *_: None)
     assert done.reasons[0].startswith(
         "the run could not be written down: '/dev/full': No space left on device; free some"
@@ -265,7 +265,7 @@ def test_a_swarm_that_cannot_be_launched_fails_and_says_why(refused, out, monkey
     def refuse(*_, **__):
         raise OSError(refused, os.strerror(refused))
 
-    monkeypatch.setattr("affinet.supervision.subprocess.Popen", refuse)
+    monkeypatch.setattr("affinet.runtimes.supervision.subprocess.Popen", refuse)
     done = fly(plan_of("corridor", *SHORT, "record.enabled=false"), "processes", out, lambda *_: None)
     assert done.reasons == (f"the swarm could not be launched: {said(OSError(refused, ''))}",)
     assert summary(out)["verdict"] == "fail"
@@ -334,10 +334,10 @@ def test_every_step_of_a_clean_up_is_taken_and_the_first_failure_is_the_one_that
 def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, monkeypatch):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
     out.mkdir()
-    monkeypatch.setattr("netem.journal.Writer.close", lambda _: broken("journal")())
+    monkeypatch.setattr("netem.medium.journal.Writer.close", lambda _: broken("journal")())
     with (
         pytest.raises(KeyError, match="first"),
-        Logbook(out, "run", plan.world, plan.channels, plan.books(None)),
+        RunWriter(out, "run", plan.world, plan.channels, plan.books(None)),
     ):
         raise KeyError("first")
 

@@ -11,15 +11,15 @@ from contextlib import closing
 import pytest
 from rich.progress import BarColumn
 
-from affinet.progress import Bar
-from world.logbook import RECORDING
+from affinet.cli.progress import Bar
+from world.recording.logbook import RECORDING
 
 COARSE = ("--set", "time.dt=0.05", "--set", "time.duration=1")
 RUN = ("run", "corridor", "--runtime", "inprocess", *COARSE)
 
 
 def affinet(*arguments, cwd, environment=os.environ, **streams):
-    command = [sys.executable, "-m", "affinet.cli", *arguments]
+    command = [sys.executable, "-m", "affinet.cli.commands", *arguments]
     return subprocess.run(command, cwd=cwd, env=environment, check=False, **streams)
 
 
@@ -33,7 +33,7 @@ def affinet(*arguments, cwd, environment=os.environ, **streams):
     ],
 )
 def test_characters_a_terminal_does_not_have_are_question_marks(encoding, shown):
-    program = "from affinet import terminal; terminal.settle(); print('1 m² … 2')"
+    program = "from affinet.cli import terminal; terminal.settle(); print('1 m² … 2')"
     command = [sys.executable, "-X", "utf8", "-c", program]
     done = subprocess.run(command, capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding}, check=False)
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, shown, b"")
@@ -87,7 +87,7 @@ def test_a_full_disk_under_the_streams_is_said_in_a_line(arguments, complaints, 
 
 def test_closed_streams_are_not_taken_for_files_of_the_run(tmp_path):
     # The recording became descriptor 1 or 2, and the run was bad input.
-    command = [sys.executable, "-m", "affinet.cli", *RUN, "--out", "run"]
+    command = [sys.executable, "-m", "affinet.cli.commands", *RUN, "--out", "run"]
     done = subprocess.run(["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *command], cwd=tmp_path, check=False)
     assert done.returncode == 0
     assert (tmp_path / "run" / RECORDING).exists()

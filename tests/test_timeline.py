@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from netem.fault import Body, Fault, UnderWay, Verb
-from netem.links import Links
-from netem.timeline import Conditions, Timeline
-from netem.trigger import Trigger
+from netem.core.links import Links
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.timeline import Conditions, Timeline
+from netem.faults.trigger import Trigger
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 
@@ -51,8 +51,8 @@ WHAT_IT_IMPOSES = [
     (Fault(Verb.PAUSE, 3, 6, agents=(1,), under_way=UnderWay.HOLD), {"paused", "idle", "coasting", "holds"}),
     (Fault(Verb.CLOCK, 3, 6, agents=(1,), rate=0.5), set()),
     (Fault(Verb.DEPART, 3, 6, agents=(1,)), {"departed", "absent", "still"}),
-    (Fault(Verb.DEPART, 3, 6, agents=(1,), body=Body.DRIFT), {"departed", "absent", "drifting", "coasting"}),
-    (Fault(Verb.DEPART, 3, 6, agents=(1,), body=Body.VANISH), {"departed", "absent", "vanished", "still"}),
+    (Fault(Verb.DEPART, 3, 6, agents=(1,), body=DepartedBody.DRIFT), {"departed", "absent", "drifting", "coasting"}),
+    (Fault(Verb.DEPART, 3, 6, agents=(1,), body=DepartedBody.VANISH), {"departed", "absent", "vanished", "still"}),
     (Fault(Verb.GUST, 3, 6, agents=(1,), vector=(1.0, 0.0)), {"push"}),
     (Fault(Verb.BIAS, 3, 6, pairs=((1, 2),), vector=(1.0, 0.0)), {"bias"}),
     (Fault(Verb.OUTLIER, 3, 6, pairs=((1, 2),), probability=0.5, deviation=2.0), {"outlier", "deviation"}),
@@ -285,7 +285,7 @@ def overlapping(first, **other):
             [[], [1.0], [1.0], [1.0, 2.0], [1.0, 2.0], [2.0], [2.0], []],
         ),
         (
-            overlapping(Fault(Verb.DEPART, 0, 0, agents=(3,)), body=Body.DRIFT),
+            overlapping(Fault(Verb.DEPART, 0, 0, agents=(3,)), body=DepartedBody.DRIFT),
             lambda now: (bool(now.still[2]), bool(now.coasting[2])),
             [(False, False), *[(True, False)] * 2, *[(False, True)] * 4, (False, False)],
         ),
@@ -310,7 +310,7 @@ def test_biases_and_gusts_point_where_they_are_told():
 def test_a_dead_agent_is_not_paused_and_a_departed_one_that_is_paused_holds():
     pause = Fault(Verb.PAUSE, 0, None, agents=(1, 2, 3, 4))
     faults = [pause, Fault(Verb.KILL, 0, None, agents=(1,)), Fault(Verb.DEPART, 0, None, agents=(2,))]
-    now = Timeline(LINKS, [*faults, Fault(Verb.DEPART, 0, None, agents=(3,), body=Body.DRIFT)]).at(0)
+    now = Timeline(LINKS, [*faults, Fault(Verb.DEPART, 0, None, agents=(3,), body=DepartedBody.DRIFT)]).at(0)
     assert now.paused.tolist() == [False, True, True, True]
     assert now.idle.tolist() == [True, True, True, True]
     assert now.still.tolist() == [True, True, False, False]
@@ -318,7 +318,7 @@ def test_a_dead_agent_is_not_paused_and_a_departed_one_that_is_paused_holds():
 
 
 def test_a_dead_body_holds_even_where_it_drifted():
-    faults = [Fault(Verb.KILL, 0, None, agents=(1,)), Fault(Verb.DEPART, 0, None, agents=(1,), body=Body.DRIFT)]
+    faults = [Fault(Verb.KILL, 0, None, agents=(1,)), Fault(Verb.DEPART, 0, None, agents=(1,), body=DepartedBody.DRIFT)]
     now = Timeline(LINKS, faults).at(0)
     assert (now.still[0], now.coasting[0]) == (True, False)
 
@@ -569,7 +569,7 @@ def test_a_fault_holds_its_links_and_all_links_of_its_agents():
         (Fault(Verb.KILL, 0, 1, agents=(4,)), "kill 4", "restart 4"),
         (Fault(Verb.KILL, 0, 1, agents=(4,), warm=True), "kill 4", "restart 4 warm"),
         (Fault(Verb.DEPART, 0, 1, agents=(1, 2)), "depart 1,2", "rejoin 1,2"),
-        (Fault(Verb.DEPART, 0, 1, agents=(1,), body=Body.DRIFT), "depart 1, bodies drift", "rejoin 1"),
+        (Fault(Verb.DEPART, 0, 1, agents=(1,), body=DepartedBody.DRIFT), "depart 1, bodies drift", "rejoin 1"),
         (Fault(Verb.PAUSE, 0, 1, agents=(1, 3)), "pause 1,3", "resume 1,3"),
         (Fault(Verb.DELAY, 0, 1, pairs=((1, 2),), seconds=0.3), "delay 0.3 s on 1->2", "heal: delay 0.3 s on 1->2"),
         (

@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from affinet import told
-from affinet.child import RunFailed
-from affinet.interruption import Interruption
-from affinet.supervision import Crew
-from affinet.told import NotItsOwn
+from affinet.runtimes import told
+from affinet.runtimes.child import RunFailed
+from affinet.runtimes.interruption import Interruption
+from affinet.runtimes.supervision import ProcessGroup
+from affinet.runtimes.told import NotItsOwn
 
 BEAT = {"event": "beat", "k": 3, "what": "its inbox", "waits": ["netem"]}
 FACTS = {"agents": [1], "remembering": [], "k": 3}
@@ -113,7 +113,7 @@ def test_text_of_children_is_shown_as_any_terminal_takes_it():
 
 
 def crew(tmp_path):
-    return Crew(tmp_path, 3.0, Interruption())
+    return ProcessGroup(tmp_path, 3.0, Interruption())
 
 
 def program(says):

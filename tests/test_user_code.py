@@ -13,14 +13,15 @@ import pytest
 from flying import PROCESSES
 from own_code import ESTIMATOR, LAW, broken, line_of, write
 
-from affinet import plan, scenario
-from affinet.checkers import always, eventually
-from affinet.checking import Checker
-from affinet.cli import main
-from affinet.run import fly, rehearse
-from affinet.sections import ScenarioError
-from affinet.testing.swarm import Broken, Hangar
-from netem.user_code import UserCodeError
+from affinet.cli.commands import main
+from affinet.planning import plan
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from affinet.testing.swarm import Broken, SwarmRuns
+from affinet.verdicts.checkers import always, eventually
+from affinet.verdicts.checking import Checker
+from netem.processes.user_code import UserCodeError
 
 SHORT = ("time.dt=0.05", "time.duration=1")
 SIMPLE = ("agents.law=rest", *SHORT)  # no stress to solve
@@ -35,7 +36,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def made(key, name, *overrides):
-    return plan.make(scenario.load("corridor", (*SIMPLE, f'agents.{key}="{name}:Own"', *overrides)))
+    return plan.make(loading.load("corridor", (*SIMPLE, f'agents.{key}="{name}:Own"', *overrides)))
 
 
 def refused(key, name, *overrides):
@@ -358,7 +359,10 @@ def test_a_missing_method_is_named(method, folder):
     assert f"{name}.py:{line_of(text, '@dataclass')})" in said
 
 
-STUB = (("class Own", "class Own(Estimator)"), ("base import ", "base import Estimator, "))
+STUB = (
+    ("class Own", "class Own(Estimator)"),
+    ("import sys", "import sys\nfrom agents.estimators.base import Estimator"),
+)
 ABSTRACT = (
     ("import sys", "import abc"),
     ("class Own", "class Own(abc.ABC)"),
@@ -445,7 +449,7 @@ PATHS = [
 def test_a_path_that_leads_nowhere_is_a_problem_of_the_scenario(path, says, folder):
     name = write(folder, ESTIMATOR)
     with pytest.raises(ScenarioError) as caught:
-        plan.make(scenario.load("corridor", [*SIMPLE, f'agents.estimator="{path.replace("NAME", name)}"']))
+        plan.make(loading.load("corridor", [*SIMPLE, f'agents.estimator="{path.replace("NAME", name)}"']))
     assert f"agents.estimator: {says.replace('NAME', name)}" in str(caught.value)
 
 
@@ -505,7 +509,7 @@ def test_a_module_called_like_a_package_of_ours_is_to_be_renamed(package, folder
     assert main(["check", "corridor", "--estimator", f"{package}:Own"]) == 2
     file = folder / f"{package}.py"
     assert f"{file} is called like a package of affinet's own: rename it" in capsys.readouterr().err
-    assert rehearse(plan.make(scenario.load("corridor", SIMPLE))).outcome.verdict == "pass"
+    assert rehearse(plan.make(loading.load("corridor", SIMPLE))).outcome.verdict == "pass"
 
 
 SLEEPER = "import sys\nimport threading\n\nthreading.Thread(target=threading.Event().wait).start()"
@@ -523,7 +527,7 @@ def test_a_thread_that_a_module_starts_keeps_no_process(arguments, folder):
     name = write(folder, broken(ESTIMATOR, ("import sys", SLEEPER)))
     verb, *options = arguments
     settings = [option for override in SIMPLE for option in ("--set", override)]
-    program = [sys.executable, "-c", "from affinet.cli import command; command()", verb, "corridor", *options]
+    program = [sys.executable, "-c", "from affinet.cli.commands import command; command()", verb, "corridor", *options]
     done = subprocess.run(
         [*program, "--estimator", f"{name}:Own", *settings], check=False, capture_output=True, timeout=300
     )
@@ -722,7 +726,9 @@ def test_a_hunt_ends_with_the_smallest_timeline_that_breaks_the_code(folder, cap
 
 def test_a_test_fails_by_it_even_if_it_expects_a_failure(folder, tmp_path):
     name = write(folder, broken(ESTIMATOR, LATE))
-    swarm = Hangar("inprocess", None, lambda: tmp_path, tmp_path)("corridor", *SIMPLE, f"agents.estimator={name}:Own")
+    swarm = SwarmRuns("inprocess", None, lambda: tmp_path, tmp_path)(
+        "corridor", *SIMPLE, f"agents.estimator={name}:Own"
+    )
     with pytest.raises(Broken, match=rf"^{name}:Own\.fuse in tick 7: ZeroDivisionError"):
         swarm.fly("fail")
 
@@ -748,7 +754,7 @@ CHECKERS = [
 
 @pytest.mark.parametrize(("checker", "says"), CHECKERS, ids=[says for _, says in CHECKERS])
 def test_a_checker_that_fails_is_named_with_file_and_line(checker, says):
-    evidence = rehearse(plan.make(scenario.load("corridor", SHORT)))
+    evidence = rehearse(plan.make(loading.load("corridor", SHORT)))
     with pytest.raises(UserCodeError) as caught:
         checker(evidence)
     assert str(caught.value).startswith(says)

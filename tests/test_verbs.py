@@ -8,13 +8,13 @@ import pytest
 from flying import plan_of
 from scripted import timeline
 
-from affinet import events
-from affinet.compare import first_difference
-from affinet.outcome import Outcome
-from affinet.plan import Plan
-from affinet.run import fly
-from netem.fate import Fate
-from world import history
+from affinet.planning.plan import Plan
+from affinet.runtimes.run import fly
+from affinet.scenario import verbs
+from affinet.verdicts.compare import first_difference
+from affinet.verdicts.outcome import Outcome
+from netem.medium.verdict import Fate
+from world.books import history
 
 DT = 0.05
 BASE = (
@@ -127,7 +127,7 @@ FIRST = {
 
 
 def lasting(verb):
-    return issubclass(events.VERBS[verb], events.Lasting)
+    return issubclass(verbs.VERBS[verb], verbs.Lasting)
 
 
 def scripted(verb, at, **more):
@@ -139,10 +139,10 @@ def scripted(verb, at, **more):
 
 
 def test_no_verb_is_left_out():
-    assert set(WHAT) == set(FIRST) == set(events.VERBS)
+    assert set(WHAT) == set(FIRST) == set(verbs.VERBS)
 
 
-@pytest.mark.parametrize("verb", events.VERBS)
+@pytest.mark.parametrize("verb", verbs.VERBS)
 def test_a_verb_changes_what_it_says_and_nothing_before_its_time(verb, flown):
     entries = scripted(verb, 1.0)
     with_it, without = flown(*entries), flown(*entries[:-1])
@@ -154,7 +154,7 @@ def test_a_verb_changes_what_it_says_and_nothing_before_its_time(verb, flown):
     assert part(without, with_it) == FIRST[verb]
 
 
-@pytest.mark.parametrize("verb", events.VERBS)
+@pytest.mark.parametrize("verb", verbs.VERBS)
 def test_a_verb_whose_condition_never_comes_makes_the_run_vacuous_and_changes_nothing(verb, flown):
     *before, last = scripted(verb, 1.0)
     waiting = [{**entry, "at": 0.0, "when": NEVER, "name": "never"} for entry in before]
@@ -165,7 +165,7 @@ def test_a_verb_whose_condition_never_comes_makes_the_run_vacuous_and_changes_no
     assert flight.outcome.digest == flown().outcome.digest
 
 
-@pytest.mark.parametrize("verb", [verb for verb in events.VERBS if verb not in ENDED_BY])
+@pytest.mark.parametrize("verb", [verb for verb in verbs.VERBS if verb not in ENDED_BY])
 def test_what_lies_beyond_the_end_of_the_run_is_noted_and_makes_it_vacuous(verb, flown):
     flight = flown(*scripted(verb, 2.0))
     assert any(f"'{verb}" in note.says and "beyond the end" in note.says for note in flight.plan.findings)
@@ -254,7 +254,7 @@ ALWAYS_BITE = {"kill", "restart", "replace"}
 
 
 def test_every_verb_that_can_touch_nothing_has_a_way_to():
-    assert {name.split()[0] for name in VACUOUS} == set(events.VERBS) - ALWAYS_BITE
+    assert {name.split()[0] for name in VACUOUS} == set(verbs.VERBS) - ALWAYS_BITE
 
 
 FROZEN = {"verb": "freeze", "at": 0.5, "links": ["2->4"]}

@@ -5,11 +5,11 @@ import pytest
 from flying import PROCESSES, plan_of
 from scripted import timeline
 
-from affinet import events
-from affinet import plan as planning
-from affinet.run import fly
-from netem import journal
-from world import history
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly
+from affinet.scenario import verbs
+from netem.medium import journal
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -75,7 +75,7 @@ SCRIPTS = {
 
 
 def test_together_the_scripts_hold_every_verb():
-    assert {entry["verb"] for _, script in SCRIPTS.values() for entry in script} == set(events.VERBS)
+    assert {entry["verb"] for _, script in SCRIPTS.values() for entry in script} == set(verbs.VERBS)
 
 
 def flown(plan, runtime, out):

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from agents.brief import Brief
 from agents.process import AgentBrief, Choice
-from analysis.affine import Manoeuvre
-from analysis.pursuit import Target
-from analysis.sensor import Sensor
-from netem import wire
-from netem.delay import Law
-from netem.fault import Body, Fault, UnderWay, Verb
-from netem.links import Links
-from netem.plain import PlainError, from_plain, plainly
+from analysis.models.affine import Manoeuvre
+from analysis.models.pursuit import Target
+from analysis.models.sensor import Sensor
+from netem.core.links import Links
+from netem.core.plain import PlainError, from_plain, plainly
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.trigger import Trigger
+from netem.impairments.delay import DelayLaw
 from netem.process import MediumBrief
-from netem.session import Login
-from netem.trigger import Trigger
-from netem.wire import Phase, WireError
+from netem.wire import messages
+from netem.wire.messages import Phase, WireError
+from netem.wire.session import Login
 
 
 def name(message):
@@ -31,7 +31,7 @@ def name(message):
 
 
 MESSAGES = [
-    wire.Sense(
+    messages.Sense(
         k=7,
         src="world",
         seq=7,
@@ -42,7 +42,7 @@ MESSAGES = [
         sightings=[{"position": [1.5, 2.0], "done": True, "by": 0, "method": 1}] * 2,
         fired=[1],
     ),
-    wire.SenseInbox(
+    messages.SenseInbox(
         k=7,
         src="netem",
         seq=14,
@@ -54,10 +54,12 @@ MESSAGES = [
         motion=[[0.25, 0.0], [1.0, 2.0]],
         sighting={"position": [1.5, 2.0], "done": True, "by": 0, "method": 1},
     ),
-    wire.Broadcast(k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}),
-    wire.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
-    wire.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
-    wire.Act(
+    messages.Broadcast(
+        k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}
+    ),
+    messages.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
+    messages.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
+    messages.Act(
         k=7,
         src=3,
         seq=7,
@@ -70,7 +72,7 @@ MESSAGES = [
         reports={"place": [1.0, 2.0]},
         heard=12,
     ),
-    wire.Journal(
+    messages.Journal(
         k=7,
         src="netem",
         seq=7,
@@ -91,50 +93,50 @@ FIELDS = [
 
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_a_message_survives_the_trip(message):
-    assert wire.unpack(type(message), wire.pack(message)) == message
+    assert messages.unpack(type(message), messages.pack(message)) == message
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_a_message_is_a_plain_map_for_any_messagepack_codec(message):
-    plain = msgpack.unpackb(wire.pack(message))
+    plain = msgpack.unpackb(messages.pack(message))
     assert plain == message._asdict()
     assert {"k", "src", "seq"} <= plain.keys()
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if hasattr(m, "phase")], ids=name)
 def test_an_inbox_is_known_by_its_phase(message):
-    assert wire.unpack_inbox(wire.pack(message)) == message
+    assert messages.unpack_inbox(messages.pack(message)) == message
 
 
 def test_arrays_travel_as_nested_lists():
     sense = MESSAGES[0]._replace(measured=np.array([[0.1, 0.2]]), position=np.zeros((2, 2)))
-    arrived = wire.unpack(wire.Sense, wire.pack(sense))
+    arrived = messages.unpack(messages.Sense, messages.pack(sense))
     assert arrived.measured == [[0.1, 0.2]]
     assert arrived.position == [[0.0, 0.0], [0.0, 0.0]]
 
 
 def test_numpy_scalars_travel_as_numbers():
     act = MESSAGES[5]._replace(k=np.int64(7), psi=np.float64(0.25), heard=np.int32(12), known=np.array([True]))
-    assert wire.unpack(wire.Act, wire.pack(act)) == MESSAGES[5]
+    assert messages.unpack(messages.Act, messages.pack(act)) == MESSAGES[5]
 
 
 def test_an_undefined_indicator_travels_as_nan():
-    assert np.isnan(wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(psi=np.nan))).psi)
+    assert np.isnan(messages.unpack(messages.Act, messages.pack(MESSAGES[5]._replace(psi=np.nan))).psi)
 
 
 def test_numbers_arrive_bit_for_bit():
     numbers = [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf]
-    arrived = wire.unpack(wire.Act, wire.pack(MESSAGES[5]._replace(input=np.array(numbers)))).input
+    arrived = messages.unpack(messages.Act, messages.pack(MESSAGES[5]._replace(input=np.array(numbers)))).input
     assert np.array(arrived).tobytes() == np.array(numbers).tobytes()
 
 
 @pytest.mark.parametrize("message", MESSAGES[:2], ids=name)
 def test_single_integrators_are_told_no_motion(message):
-    assert wire.unpack(type(message), wire.pack(message._replace(motion=None))).motion is None
+    assert messages.unpack(type(message), messages.pack(message._replace(motion=None))).motion is None
 
 
 def test_a_whole_number_will_do_for_a_number():
-    arrived = wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {"psi": 1}))
+    arrived = messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {"psi": 1}))
     assert type(arrived.psi) is float
 
 
@@ -145,7 +147,7 @@ def test_a_whole_number_will_do_for_a_number():
 def test_a_missing_field_is_named(message, field):
     plain = {name: value for name, value in message._asdict().items() if name != field}
     with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*unknown \[\], missing \['{field}'\]") as error:
-        wire.unpack(type(message), msgpack.packb(plain))
+        messages.unpack(type(message), msgpack.packb(plain))
     assert "docs/protocol.md" in str(error.value)
 
 
@@ -153,7 +155,7 @@ def test_a_missing_field_is_named(message, field):
 def test_an_unknown_field_is_named(message):
     data = msgpack.packb(message._asdict() | {"colour": "red"})
     with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*unknown \['colour'\], missing \[\]"):
-        wire.unpack(type(message), data)
+        messages.unpack(type(message), data)
 
 
 @pytest.mark.parametrize(("message", "field"), FIELDS)
@@ -161,7 +163,7 @@ def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
     wrong = "lunch" if field in {"payload", "sighting", "reports"} else {"lunch": 1}
     data = msgpack.packb(message._asdict() | {field: wrong})
     with pytest.raises(WireError, match=rf"^{type(message).__name__}: {field}: expected .*lunch"):
-        wire.unpack(type(message), data)
+        messages.unpack(type(message), data)
 
 
 @pytest.mark.parametrize(
@@ -177,19 +179,19 @@ def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
 )
 def test_no_type_is_taken_for_another(field, wrong, match):
     with pytest.raises(WireError, match=match):
-        wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {field: wrong}))
+        messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {field: wrong}))
 
 
 def test_an_overlong_value_is_shortened_in_the_message():
     with pytest.raises(WireError, match="Act: k") as error:
-        wire.unpack(wire.Act, msgpack.packb(MESSAGES[5]._asdict() | {"k": "x" * 10_000}))
+        messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {"k": "x" * 10_000}))
     assert len(str(error.value)) < 200
 
 
 @pytest.mark.parametrize("plain", [None, 3, "sense", [1, 2], []])
 def test_what_is_no_map_is_refused(plain):
     with pytest.raises(WireError, match=r"Act: expected a map \(Act\)"):
-        wire.unpack(wire.Act, msgpack.packb(plain))
+        messages.unpack(messages.Act, msgpack.packb(plain))
 
 
 @pytest.mark.parametrize(
@@ -200,12 +202,14 @@ def test_what_is_no_map_is_refused(plain):
         b"\x91" * 5000,
         b"\x81\x01\x02",
         b"\xa1\xff",
-        wire.pack(MESSAGES[5])[:-1],
-        wire.pack(MESSAGES[5]) * 2,
+        messages.pack(MESSAGES[5])[:-1],
+        messages.pack(MESSAGES[5]) * 2,
     ],
     ids=["empty", "reserved byte", "too deep", "number as key", "not UTF-8", "cut short", "two at once"],
 )
-@pytest.mark.parametrize("read", [lambda data: wire.unpack(wire.Act, data), wire.unpack_inbox], ids=["unpack", "inbox"])
+@pytest.mark.parametrize(
+    "read", [lambda data: messages.unpack(messages.Act, data), messages.unpack_inbox], ids=["unpack", "inbox"]
+)
 def test_malformed_bytes_are_refused(read, data):
     with pytest.raises(WireError, match="not MessagePack"):
         read(data)
@@ -214,12 +218,12 @@ def test_malformed_bytes_are_refused(read, data):
 @pytest.mark.parametrize("phase", [None, "lunch", 3, True, [], {}, ["sense"]], ids=repr)
 def test_an_inbox_of_no_phase_is_refused_with_the_phases_there_are(phase):
     with pytest.raises(WireError, match=r"phase among .*sense.*exchange.*end"):
-        wire.unpack_inbox(msgpack.packb({"k": 1, "src": "netem", "seq": 0, "phase": phase}))
+        messages.unpack_inbox(msgpack.packb({"k": 1, "src": "netem", "seq": 0, "phase": phase}))
 
 
 def test_an_inbox_with_the_fields_of_another_phase_is_refused():
     with pytest.raises(WireError, match=r"^ExchangeInbox: .*missing \['messages'\]"):
-        wire.unpack_inbox(msgpack.packb(MESSAGES[1]._asdict() | {"phase": "exchange"}))
+        messages.unpack_inbox(msgpack.packb(MESSAGES[1]._asdict() | {"phase": "exchange"}))
 
 
 PLAIN = st.recursive(
@@ -239,7 +243,7 @@ PLAIN = st.recursive(
 def test_whatever_else_comes_is_refused_as_a_wire_error(data):
     for kind in map(type, MESSAGES):
         with pytest.raises(WireError):
-            wire.unpack(kind, data)
+            messages.unpack(kind, data)
 
 
 @settings(max_examples=150, deadline=None)
@@ -248,7 +252,7 @@ def test_any_value_of_any_field_is_read_as_it_came_or_refused_by_the_name_of_the
     field = message._fields[number % len(message._fields)]
     plain, refused = message._asdict() | {field: value}, ""
     try:
-        arrived = wire.unpack(type(message), msgpack.packb(plain))
+        arrived = messages.unpack(type(message), msgpack.packb(plain))
     except WireError as error:
         refused = str(error)
     if refused:
@@ -261,9 +265,9 @@ def test_any_value_of_any_field_is_read_as_it_came_or_refused_by_the_name_of_the
 
 
 def test_an_exchange_inbox_holds_the_maps_that_were_broadcast():
-    said = [wire.Broadcast(7, src, "theta", 7, {"local": np.eye(2) * src, "feasible": True}) for src in (1, 2)]
-    inbox = wire.unpack_inbox(wire.pack_exchange(7, 15, [wire.pack(broadcast) for broadcast in said]))
-    assert inbox == wire.ExchangeInbox(
+    said = [messages.Broadcast(7, src, "theta", 7, {"local": np.eye(2) * src, "feasible": True}) for src in (1, 2)]
+    inbox = messages.unpack_inbox(messages.pack_exchange(7, 15, [messages.pack(broadcast) for broadcast in said]))
+    assert inbox == messages.ExchangeInbox(
         k=7,
         src="netem",
         seq=15,
@@ -278,15 +282,15 @@ def test_an_exchange_inbox_holds_the_maps_that_were_broadcast():
 @pytest.mark.parametrize("number", [0, 1, 15, 16, 70_000])
 def test_an_exchange_inbox_relays_any_number_of_broadcasts_byte_for_byte(number):
     said = msgpack.packb({"payload": {"x": 1.5}, "seq": 0, "k": 7, "src": 1, "channel": "x"}, use_single_float=True)
-    data = wire.pack_exchange(7, 0, [said] * number)
+    data = messages.pack_exchange(7, 0, [said] * number)
     assert data.endswith(said * number)
-    assert wire.unpack_inbox(data).messages == [msgpack.unpackb(said)] * number
+    assert messages.unpack_inbox(data).messages == [msgpack.unpackb(said)] * number
 
 
 def test_an_exchange_inbox_equals_one_packed_at_once():
-    said = wire.pack(MESSAGES[2])
-    at_once = wire.ExchangeInbox(7, "netem", 15, Phase.EXCHANGE, [MESSAGES[2]._asdict()])
-    assert wire.pack_exchange(7, 15, [said]) == wire.pack(at_once)
+    said = messages.pack(MESSAGES[2])
+    at_once = messages.ExchangeInbox(7, "netem", 15, Phase.EXCHANGE, [MESSAGES[2]._asdict()])
+    assert messages.pack_exchange(7, 15, [said]) == messages.pack(at_once)
 
 
 # ---- briefs
@@ -325,7 +329,7 @@ MEDIUM = MediumBrief(
         Fault(Verb.DEGRADE, 3, 6, pairs=((1, 2),), profile=1),
         Fault(Verb.PAUSE, 3, 6, agents=(2,), under_way=UnderWay.HOLD),
         Fault(Verb.CLOCK, 3, 6, agents=(2,), rate=-0.5),
-        Fault(Verb.DEPART, 3, 6, agents=(2,), body=Body.DRIFT),
+        Fault(Verb.DEPART, 3, 6, agents=(2,), body=DepartedBody.DRIFT),
         Fault(Verb.GUST, 3, 6, agents=(2,), vector=(1.0, -0.5)),
         Fault(Verb.BIAS, 3, 6, pairs=((1, 2),), vector=(1.0, -0.5)),
         Fault(Verb.OUTLIER, 3, 6, pairs=((1, 2),), probability=0.1, deviation=3.0),
@@ -346,7 +350,7 @@ AGENT = AgentBrief(
     agent=2,
     neighbours=(1, 3),
     estimator=Choice("agents.estimators.none:NoEstimator", {}),
-    law=Choice("agents.controllers:Static", {"alpha": 2.0}),
+    law=Choice("agents.laws.single:Static", {"alpha": 2.0}),
     leaders="distances",
     leader_gain=1.0,
     limit=3.0,
@@ -405,14 +409,14 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
     assert arrived.faults == MEDIUM.faults
     assert arrived.faults[0].verb is Verb.CUT
     assert arrived.faults[0].under_way is UnderWay.HOLD
-    assert arrived.profiles[0].delays[0].law is Law.CONSTANT
+    assert arrived.profiles[0].delays[0].law is DelayLaw.CONSTANT
     own = arrived.profiles[0]
     assert all(len(layers) > 0 for layers in (own.traces, own.reaches, own.zones))
     assert not arrived.profiles[1].traces
     assert arrived.triggers == MEDIUM.triggers
     assert arrived.faults[0].trigger is None
     assert arrived.faults[4].trigger == 1
-    assert [fault.body for fault in arrived.faults[:1] + arrived.faults[8:9]] == [Body.HOLD, Body.DRIFT]
+    assert [fault.body for fault in arrived.faults[:1] + arrived.faults[8:9]] == [DepartedBody.HOLD, DepartedBody.DRIFT]
     assert arrived.faults[-1].matrix == ((0.0, 1.0), (-1.0, 0.5))
     assert arrived.login == MEDIUM.login
     assert arrived.channels == ("sense", "theta")
@@ -474,7 +478,7 @@ def test_an_unknown_word_in_a_brief_is_named_with_those_there_are():
 
 def test_what_has_no_plain_form_is_not_packed():
     with pytest.raises(TypeError, match="object has no plain form"):
-        wire.pack(MESSAGES[2]._replace(payload={"thing": object()}))
+        messages.pack(MESSAGES[2]._replace(payload={"thing": object()}))
 
 
 def test_a_record_of_what_has_no_plain_form_is_refused_with_what_there_is():

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis.sensor import Sensor
-from netem.fault import Body, Fault, UnderWay, Verb
-from netem.links import Links
-from netem.timeline import Timeline
-from world import sensors
-from world.disturbance import Disturbance
-from world.formation import PRESETS, Formation
-from world.maneuver import corridor, hover
-from world.world import Scene, World
+from analysis.models.sensor import Sensor
+from netem.core.links import Links
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.timeline import Timeline
+from world.formation.manoeuvre import corridor, hover
+from world.formation.nominal import PRESETS, Formation
+from world.physics import sensors
+from world.physics.disturbance import Disturbance
+from world.physics.world import Scene, World
 
 ZHAO7 = PRESETS["zhao7"]
 SEVEN = Links.both_ways(7, ZHAO7.edges)
@@ -144,7 +144,7 @@ def test_step_remembers_what_was_flown_and_measured(world):
 HOLDING = [
     Fault(Verb.KILL, 0, None, agents=GONE),
     Fault(Verb.DEPART, 0, None, agents=GONE),
-    Fault(Verb.DEPART, 0, None, agents=GONE, body=Body.VANISH),
+    Fault(Verb.DEPART, 0, None, agents=GONE, body=DepartedBody.VANISH),
 ]
 HELD = pytest.mark.parametrize("fault", HOLDING, ids=lambda fault: f"{fault.verb}, {fault.body}")
 
@@ -170,7 +170,7 @@ def test_absent_agents_hold_still_under_disturbance_and_gusts_too(world, fault):
 
 COASTING = [
     Fault(Verb.PAUSE, 0, None, agents=GONE, under_way=UnderWay.HOLD),
-    Fault(Verb.DEPART, 0, None, agents=GONE, body=Body.DRIFT),
+    Fault(Verb.DEPART, 0, None, agents=GONE, body=DepartedBody.DRIFT),
 ]
 
 

@@ -6,11 +6,13 @@ from typing import Literal, get_origin
 import pytest
 from pydantic import BaseModel, TypeAdapter
 
-from affinet import forms, invariants, plan, scenario
-from affinet.cli import main
-from affinet.sections import Scenario, ScenarioError
-from affinet.study import Study
-from affinet.words import one_line, shown
+from affinet.cli.commands import main
+from affinet.planning import plan
+from affinet.scenario import forms, loading
+from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.words import one_line, shown
+from affinet.studies.study import Study
+from affinet.verdicts import invariants
 
 RAW = re.compile(
     r"Input |valid (dictionary|list|string|number|integer|boolean)|instance of|ValidationError|Value error"
@@ -21,7 +23,7 @@ def refused(*overrides):
     """What is said of the corridor with these overrides."""
     flown = "target" if "parameters.target" in overrides[0] else "corridor"
     with pytest.raises(ScenarioError) as error:
-        plan.make(scenario.load(flown, overrides))
+        plan.make(loading.load(flown, overrides))
     (line,) = str(error.value).splitlines()
     assert not RAW.search(line)
     return line.removeprefix("--set: ")
@@ -137,7 +139,7 @@ def test_what_is_missing_because_it_was_misspelt_is_one_mistake(tmp_path):
         '[formation]\npreset="zhao7"\n[manouvre]\n[tmie]\n[sensing]\nsigma=1.0\n[agents]\nestimator="rkf"\nlaw="rest"'
     )
     with pytest.raises(ScenarioError) as error:
-        scenario.load(str(file))
+        loading.load(str(file))
     assert str(error.value).startswith("swarm.toml:3: manouvre: unknown key; did you mean 'manoeuvre'? known here: ")
     assert str(error.value).endswith("; 1 more mistake: tmie (swarm.toml:4)")
 
@@ -266,7 +268,7 @@ class Several(BaseModel):
 def test_of_a_value_that_could_be_several_things_one_line_says_which(given, says):
     from pydantic import ValidationError
 
-    from affinet.explain import mistakes
+    from affinet.scenario.explain import mistakes
 
     with pytest.raises(ValidationError) as error:
         Several.model_validate(given, strict=True)

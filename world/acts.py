@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from netem import wire
-from netem.keys import Keys
-from netem.links import Links, Mask
-from netem.sequence import Sequences
-from world.formation import Array
+from analysis.models.arrays import Array, Mask
+from netem.core.links import Links
+from netem.wire import messages
+from netem.wire.keys import Keys
+from netem.wire.sequence import Sequences
 
 
 class Beliefs(NamedTuple):
@@ -50,7 +50,7 @@ class Acts:
         """Expect the acts of a new process."""
         self._streams.restart(f"{agent} act")
 
-    def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> wire.Act:
+    def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> messages.Act:
         """The act that came on a key, its numbers as arrays.
 
         Raises
@@ -62,25 +62,25 @@ class Acts:
         """
         agent = self._speaking[key]
         try:
-            act = wire.unpack(wire.Act, data)
-        except wire.WireError as error:
-            raise wire.WireError(f"agent {agent}: {error}") from error
+            act = messages.unpack(messages.Act, data)
+        except messages.WireError as error:
+            raise messages.WireError(f"agent {agent}: {error}") from error
         if act.src != agent or act.k != tick or agent not in awaited:
-            raise wire.WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
+            raise messages.WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
         self._streams.check(f"{agent} act", act.seq)
         return act._replace(
-            input=wire.numbers(act.input, self._whose[agent]["input"], (self._dimension,)),
+            input=messages.numbers(act.input, self._whose[agent]["input"], (self._dimension,)),
             known=self._edges(agent, "known", act.known, (None,), "b"),
             estimate=self._edges(agent, "estimate", act.estimate, (None, self._rows["estimate"])),
             covariance=self._edges(agent, "covariance", act.covariance, (None, self._rows["covariance"])),
             reports={
-                name: wire.numbers(act.reports[name], f"agent {agent}: Act: reports: {name}", shape, "iufb")
+                name: messages.numbers(act.reports[name], f"agent {agent}: Act: reports: {name}", shape, "iufb")
                 for name, shape in self._reports.items()
                 if name in act.reports
             },
         )
 
-    def beliefs(self, acts: Mapping[int, wire.Act]) -> Beliefs:
+    def beliefs(self, acts: Mapping[int, messages.Act]) -> Beliefs:
         """What all agents believe, padded to the widest."""
         believed = Beliefs(
             np.zeros((*self._shape, self._rows["estimate"])),
@@ -93,9 +93,9 @@ class Acts:
         return believed
 
     def _edges(self, agent: int, name: str, given: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> Any:
-        rows = wire.numbers(given, self._whose[agent][name], shape, kinds)
+        rows = messages.numbers(given, self._whose[agent][name], shape, kinds)
         if len(rows) not in (0, self._degree[agent - 1]):
-            raise wire.WireError(
+            raise messages.WireError(
                 f"agent {agent}: Act: {name}: expected one for each of its {self._degree[agent - 1]} neighbours, or none, "
                 f"got {len(rows)} (see docs/protocol.md)"
             )

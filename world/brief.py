@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from netem.fault import Fault
-from netem.session import Login
-from netem.trigger import Trigger
-from world.world import World
+from netem.faults.fault import Fault
+from netem.faults.trigger import Trigger
+from netem.wire.session import Login
+from world.physics.world import World
 
 _LEAST_BATCH = 50
 
 
 @dataclass(frozen=True)
-class Books:
+class RecordOptions:
     """How a run is written down.
 
     Parameters
@@ -70,4 +70,4 @@ class WorldBrief:
     faults: tuple[Fault, ...]
     triggers: tuple[Trigger, ...]
     reports: Mapping[str, tuple[int, ...]]
-    books: Books
+    books: RecordOptions

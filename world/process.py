@@ -10,26 +10,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import zenoh
 
-from netem import system_errors, wire
-from netem.fault import Fault
-from netem.keys import Keys
-from netem.plain import from_plain
-from netem.sequence import Numbering
-from netem.session import HUB, WORLD, await_subscribers, client
-from netem.supervised import Supervisor, called
-from netem.timeline import Conditions, Timeline
+from analysis.models.arrays import Array
+from netem.core.plain import from_plain
+from netem.faults.fault import Fault
+from netem.faults.timeline import Conditions, Timeline
+from netem.processes import system_errors
+from netem.processes.supervised import Supervisor, called
+from netem.wire import messages
+from netem.wire.keys import Keys
+from netem.wire.sequence import Numbering
+from netem.wire.session import HUB, WORLD, await_subscribers, client
 from world.acts import Acts
+from world.books.history import FILE as ARRAYS
+from world.books.history import UNTOLD, ErrorMonitor, History, Moment, gather
 from world.brief import WorldBrief
-from world.formation import Array
-from world.history import FILE as ARRAYS
-from world.history import UNTOLD, History, Moment, Vigil, gather
-from world.world import Scene
+from world.physics.world import Scene
 
 if TYPE_CHECKING:
-    from world.logbook import Logbook
+    from world.recording.logbook import RunWriter
 
 
-class Theatre:
+class WorldNode:
     """The world of a run over Zenoh."""
 
     def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: WorldBrief) -> None:
@@ -48,8 +49,8 @@ class Theatre:
         self._awaited: set[int] = set()
         self._flown: list[tuple[Moment, Scene]] = []  # with where each tick led
         self._batch = brief.books.batch
-        self._nobody = wire.Act(0, 0, 0, np.zeros(dimension), [], [], [], np.nan, None, {}, 0)
-        self._vigil = Vigil(brief.world)
+        self._nobody = messages.Act(0, 0, 0, np.zeros(dimension), [], [], [], np.nan, None, {}, 0)
+        self._vigil = ErrorMonitor(brief.world)
         self.uninstructed = 0
         self._unsaid = {name: np.full(shape, np.nan).tolist() for name, shape in brief.reports.items()}
         self.history = History(brief.world, len(brief.channels), brief.reports)
@@ -58,14 +59,14 @@ class Theatre:
         """Wait until the medium listens."""
         await_subscribers([self._sense])
 
-    def run(self, logbook: Logbook) -> None:
+    def run(self, logbook: RunWriter) -> None:
         """Fly all ticks, and write them down: also those before whatever ends the run early."""
         with system_errors.afterwards(partial(self._write_down, logbook)):
             self._fly(logbook)
-        end = wire.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, None, [])
-        self._sense.put(wire.pack(end))
+        end = messages.Sense(self._world.ticks, WORLD, self._numbers.next("sense"), True, [], [], None, None, [])
+        self._sense.put(messages.pack(end))
 
-    def _fly(self, logbook: Logbook) -> None:
+    def _fly(self, logbook: RunWriter) -> None:
         scene = self._world.begin()
         for tick in range(self._world.ticks):
             fired = self._fire(tick)
@@ -108,10 +109,10 @@ class Theatre:
 
     def _publish(self, tick: int, measured: Array, scene: Scene, fired: list[int]) -> None:
         number, motion = self._numbers.next("sense"), self._world.odometry(scene)
-        sense = wire.Sense(
+        sense = messages.Sense(
             tick, WORLD, number, False, measured, scene.position, motion, self._sightings(tick, scene), fired
         )
-        self._sense.put(wire.pack(sense))
+        self._sense.put(messages.pack(sense))
 
     def _sightings(self, tick: int, scene: Scene) -> list[dict[str, Any]] | None:
         sighting = self._world.sighting(tick, scene)
@@ -120,19 +121,19 @@ class Theatre:
         agents = zip(*(field.tolist() for field in sighting), strict=True)
         return [dict(zip(sighting._fields, said, strict=True)) for said in agents]
 
-    def _read_journal(self, tick: int) -> wire.Journal:
+    def _read_journal(self, tick: int) -> messages.Journal:
         self._supervisor.waits(tick, "its journal", lambda: (HUB,))
-        journal = wire.unpack(wire.Journal, self._journal.recv().payload.to_bytes())
+        journal = messages.unpack(messages.Journal, self._journal.recv().payload.to_bytes())
         if journal.k != tick:
-            raise wire.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
+            raise messages.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
         return journal
 
-    def _hear_of_faults(self, journal: wire.Journal) -> None:
+    def _hear_of_faults(self, journal: messages.Journal) -> None:
         if journal.injected is not None:
             injected = [from_plain(Fault, fault) for fault in journal.injected]
             self._timeline = self._scripted.facing(injected)
 
-    def _read_acts(self, tick: int) -> dict[int, wire.Act]:
+    def _read_acts(self, tick: int) -> dict[int, messages.Act]:
         self._awaited = set((np.flatnonzero(~self._timeline.at(tick).idle) + 1).tolist())
         self._supervisor.waits(tick, "its act", self._idle)
         acts = {}
@@ -147,7 +148,7 @@ class Theatre:
         return [called(agent) for agent in sorted(self._awaited)]
 
     def _moment(
-        self, scene: Scene, measured: Array, journal: wire.Journal, acts: dict[int, wire.Act], now: Conditions
+        self, scene: Scene, measured: Array, journal: messages.Journal, acts: dict[int, messages.Act], now: Conditions
     ) -> Moment:
         self._account(journal, acts)
         everybody = [acts.get(agent, self._nobody) for agent in self._heard]
@@ -174,7 +175,7 @@ class Theatre:
             injected=journal.injected,
         )
 
-    def _write_down(self, logbook: Logbook) -> None:
+    def _write_down(self, logbook: RunWriter) -> None:
         if not self._flown:
             return
         flown, self._flown = self._flown, []
@@ -183,7 +184,7 @@ class Theatre:
         logbook.write(moments, self._timeline)
         self._supervisor.tell("tick", k=self.history.ticks, error=float(moments.error[-1]))
 
-    def _account(self, journal: wire.Journal, acts: dict[int, wire.Act]) -> None:
+    def _account(self, journal: messages.Journal, acts: dict[int, messages.Act]) -> None:
         """What the agents say they heard must be what the medium says it delivered, message by message."""
         for agent, act in acts.items():
             self.uninstructed += abs(journal.handed[agent - 1] - (act.heard - self._heard[agent]))
@@ -194,15 +195,15 @@ def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
     brief = supervisor.brief(WorldBrief)
-    from world.logbook import Logbook  # takes a second to import: the lifeline is to be watched by then
+    from world.recording.logbook import RunWriter  # takes a second to import: the lifeline is to be watched by then
 
     out = Path(brief.out)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
-        theatre = Theatre(session, supervisor, brief)
+        theatre = WorldNode(session, supervisor, brief)
         last: list[Callable[[], None]] = []
         with (
             system_errors.afterwards(lambda: [step() for step in last]),
-            Logbook(out, brief.run, brief.world, brief.channels, brief.books) as logbook,
+            RunWriter(out, brief.run, brief.world, brief.channels, brief.books) as logbook,
         ):
             theatre.await_everybody()
             supervisor.tell("ready")

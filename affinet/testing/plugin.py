@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from affinet.testing.swarm import Hangar
+    from affinet.testing.swarm import SwarmRuns
 
 _SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
 _RUNTIMES = ("inprocess", "processes")
 _MOST = 2**64  # seeds are below
-_HANGAR: pytest.StashKey[Hangar] = pytest.StashKey()
+_HANGAR: pytest.StashKey[SwarmRuns] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -73,14 +73,14 @@ def _right(name: str) -> str:
 
 
 @pytest.fixture
-def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hangar]:
+def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SwarmRuns]:
     """Builds runs: `swarm("corridor").fault("cut", links=["6-7"], at=2).fly().check(bounded(1.0))`."""
-    from affinet.testing.swarm import Hangar
+    from affinet.testing.swarm import SwarmRuns
 
     mark = request.node.get_closest_marker(_RUNTIME)
     runtime = mark.args[0] if mark else request.config.getoption("--affinet-runtime")
     seed = getattr(request, "param", None)
-    hangar = Hangar(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"), request.path.parent)
+    hangar = SwarmRuns(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"), request.path.parent)
     request.node.stash[_HANGAR] = hangar
     yield hangar
     if not hangar.failed:
@@ -100,8 +100,8 @@ def pytest_runtest_makereport(
     return report
 
 
-def _kept(hangar: Hangar) -> list[str]:
-    from affinet.directories import on_a_command_line
+def _kept(hangar: SwarmRuns) -> list[str]:
+    from affinet.runtimes.directories import on_a_command_line
 
     try:
         return [

@@ -12,10 +12,10 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from affinet.blueprint import formation_of
-from affinet.impairments import presets
-from affinet.sections import Scenario
-from netem.links import Links
+from affinet.planning.blueprint import formation_of
+from affinet.scenario.profiles import presets
+from affinet.scenario.sections import Scenario
+from netem.core.links import Links
 
 Entry = dict[str, Any]
 Entries = list[Entry]

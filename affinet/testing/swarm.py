@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from affinet import plan as planning
-from affinet import scenario as scenarios
-from affinet.checking import Checker
-from affinet.evidence import Evidence
-from affinet.outcome import Verdict
-from affinet.plan import Plan
-from affinet.run import Runtime, evidence, fly, rehearse
-from affinet.sections import Scenario
-from netem.user_code import UserCodeError
+from affinet.planning import plan as planning
+from affinet.planning.plan import Plan
+from affinet.runtimes.run import Runtime, evidence, fly, rehearse
+from affinet.scenario import loading as scenarios
+from affinet.scenario.sections import Scenario
+from affinet.verdicts.checking import Checker
+from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.outcome import Verdict
+from netem.processes.user_code import UserCodeError
 
 _KEPT = 4
 
@@ -27,10 +27,10 @@ class Broken(AssertionError):
     """A run, or what was checked of it, did not come out as the test expects."""
 
 
-class Flown(Evidence):
+class FlownRun(Evidence):
     """A run that was flown: its arrays, and its faults with what they touched."""
 
-    def check(self, *checkers: Checker) -> Flown:
+    def check(self, *checkers: Checker) -> FlownRun:
         """Nothing if every checker passes; one that is vacuous proves nothing, and fails.
 
         Raises
@@ -58,7 +58,7 @@ class Swarm:
     """
 
     scenario: Scenario
-    launch: Callable[[Plan], Flown]
+    launch: Callable[[Plan], FlownRun]
 
     def fault(self, verb: str, **keys: Any) -> Swarm:
         """The same run with one more entry in its timeline: the keys are those of a scenario file (docs/scenario.md).
@@ -70,7 +70,7 @@ class Swarm:
         """
         return replace(self, scenario=scenarios.extended(self.scenario, [{"verb": verb} | keys]))
 
-    def fly(self, verdict: Verdict = "pass") -> Flown:
+    def fly(self, verdict: Verdict = "pass") -> FlownRun:
         """Fly it.
 
         Parameters
@@ -96,7 +96,7 @@ class Swarm:
         return flown
 
 
-class Hangar:
+class SwarmRuns:
     """The runs of one test: it flies them, and keeps what a failure needs.
 
     Parameters
@@ -141,11 +141,11 @@ class Hangar:
         for room in self._rooms:
             shutil.rmtree(room)
 
-    def _launch(self, plan: Plan) -> Flown:
+    def _launch(self, plan: Plan) -> FlownRun:
         if self.runtime == "inprocess":
             self._flown.append((plan, None))
             rehearsed = rehearse(plan)
-            return Flown(plan, rehearsed.arrays, rehearsed.outcome)
+            return FlownRun(plan, rehearsed.arrays, rehearsed.outcome)
         self._rooms.append(self._room())
         out = self._rooms[-1] / "run"
         self._flown.append((plan, out))
@@ -155,7 +155,7 @@ class Hangar:
             raise Broken("; ".join(done.reasons))
         if landed is None:
             raise Broken(f"the run left nothing: {'; '.join(done.reasons)}")
-        return Flown(plan, landed.arrays, done)
+        return FlownRun(plan, landed.arrays, done)
 
     def _recorded(self, plan: Plan) -> Path:
         out = self._room() / "run"

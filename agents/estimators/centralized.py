@@ -1,4 +1,4 @@
-"""An agent's end of the centralized filter: it takes its edges as the centre tells them (`agents/centre.py`)."""
+"""An agent's end of the centralized filter: it takes its edges as the centre tells them (`agents/centre/filter.py`)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
-from agents.estimators.inputs import refuse_accelerations
-from netem.channels import CENTRE, INPUT
+from agents.algebra.inputs import refuse_accelerations
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import CENTRE, INPUT
 
 
-class Nothing(NamedTuple):
+class Stateless(NamedTuple):
     """It remembers nothing: the centre does."""
 
 
@@ -37,27 +40,27 @@ class CentralizedFilter:
         """Nothing."""
         return {}
 
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Stateless:  # noqa: ARG002
         """Nothing to remember."""
-        return Nothing()
+        return Stateless()
 
     def sense(
         self,
         brief: Brief,  # noqa: ARG002
-        state: Nothing,
+        state: Stateless,
         measured: Array,  # noqa: ARG002
         seen: Mask,  # noqa: ARG002
-    ) -> tuple[Nothing, Mapping[str, Fields]]:
+    ) -> tuple[Stateless, Mapping[str, Fields]]:
         """What is measured goes to the centre with every agent's measurements."""
         return state, {}
 
     def fuse(
         self,
         brief: Brief,
-        state: Nothing,
+        state: Stateless,
         heard: Mapping[str, Heard],
         own: Own,  # noqa: ARG002
-    ) -> tuple[Nothing, Estimate]:
+    ) -> tuple[Stateless, Estimate]:
         """What the centre tells."""
         refuse_accelerations(heard[INPUT])
         told = heard[CENTRE].fields

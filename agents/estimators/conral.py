@@ -16,12 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import geometry
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
-from agents.estimators.constraints import MAPS, Constraint
+from agents.algebra import geometry
+from agents.algebra.constraints import MAPS, Constraint
+from agents.brief import Brief, Own
+from agents.estimate import Estimate
 from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
-from netem.channels import THETA
+from agents.exchange import Channels, Field, Fields, Heard
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import THETA
 
 
 class Agreement(NamedTuple):

@@ -12,20 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import inputs, kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
-from agents.estimators.blocks import diagonal_blocks
-from agents.estimators.geometry import identity
-from netem.channels import INPUT
+from agents.algebra import inputs, kalman
+from agents.algebra.blocks import diagonal_blocks
+from agents.algebra.geometry import identity
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import INPUT
 
 
-class Edges(NamedTuple):
+class EdgeStates(NamedTuple):
     """The filters: mean (..., n, D), covariance (..., n, D, D), the neighbours' inputs, and what was measured in this tick."""
 
     mean: Array
     covariance: Array
-    flown: inputs.Flown
+    flown: inputs.NeighbourInputs
     measured: Array
     seen: Mask
 
@@ -57,11 +60,11 @@ class EdgeKalmanFilter:
         """Nothing beyond the inputs that every agent broadcasts."""
         return {}
 
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> Edges:
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> EdgeStates:
         """Everybody at the same place, as far as is known (5a)."""
         shape = (*batch, brief.relative.shape[-2])
         prior = 2.0 * self.prior_position * self.prior_position * identity(brief.dimension)
-        return Edges(
+        return EdgeStates(
             mean=np.zeros((*shape, brief.dimension)),
             covariance=np.broadcast_to(prior, (*shape, *prior.shape)).copy(),
             flown=inputs.at_rest(shape, brief.dimension, len(self.coefficients)),
@@ -72,14 +75,16 @@ class EdgeKalmanFilter:
     def sense(
         self,
         brief: Brief,  # noqa: ARG002
-        state: Edges,
+        state: EdgeStates,
         measured: Array,
         seen: Mask,
-    ) -> tuple[Edges, Mapping[str, Fields]]:
+    ) -> tuple[EdgeStates, Mapping[str, Fields]]:
         """Keep the measurements until it is known how the edges have moved."""
         return state._replace(measured=measured, seen=seen), {}
 
-    def fuse(self, brief: Brief, state: Edges, heard: Mapping[str, Heard], own: Own) -> tuple[Edges, Estimate]:
+    def fuse(
+        self, brief: Brief, state: EdgeStates, heard: Mapping[str, Heard], own: Own
+    ) -> tuple[EdgeStates, Estimate]:
         """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g)."""
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last

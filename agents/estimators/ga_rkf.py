@@ -13,13 +13,16 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Estimator, Fields, Heard
+from agents.algebra.constraints import Constraint
+from agents.algebra.geometry import identity
+from agents.brief import Brief, Own
+from agents.estimate import Estimate
+from agents.estimators.base import Estimator
 from agents.estimators.conral import Agreement, ConsensusLocalization
-from agents.estimators.constraints import Constraint
-from agents.estimators.geometry import identity
 from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.arrays import Array, Mask
 
 
 class Fusion(NamedTuple):

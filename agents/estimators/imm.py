@@ -14,12 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
-from agents.estimators.small import determinant, inverse
-from analysis.algebra import product
-from analysis.elementary import exp, log
+from agents.algebra import kalman
+from agents.algebra.small import determinant, inverse
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.algebra import product
+from analysis.models.arrays import Array, Mask
+from analysis.models.elementary import exp, log
 
 
 class Modes(NamedTuple):

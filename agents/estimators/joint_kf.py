@@ -12,13 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import inputs
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
-from agents.estimators.blocks import block_diagonal, diagonal_blocks
-from agents.estimators.geometry import identity
-from analysis.algebra import product
-from netem.channels import INPUT
+from agents.algebra import inputs
+from agents.algebra.blocks import block_diagonal, diagonal_blocks
+from agents.algebra.geometry import identity
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.algebra import product
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import INPUT
 
 
 class Joint(NamedTuple):
@@ -26,7 +29,7 @@ class Joint(NamedTuple):
 
     mean: Array
     covariance: Array
-    flown: inputs.Flown
+    flown: inputs.NeighbourInputs
     measured: Array
     seen: Mask
 

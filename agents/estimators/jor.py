@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_edges
-from agents.estimators.geometry import identity
-from agents.estimators.small import inverse
-from analysis.algebra import product, sum_over
-from netem.channels import PLACE
+from agents.algebra.geometry import identity
+from agents.algebra.small import inverse
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_edges
+from agents.exchange import Channels, Field, Fields, Heard
+from analysis.models.algebra import product, sum_over
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import PLACE
 
 
 class Side(NamedTuple):

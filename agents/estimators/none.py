@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.arrays import Array, Mask
 
 
-class Measured(NamedTuple):
+class LastMeasured(NamedTuple):
     """The measurements of this tick: relative positions (..., n, D) and which edges were seen (..., n)."""
 
     measured: Array
@@ -27,28 +29,28 @@ class NoEstimator:
         """Nothing."""
         return {}
 
-    def init(self, brief: Brief, batch: tuple[int, ...]) -> Measured:
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastMeasured:
         """Nothing measured yet."""
         shape = (*batch, brief.relative.shape[-2])
-        return Measured(np.zeros((*shape, brief.dimension)), np.zeros(shape, dtype=bool))
+        return LastMeasured(np.zeros((*shape, brief.dimension)), np.zeros(shape, dtype=bool))
 
     def sense(
         self,
         brief: Brief,  # noqa: ARG002
-        state: Measured,  # noqa: ARG002
+        state: LastMeasured,  # noqa: ARG002
         measured: Array,
         seen: Mask,
-    ) -> tuple[Measured, Mapping[str, Fields]]:
+    ) -> tuple[LastMeasured, Mapping[str, Fields]]:
         """Remember this tick's measurements."""
-        return Measured(measured, seen), {}
+        return LastMeasured(measured, seen), {}
 
     def fuse(
         self,
         brief: Brief,
-        state: Measured,
+        state: LastMeasured,
         heard: Mapping[str, Heard],  # noqa: ARG002
         own: Own,  # noqa: ARG002
-    ) -> tuple[Measured, Estimate]:
+    ) -> tuple[LastMeasured, Estimate]:
         """The measurements."""
         covariance = brief.sensor.spread(state.measured)
         return state, Estimate(state.measured, state.seen, covariance, no_indicator(state.seen))

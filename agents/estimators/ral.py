@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import geometry
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard
-from agents.estimators.constraints import MAPS, Constraint
-from netem.channels import THETA
+from agents.algebra import geometry
+from agents.algebra.constraints import MAPS, Constraint
+from agents.brief import Brief, Own
+from agents.estimate import Estimate
+from agents.exchange import Channels, Field, Fields, Heard
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import THETA
 
 
 class Perceived(NamedTuple):

@@ -11,9 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
+from agents.algebra import kalman
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.arrays import Array, Mask
 
 
 class Tracks(NamedTuple):

@@ -13,14 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators import inputs, kalman
-from agents.estimators.base import Channels, Estimate, Fields, Heard, no_indicator, refuse_negative
+from agents.algebra import inputs, kalman
+from agents.algebra.geometry import identity
+from agents.algebra.small import inverse
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import refuse_negative
 from agents.estimators.edge_kf import of_edges
-from agents.estimators.geometry import identity
-from agents.estimators.small import inverse
-from analysis.algebra import product, sum_over
-from netem.channels import INPUT
+from agents.exchange import Channels, Fields, Heard
+from analysis.models.algebra import product, sum_over
+from analysis.models.arrays import Array, Mask
+from netem.core.channels import INPUT
 
 
 class Past(NamedTuple):

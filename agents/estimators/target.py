@@ -13,18 +13,19 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents.brief import Array, Brief, Mask, Own
-from agents.estimators.base import Channels, Estimate, Field, Fields, Heard, no_edges
-from agents.estimators.prediction import Prediction, carried, predicted
-from agents.estimators.redcho import Consensus
-from analysis import jets
-from analysis.algebra import product, sum_over
-from analysis.elementary import whole_power
-from analysis.information import numbers, packed, position_jet, unpacked
-from analysis.pursuit import Target, diffusion, transition
-from analysis.unsuited import Unsuited
-from netem.channels import TARGET
-from netem.links import Integers
+from agents.algebra.prediction import Prediction, carried, predicted
+from agents.algebra.redcho import Consensus
+from agents.brief import Brief, Own
+from agents.estimate import Estimate, no_edges
+from agents.exchange import Channels, Field, Fields, Heard
+from analysis.models import jets
+from analysis.models.algebra import product, sum_over
+from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.elementary import whole_power
+from analysis.models.information import numbers, packed, position_jet, unpacked
+from analysis.models.pursuit import Target, diffusion, transition
+from analysis.models.unsuited import Unsuited
+from netem.core.channels import TARGET
 
 _SUREST, _LEAST_SURE = 1e-3, 1e3  # standard deviations whose information can be inverted side by side
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller

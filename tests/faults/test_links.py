@@ -2,7 +2,15 @@
 
 import pytest
 
-from affinet.checkers import agreement, always, bounded, converged, error_below, never_heard_across_a_cut, recovers
+from affinet.verdicts.checkers import (
+    agreement,
+    always,
+    bounded,
+    converged,
+    error_below,
+    never_heard_across_a_cut,
+    recovers,
+)
 
 COARSE = "time.dt=0.05"
 FILTER_ALONE = "agents.estimator=rkf"

@@ -51,7 +51,10 @@ def tried(minor: int, interpreter: Path) -> str | None:
     with tempfile.TemporaryDirectory() as folder:
         steps: dict[str, list[str | Path]] = {
             "environment": [interpreter, "-m", "venv", environment],
-            "set-up": [ROOT / ".venv/bin/uv", "sync", "--locked", "--quiet", "--python", programs / "python"],
+            "set-up": [
+                *(ROOT / ".venv/bin/uv", "sync", "--locked", "--quiet", "--compile-bytecode"),
+                *("--python", programs / "python"),
+            ],
             "demo": [programs / "affinet", "run", "corridor", "--duration", "1", "--out", f"{folder}/run"],
             "tests": [programs / "pytest", "-n", "0", "-q", *TESTS],
         }

@@ -5,10 +5,10 @@ import sys
 
 import zenoh
 
-from agents.process import AgentBrief, Node
-from netem.keys import Keys
-from netem.session import client
-from netem.supervised import Supervisor
+from agents.process import AgentBrief, AgentNode
+from netem.processes.supervised import Supervisor
+from netem.wire.keys import Keys
+from netem.wire.session import client
 
 PEERS = range(1, 11)
 
@@ -18,7 +18,7 @@ def main() -> None:
     brief = supervisor.brief(AgentBrief)
     keys = Keys(brief.run)
     with zenoh.open(client(brief.login)) as session, zenoh.open(client(brief.login)) as side:
-        node = Node(session, supervisor, brief)
+        node = AgentNode(session, supervisor, brief)
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
         private = [key for peer in PEERS for key in (keys.inbox(peer), keys.told(peer))]
         inboxes = [side.declare_subscriber(key, zenoh.handlers.FifoChannel(10_000)) for key in private]

@@ -6,14 +6,14 @@ import time
 
 import zenoh
 
-from agents.process import AgentBrief, Node
-from netem.session import client
-from netem.supervised import Supervisor
+from agents.process import AgentBrief, AgentNode
+from netem.processes.supervised import Supervisor
+from netem.wire.session import client
 
 TICK = 4
 
 
-class Wayward(Node):
+class Wayward(AgentNode):
     def __init__(self, session, supervisor, brief, wrong):
         super().__init__(session, supervisor, brief)
         self.wrong = wrong

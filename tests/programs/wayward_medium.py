@@ -1,6 +1,6 @@
 """The medium as it should be, but that it says of one message more than there was that it arrived late."""
 
-from netem.medium import Medium
+from netem.medium.medium import Medium
 from netem.process import main
 
 TICK = 4

@@ -6,30 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 from briefs import BRIEF
 
-from agents import agent, controllers, second_order
-from agents.centre import Centre, Whole
-from agents.estimators import (
-    base,
-    blocks,
-    constraints,
-    edge_kf,
-    geometry,
-    inputs,
-    joint_kf,
-    kalman,
-    prediction,
-    ral,
-    redcho,
-    small,
-)
-from agents.estimators.base import Estimate, Heard
-from agents.estimators.geometry import Fit
-from agents.estimators.none import Measured
-from agents.estimators.prediction import Prediction
+from agents import agent, estimate
+from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small
+from agents.algebra.geometry import Fit
+from agents.algebra.prediction import Prediction
+from agents.centre.filter import Centre, Whole
+from agents.estimate import Estimate
+from agents.estimators import edge_kf, joint_kf, ral
+from agents.estimators.none import LastMeasured
 from agents.estimators.rkf import EdgeFilters, Tracks
-from analysis.affine import Manoeuvre
-from analysis.pursuit import Target
-from analysis.sensor import Sensor
+from agents.exchange import Heard
+from agents.laws import base, leaders
+from analysis.models.affine import Manoeuvre
+from analysis.models.pursuit import Target
+from analysis.models.sensor import Sensor
 from rows.case import covariance, of, real, share, truth, whole
 
 NEIGHBOURS = 9  # sums of more than eight numbers take another path
@@ -77,60 +67,65 @@ def _completed(relative, known, measured, seen, theta, spread):
 CASES = {
     "agents.agent.chosen": of(agent.chosen, truth(), real(9, 2), real(9, 2)),
     "agents.agent.renew": of(
-        lambda new, one, other: agent.renew(Measured(one, one), Measured(other, one), new), truth(), real(9), real(9)
+        lambda new, one, other: agent.renew(LastMeasured(one, one), LastMeasured(other, one), new),
+        truth(),
+        real(9),
+        real(9),
     ),
     "agents.brief.Brief.degree": of(lambda stress: replace(BRIEF, stress=stress).degree, real(NEIGHBOURS)),
-    "agents.centre.Centre.step": of(
+    "agents.centre.filter.Centre.step": of(
         lambda position, spread, measured, seen, flown: CENTRE.step(Whole(position, spread), measured, seen, flown),
         *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
     ),
-    "agents.controllers.weighted": of(controllers.weighted, real(NEIGHBOURS), real(NEIGHBOURS, 2)),
-    "agents.controllers.stress_force": of(
-        lambda stress, relative, known: controllers.stress_force(_brief(stress=stress), _estimate(relative, known)),
+    "agents.laws.base.weighted": of(base.weighted, real(NEIGHBOURS), real(NEIGHBOURS, 2)),
+    "agents.laws.base.stress_force": of(
+        lambda stress, relative, known: base.stress_force(_brief(stress=stress), _estimate(relative, known)),
         *(real(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
-    "agents.controllers.hold_distances": of(
-        lambda p, leads, relative, known: controllers.hold_distances(
+    "agents.laws.leaders.hold_distances": of(
+        lambda p, leads, relative, known: leaders.hold_distances(
             _brief(relative=p, leads=leads), 0.7, _estimate(relative, known)
         ),
         *(real(NEIGHBOURS, 2), truth(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
-    "agents.controllers.pilot": of(
-        lambda nominal, k, position: controllers.pilot(_brief(nominal=nominal), MANOEUVRE, 0.7, k, position),
+    "agents.laws.leaders.pilot": of(
+        lambda nominal, k, position: leaders.pilot(_brief(nominal=nominal), MANOEUVRE, 0.7, k, position),
         *(real(2), whole(20), real(2)),
     ),
-    "agents.second_order.pilot": of(
-        lambda nominal, k, position, velocity: second_order.pilot(
+    "agents.laws.leaders.pilot_of_accelerations": of(
+        lambda nominal, k, position, velocity: leaders.pilot_of_accelerations(
             _brief(nominal=nominal), MANOEUVRE, 0.7, k, position, velocity
         ),
         *(real(2), whole(20), real(2), real(2)),
     ),
-    "agents.controllers.saturated": of(lambda command: controllers.saturated(command, 2.0), real(3), rows=300),
-    "agents.estimators.base.Estimate.spread": of(
+    "agents.laws.leaders.saturated": of(lambda command: leaders.saturated(command, 2.0), real(3), rows=300),
+    "agents.estimate.Estimate.spread": of(
         lambda relative, known, spread: _estimate(relative, known, spread).spread,
         *(real(NEIGHBOURS, 3), truth(NEIGHBOURS), covariance(NEIGHBOURS, 3, 3)),
     ),
-    "agents.estimators.base.no_edges": of(lambda slots: base.no_edges(slots, 2, {}), truth(NEIGHBOURS)),
-    "agents.estimators.base.no_indicator": of(base.no_indicator, truth(NEIGHBOURS)),
-    "agents.estimators.blocks.block_diagonal": of(blocks.block_diagonal, real(NEIGHBOURS, 2, 2)),
-    "agents.estimators.blocks.diagonal_blocks": of(lambda matrix: blocks.diagonal_blocks(matrix, 2), real(18, 18)),
+    "agents.estimate.no_edges": of(lambda slots: estimate.no_edges(slots, 2, {}), truth(NEIGHBOURS)),
+    "agents.estimate.no_indicator": of(estimate.no_indicator, truth(NEIGHBOURS)),
+    "agents.algebra.blocks.block_diagonal": of(blocks.block_diagonal, real(NEIGHBOURS, 2, 2)),
+    "agents.algebra.blocks.diagonal_blocks": of(lambda matrix: blocks.diagonal_blocks(matrix, 2), real(18, 18)),
     "agents.estimators.edge_kf.of_edges": of(
         lambda process: edge_kf.of_edges(_brief(process=process, dimension=2)), real(18, 18)
     ),
-    "agents.estimators.geometry.gram": of(geometry.gram, real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
-    "agents.estimators.geometry.inverse_gram": of(geometry.inverse_gram, covariance(2, 2), truth()),
-    "agents.estimators.geometry.apply": of(geometry.apply, real(2, 2), real(NEIGHBOURS, 2)),
-    "agents.estimators.geometry.total": of(geometry.total, truth(NEIGHBOURS), real(NEIGHBOURS, 2, 2)),
-    "agents.estimators.geometry.indicator": of(
+    "agents.algebra.geometry.gram": of(geometry.gram, real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.algebra.geometry.inverse_gram": of(geometry.inverse_gram, covariance(2, 2), truth()),
+    "agents.algebra.geometry.apply": of(geometry.apply, real(2, 2), real(NEIGHBOURS, 2)),
+    "agents.algebra.geometry.total": of(geometry.total, truth(NEIGHBOURS), real(NEIGHBOURS, 2, 2)),
+    "agents.algebra.geometry.indicator": of(
         lambda theta, gram, theirs, counts: geometry.indicator(_fit(theta, gram), theirs, counts),
         *(real(2, 2), covariance(2, 2), real(NEIGHBOURS, 2, 2), truth(NEIGHBOURS)),
     ),
-    "agents.estimators.inputs.Flown.last": of(
-        lambda flown, spread: inputs.Flown(flown, spread).last, real(NEIGHBOURS, 2, 2), covariance(NEIGHBOURS, 2, 2, 2)
+    "agents.algebra.inputs.NeighbourInputs.last": of(
+        lambda flown, spread: inputs.NeighbourInputs(flown, spread).last,
+        real(NEIGHBOURS, 2, 2),
+        covariance(NEIGHBOURS, 2, 2, 2),
     ),
-    "agents.estimators.inputs.hear": of(
+    "agents.algebra.inputs.hear": of(
         lambda flown, spread, velocity, fresh: inputs.hear(
-            inputs.Flown(flown, spread), Heard({"velocity": velocity}, fresh), np.linspace(0.5, -0.3, 9), 0.2
+            inputs.NeighbourInputs(flown, spread), Heard({"velocity": velocity}, fresh), np.linspace(0.5, -0.3, 9), 0.2
         ),
         *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 2, 2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
@@ -138,18 +133,18 @@ CASES = {
         joint_kf.corrected,
         *(real(NEIGHBOURS, 2), covariance(18, 18), real(NEIGHBOURS, 2), covariance(18, 18), truth(NEIGHBOURS)),
     ),
-    "agents.estimators.kalman.predict": of(
+    "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)
     ),
-    "agents.estimators.kalman.correct": of(
+    "agents.algebra.kalman.correct": of(
         lambda mean, spread, seen, usable: kalman.correct(mean, spread, seen, NOISE, usable),
         *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
-    "agents.estimators.prediction.carried": of(
+    "agents.algebra.prediction.carried": of(
         lambda mean, spread, s: prediction.carried(TARGET, Prediction(mean, spread, None), s),
         *(real(3, 2), covariance(3, 3), share()),
     ),
-    "agents.estimators.prediction.predicted": of(
+    "agents.algebra.prediction.predicted": of(
         lambda mean, spread, made, now: prediction.predicted(TARGET, Prediction(mean, spread, made), now, 0.013),
         *(real(3, 2), covariance(3, 3), whole(50), whole(99)),
         out=1,
@@ -175,20 +170,20 @@ CASES = {
         lambda mean, spread, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, known), known[..., 0]),
         *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), truth(NEIGHBOURS)),
     ),
-    "agents.estimators.redcho.Consensus.outputs": of(CONSENSUS.outputs, real(4, 9, axis=1), real(4, 9), out=1),
-    "agents.estimators.redcho.Consensus.step": of(
+    "agents.algebra.redcho.Consensus.outputs": of(CONSENSUS.outputs, real(4, 9, axis=1), real(4, 9), out=1),
+    "agents.algebra.redcho.Consensus.step": of(
         lambda internal, own, theirs: CONSENSUS.step(internal, own, theirs, 0.013),
         *(real(4, 9), real(9), real(NEIGHBOURS, 9)),
     ),
     **{
-        f"agents.estimators.small.{function.__name__} ({dimension})": of(
+        f"agents.algebra.small.{function.__name__} ({dimension})": of(
             function, covariance(dimension, dimension), rows=100
         )
         for function in (small.determinant, small.inverse, small.rotation, small.triangle)
         for dimension in (2, 3)
     },
     **{
-        f"agents.estimators.{what} ({dimension})": case
+        f"agents.algebra.{what} ({dimension})": case
         for dimension in (2, 3)
         for what, case in {
             "geometry.regular": of(geometry.regular, covariance(dimension, dimension)),

@@ -2,20 +2,8 @@
 
 import numpy as np
 
-from analysis import (
-    affine,
-    algebra,
-    consistency,
-    elementary,
-    graph,
-    indicator,
-    information,
-    jets,
-    localization,
-    metrics,
-    pursuit,
-    sensor,
-)
+from analysis.metrics import consistency, errors, indicator, localization
+from analysis.models import affine, algebra, elementary, graph, information, jets, pursuit, sensor
 from rows.case import covariance, of, real, share, truth, whole
 
 MANY = 500  # numbers that round apart once in a thousand times
@@ -42,27 +30,27 @@ def _of_edges(function):
 
 
 CASES = {
-    "analysis.elementary.whole_power": of(lambda x: elementary.whole_power(x, 3), real(), rows=MANY),
-    "analysis.elementary.whole_powers": of(lambda x: elementary.whole_powers(x, 4), real(), rows=MANY),
-    "analysis.elementary.power": of(elementary.power, share(), real(), rows=MANY),
-    "analysis.elementary.hypot": of(elementary.hypot, real(), real(), rows=MANY),
-    "analysis.elementary.exp": of(elementary.exp, real(), rows=MANY),
-    "analysis.elementary.expm1": of(elementary.expm1, real(), rows=MANY),
-    "analysis.elementary.log": of(elementary.log, share(), rows=MANY),
-    "analysis.elementary.sin": of(elementary.sin, real(), rows=MANY),
-    "analysis.elementary.cos": of(elementary.cos, real(), rows=MANY),
-    "analysis.elementary.arctan2": of(elementary.arctan2, real(), real(), rows=MANY),
-    "analysis.algebra.product": of(algebra.product, real(9, 9), real(9, 9), real(9, 2)),
-    "analysis.algebra.sum_over": of(lambda x: algebra.sum_over(x, -1), real(3, 19)),
-    "analysis.jets.power": of(lambda x, rate: jets.power(x, 3, rate, 3), share(), real(), rows=4000, out=1),
-    "analysis.jets.times": of(jets.times, real(3, 3, 3, axis=1), real(3, 3, 2, axis=1), out=1),
-    "analysis.jets.scaled": of(jets.scaled, real(3, axis=1), real(3, 3, 2, axis=1), out=1),
-    "analysis.jets.inverse": of(jets.inverse, covariance(3, 3, 3, axis=1), out=1),
-    "analysis.jets.quotient": of(jets.quotient, real(3, axis=1), real(3, axis=1), rows=MANY, out=1),
-    "analysis.pursuit.transition": of(lambda s: pursuit.transition(4, s), share(), rows=MANY),
-    "analysis.pursuit.diffusion": of(lambda s: pursuit.diffusion(4, s, 0.7), share(), rows=MANY),
+    "analysis.models.elementary.whole_power": of(lambda x: elementary.whole_power(x, 3), real(), rows=MANY),
+    "analysis.models.elementary.whole_powers": of(lambda x: elementary.whole_powers(x, 4), real(), rows=MANY),
+    "analysis.models.elementary.power": of(elementary.power, share(), real(), rows=MANY),
+    "analysis.models.elementary.hypot": of(elementary.hypot, real(), real(), rows=MANY),
+    "analysis.models.elementary.exp": of(elementary.exp, real(), rows=MANY),
+    "analysis.models.elementary.expm1": of(elementary.expm1, real(), rows=MANY),
+    "analysis.models.elementary.log": of(elementary.log, share(), rows=MANY),
+    "analysis.models.elementary.sin": of(elementary.sin, real(), rows=MANY),
+    "analysis.models.elementary.cos": of(elementary.cos, real(), rows=MANY),
+    "analysis.models.elementary.arctan2": of(elementary.arctan2, real(), real(), rows=MANY),
+    "analysis.models.algebra.product": of(algebra.product, real(9, 9), real(9, 9), real(9, 2)),
+    "analysis.models.algebra.sum_over": of(lambda x: algebra.sum_over(x, -1), real(3, 19)),
+    "analysis.models.jets.power": of(lambda x, rate: jets.power(x, 3, rate, 3), share(), real(), rows=4000, out=1),
+    "analysis.models.jets.times": of(jets.times, real(3, 3, 3, axis=1), real(3, 3, 2, axis=1), out=1),
+    "analysis.models.jets.scaled": of(jets.scaled, real(3, axis=1), real(3, 3, 2, axis=1), out=1),
+    "analysis.models.jets.inverse": of(jets.inverse, covariance(3, 3, 3, axis=1), out=1),
+    "analysis.models.jets.quotient": of(jets.quotient, real(3, axis=1), real(3, axis=1), rows=MANY, out=1),
+    "analysis.models.pursuit.transition": of(lambda s: pursuit.transition(4, s), share(), rows=MANY),
+    "analysis.models.pursuit.diffusion": of(lambda s: pursuit.diffusion(4, s, 0.7), share(), rows=MANY),
     **{
-        f"analysis.sensor.Sensor.{what} ({name})": of(function, *arguments)
+        f"analysis.models.sensor.Sensor.{what} ({name})": of(function, *arguments)
         for name, one in SENSORS.items()
         for dimension in [3 if one.covariance.shape[-1] == 3 else 2]
         for what, function, arguments in (
@@ -70,71 +58,75 @@ CASES = {
             ("spread", one.spread, (real(9, dimension),)),
         )
     },
-    "analysis.sensor.moments": of(lambda polar: sensor.moments(polar, np.array([0.1, 0.2, 0.3])), real(9, 3)),
-    "analysis.affine.Manoeuvre.target": of(lambda p: MANOEUVRE.target(3, p), real(9, 2)),
-    "analysis.affine.Manoeuvre.velocity": of(lambda k, p: MANOEUVRE.velocity(k, p, 0.1), whole(20), real(2)),
-    "analysis.affine.Manoeuvre.acceleration": of(lambda k, p: MANOEUVRE.acceleration(k, p, 0.1), whole(20), real(2)),
-    "analysis.consistency.of_errors": of(
+    "analysis.models.sensor.moments": of(lambda polar: sensor.moments(polar, np.array([0.1, 0.2, 0.3])), real(9, 3)),
+    "analysis.models.affine.Manoeuvre.target": of(lambda p: MANOEUVRE.target(3, p), real(9, 2)),
+    "analysis.models.affine.Manoeuvre.velocity": of(lambda k, p: MANOEUVRE.velocity(k, p, 0.1), whole(20), real(2)),
+    "analysis.models.affine.Manoeuvre.acceleration": of(
+        lambda k, p: MANOEUVRE.acceleration(k, p, 0.1), whole(20), real(2)
+    ),
+    "analysis.metrics.consistency.of_errors": of(
         consistency.of_errors, real(4, 9, 2), real(4, 9, 2), real(4, 9, 3), truth(4, 9)
     ),
-    "analysis.consistency.of_innovations": of(
+    "analysis.metrics.consistency.of_innovations": of(
         consistency.of_innovations,
         *(real(4, 9, 2), real(4, 9, 2), share(4, 9, 3), covariance(4, 9, 2, 2), truth(4, 9)),
     ),
-    "analysis.consistency.band": of(lambda number: consistency.band(0.9, 2, number), whole(99)),
-    "analysis.consistency.nees": of(consistency.nees, real(9, 3), real(9, 6)),
-    "analysis.consistency.whole": of(consistency.whole, real(9, 6)),
-    "analysis.graph.mutual": of(graph.mutual, truth(AGENTS, AGENTS)),
-    "analysis.graph.adjacency": of(lambda heard: graph.adjacency(heard, SRC, DST, AGENTS), truth(11)),
-    "analysis.graph.undirected": of(
+    "analysis.metrics.consistency.band": of(lambda number: consistency.band(0.9, 2, number), whole(99)),
+    "analysis.metrics.consistency.nees": of(consistency.nees, real(9, 3), real(9, 6)),
+    "analysis.metrics.consistency.whole": of(consistency.whole, real(9, 6)),
+    "analysis.models.graph.mutual": of(graph.mutual, truth(AGENTS, AGENTS)),
+    "analysis.models.graph.adjacency": of(lambda heard: graph.adjacency(heard, SRC, DST, AGENTS), truth(11)),
+    "analysis.models.graph.undirected": of(
         lambda heard: graph.undirected(heard, np.r_[SRC, DST], np.r_[DST, SRC], EDGES), truth(22)
     ),
-    "analysis.graph.joint": of(lambda heard: graph.joint(heard, 3), truth(9, 11)),
-    "analysis.graph.age": of(graph.age, whole(9, 9, 11)),
-    "analysis.graph.algebraic_connectivity": of(
+    "analysis.models.graph.joint": of(lambda heard: graph.joint(heard, 3), truth(9, 11)),
+    "analysis.models.graph.age": of(graph.age, whole(9, 9, 11)),
+    "analysis.models.graph.algebraic_connectivity": of(
         graph.algebraic_connectivity, truth(AGENTS, AGENTS), truth(AGENTS, p=0.9)
     ),
-    "analysis.graph.connected": of(graph.connected, truth(AGENTS, AGENTS)),
-    "analysis.graph.rooted": of(lambda heard: graph.rooted(heard, [1, 2]), truth(AGENTS, AGENTS, p=0.2)),
-    "analysis.graph.reached": of(graph.reached, truth(AGENTS, AGENTS, p=0.2)),
-    "analysis.graph.feasible": of(lambda heard: graph.feasible(heard, SRC, DST, NOMINAL), truth(11)),
-    "analysis.graph.grams": of(graph.grams, truth(AGENTS, AGENTS), real(AGENTS, 2)),
-    "analysis.graph.regular": of(graph.regular, covariance(9, 2, 2)),
-    "analysis.graph.stress_dimension": of(lambda up: graph.stress_dimension(up, EDGES, NOMINAL), truth(11)),
-    "analysis.indicator.bounds": of(
+    "analysis.models.graph.connected": of(graph.connected, truth(AGENTS, AGENTS)),
+    "analysis.models.graph.rooted": of(lambda heard: graph.rooted(heard, [1, 2]), truth(AGENTS, AGENTS, p=0.2)),
+    "analysis.models.graph.reached": of(graph.reached, truth(AGENTS, AGENTS, p=0.2)),
+    "analysis.models.graph.feasible": of(lambda heard: graph.feasible(heard, SRC, DST, NOMINAL), truth(11)),
+    "analysis.models.graph.grams": of(graph.grams, truth(AGENTS, AGENTS), real(AGENTS, 2)),
+    "analysis.models.graph.regular": of(graph.regular, covariance(9, 2, 2)),
+    "analysis.models.graph.stress_dimension": of(lambda up: graph.stress_dimension(up, EDGES, NOMINAL), truth(11)),
+    "analysis.metrics.indicator.bounds": of(
         lambda nominal, heard: indicator.bounds(nominal, heard, np.diag([0.1, 0.2])),
         *(real(AGENTS, 2), truth(AGENTS, AGENTS)),
     ),
-    "analysis.information.packed": of(information.packed, covariance(3, 3), real(3, 2)),
-    "analysis.information.unpacked": of(lambda packed: information.unpacked(packed, 2, 3), real(12)),
-    "analysis.information.position": of(
+    "analysis.models.information.packed": of(information.packed, covariance(3, 3), real(3, 2)),
+    "analysis.models.information.unpacked": of(lambda packed: information.unpacked(packed, 2, 3), real(12)),
+    "analysis.models.information.position": of(
         lambda Q, y: information.position(information.packed(Q, y), 2, 3), covariance(3, 3), real(3, 2)
     ),
-    "analysis.information.position_jet": of(
+    "analysis.models.information.position_jet": of(
         information.position_jet, covariance(4, 3, 3, axis=1), real(4, 3, 2, axis=1), out=1
     ),
-    "analysis.localization.together": of(_edges, covariance(5, 5, 2, 2), real(5, 5, 2)),
-    "analysis.localization.weights": _of_edges(localization.weights),
-    "analysis.localization.system": _of_edges(localization.system),
-    "analysis.localization.optimal": _of_edges(localization.optimal),
-    "analysis.localization.spectrum": _of_edges(localization.spectrum),
-    "analysis.localization.centred": of(localization.centred, real(9, 2), covariance(9, 2, 2)),
-    "analysis.localization.centroid": of(localization.centroid, real(9, 2), covariance(9, 2, 2)),
+    "analysis.metrics.localization.together": of(_edges, covariance(5, 5, 2, 2), real(5, 5, 2)),
+    "analysis.metrics.localization.weights": _of_edges(localization.weights),
+    "analysis.metrics.localization.system": _of_edges(localization.system),
+    "analysis.metrics.localization.optimal": _of_edges(localization.optimal),
+    "analysis.metrics.localization.spectrum": _of_edges(localization.spectrum),
+    "analysis.metrics.localization.centred": of(localization.centred, real(9, 2), covariance(9, 2, 2)),
+    "analysis.metrics.localization.centroid": of(localization.centroid, real(9, 2), covariance(9, 2, 2)),
     **{
-        f"analysis.localization.{function.__name__}": of(
+        f"analysis.metrics.localization.{function.__name__}": of(
             lambda place, given, relative, function=function: function(place, _edges(given, relative)),
             *(real(5, 2), covariance(5, 5, 2, 2), real(5, 5, 2)),
         )
         for function in (localization.beside, localization.distance)
     },
-    "analysis.localization.ringing": of(localization.ringing, real(6, 9, 2)),
-    "analysis.metrics.tracking_error": of(metrics.tracking_error, real(AGENTS, 2), real(AGENTS, 2), truth(AGENTS)),
-    "analysis.metrics.root_mean_square": of(metrics.root_mean_square, real(AGENTS, 2), truth(AGENTS)),
-    "analysis.metrics.procrustes_error": of(
-        lambda z, present: metrics.procrustes_error(z, NOMINAL, present), real(AGENTS, 2), truth(AGENTS)
+    "analysis.metrics.localization.ringing": of(localization.ringing, real(6, 9, 2)),
+    "analysis.metrics.errors.tracking_error": of(
+        errors.tracking_error, real(AGENTS, 2), real(AGENTS, 2), truth(AGENTS)
     ),
-    "analysis.metrics.estimation_error": of(
-        metrics.estimation_error, real(AGENTS, 9, 2), real(AGENTS, 9, 2), truth(AGENTS, 9)
+    "analysis.metrics.errors.root_mean_square": of(errors.root_mean_square, real(AGENTS, 2), truth(AGENTS)),
+    "analysis.metrics.errors.procrustes_error": of(
+        lambda z, present: errors.procrustes_error(z, NOMINAL, present), real(AGENTS, 2), truth(AGENTS)
     ),
-    "analysis.metrics.covariance_trace": of(lambda t: metrics.covariance_trace(t, 3), real(AGENTS, 9, 6)),
+    "analysis.metrics.errors.estimation_error": of(
+        errors.estimation_error, real(AGENTS, 9, 2), real(AGENTS, 9, 2), truth(AGENTS, 9)
+    ),
+    "analysis.metrics.errors.covariance_trace": of(lambda t: errors.covariance_trace(t, 3), real(AGENTS, 9, 6)),
 }

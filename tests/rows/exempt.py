@@ -11,61 +11,75 @@ FLOWN = "flies in test_bits.py"
 
 EXEMPT = {
     ONE_MEDIUM: """
-        netem.climate.Climate.begin netem.climate.Climate.rest netem.climate.Climate.judge
-        netem.climate.Climate.bit_draws netem.climate.Climate.draw netem.medium.Verdicted.verdicts netem.medium.Medium.begin
-        netem.medium.Medium.judge netem.medium.Medium.deliver netem.medium.Medium.bit_draws netem.medium.Medium.bias
-        netem.rate.Rate.begin netem.rate.Rate.rest netem.rate.Rate.admit netem.jamming.Zone.jammed netem.trigger.Trigger.fires
-        netem.timeline.Timeline.due netem.timeline.Timeline.clock netem.weather.Forecast.at netem.weather.Forecast.draw
-        netem.draws.Tape.at
+        netem.medium.link_model.LinkModel.begin netem.medium.link_model.LinkModel.rest
+        netem.medium.link_model.LinkModel.judge netem.medium.link_model.LinkModel.bit_draws
+        netem.medium.link_model.LinkModel.draw netem.medium.medium.Verdicted.verdicts
+        netem.medium.medium.Medium.begin netem.medium.medium.Medium.judge netem.medium.medium.Medium.deliver
+        netem.medium.medium.Medium.bit_draws netem.medium.medium.Medium.bias netem.impairments.rate.Rate.begin
+        netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.jamming.Zone.jammed
+        netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
+        netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
+        netem.core.draws.DrawnAhead.at
     """,
     WHOLE: """
-        netem.air.Air.empty netem.air.deliver netem.air.newest_of netem.air.out_of_the_ordinary netem.arrow.named
-        netem.arrow.places netem.cut.severed netem.cut.separated netem.fate.standing netem.fate.doom netem.fate.Ledger.of
-        netem.links.Links.own_number netem.links.Links.ends netem.links.Links.degree netem.links.Links.present
-        netem.links.Links.slots netem.links.Links.neighbours netem.links.Links.back netem.links.Links.touching
-        netem.schedule.round_robin netem.schedule.slotted netem.timeline.Conditions.absent netem.timeline.Conditions.idle
-        netem.timeline.Conditions.still netem.timeline.Conditions.coasting netem.timeline.Timeline.present
-        netem.timeline.Timeline.held netem.weather.Forecast.acts netem.weather.Forecast.on
-        agents.estimators.inputs.refuse_accelerations world.formation.Formation.is_leader world.history.Moments.ticks
-        agents.returned.estimate agents.returned.said netem.broadcasts.fields netem.wire.numbers world.acts.Acts.read
-        world.acts.Acts.beliefs world.sensors.stray world.dynamics.flown world.world.Scene.velocity
-        analysis.sensor.Sensor.common
+        netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
+        netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
+        netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
+        netem.medium.verdict.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
+        netem.core.links.Links.degree netem.core.links.Links.present netem.core.links.Links.slots
+        netem.core.links.Links.neighbours netem.core.links.Links.back netem.core.links.Links.touching
+        netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
+        netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
+        netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
+        netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
+        agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
+        world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
+        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.read world.acts.Acts.beliefs
+        world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
+        analysis.models.sensor.Sensor.common
     """,
     ONE_WORLD: """
-        world.pursued.Pursuit.begin world.pursued.Pursuit.sighting world.pursued.Pursuit.step world.sensors.astray
-        world.world.World.begin world.world.World.target world.world.World.goal world.world.World.sighting
-        world.world.World.measure world.world.World.outliers world.world.World.flown world.world.World.odometry
-        world.world.World.step
+        world.physics.target.MovingTarget.begin world.physics.target.MovingTarget.sighting
+        world.physics.target.MovingTarget.step world.physics.sensors.astray world.physics.world.World.begin
+        world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
+        world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
+        world.physics.world.World.odometry world.physics.world.World.step
     """,
     ONCE: """
-        netem.chain.Chain.stationary netem.chain.Chain.burst_lengths netem.chain.ChainLayer.of netem.text.read
-        netem.trace.from_csv netem.trace.table netem.trace.Measured.over netem.measured.delays netem.journal.carried
-        world.maneuver.narrowest world.maneuver.turned world.stage.origin
-        world.disturbance.Disturbance.between world.stress.incidence world.stress.laplacian
-        world.stress.equilibrium world.stress.solve world.stress.stabilises analysis.cuts.smallest_cut
-        analysis.localization.step analysis.localization.rates analysis.random_graphs.edges analysis.random_graphs.rates
-        analysis.autoregressive.fit
+        netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
+        netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
+        netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
+        netem.impairments.measured.delays netem.medium.journal.carried world.formation.manoeuvre.narrowest
+        world.formation.manoeuvre.turned world.recording.stage.origin world.physics.disturbance.Disturbance.between
+        world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
+        world.formation.stress.solve world.formation.stress.stabilises analysis.models.cuts.smallest_cut
+        analysis.metrics.localization.step analysis.metrics.localization.rates analysis.claims.random_graphs.edges
+        analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
     """,
     WRITTEN: """
-        netem.journal.Writer.write netem.journal.Recorded.verdicts world.history.Vigil.errors
-        world.history.Vigil.see world.history.History.extend world.history.History.arrays world.history.load
-        world.history.digest world.history.one_nan world.localized.FirstMeasurements.of world.localized.FirstMeasurements.tick
-        world.localized.FirstMeasurements.take world.localized.FirstMeasurements.edges world.realised.Realised.stabilised
-        world.realised.Watch.follow world.realised.realise world.stage.points world.stage.scalars analysis.claims.flat
-        analysis.claims.approaches analysis.claims.lower analysis.claims.ratio analysis.claims.stays_below
-        analysis.claims.leaves analysis.claims.exponential analysis.claims.never_above analysis.claims.below_in_mean
-        analysis.claims.within analysis.figures.evolution analysis.figures.rates analysis.figures.indicator
-        analysis.target_figures.agreement
+        netem.medium.journal.Writer.write netem.medium.journal.Recorded.verdicts
+        world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
+        world.books.history.History.extend world.books.history.History.arrays world.books.history.load
+        world.books.history.digest world.books.history.one_nan world.books.localized.FirstMeasurements.of
+        world.books.localized.FirstMeasurements.tick world.books.localized.FirstMeasurements.take
+        world.books.localized.FirstMeasurements.edges world.books.realised.Realised.stabilised
+        world.books.realised.GraphWatch.follow world.books.realised.realise world.recording.stage.points
+        world.recording.stage.scalars analysis.claims.checks.flat analysis.claims.checks.approaches
+        analysis.claims.checks.lower analysis.claims.checks.ratio analysis.claims.checks.stays_below
+        analysis.claims.checks.leaves analysis.claims.checks.exponential analysis.claims.checks.never_above
+        analysis.claims.checks.below_in_mean analysis.claims.checks.within analysis.figures.curves.evolution
+        analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
     """,
     SHAPES: """
-        agents.centre.Centre.begin agents.estimators.geometry.identity agents.estimators.inputs.at_rest
-        agents.estimators.kalman.motion agents.estimators.kalman.embedded agents.estimators.kalman.unknown
+        agents.centre.filter.Centre.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
+        agents.algebra.kalman.motion agents.algebra.kalman.embedded agents.algebra.kalman.unknown
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PROTOCOL: """
-        agents.controllers.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
-        agents.estimators.constraints.Maps.feasible agents.estimators.constraints.Maps.fit
-        agents.estimators.constraints.Maps.nearest agents.estimators.constraints.Maps.covariance
+        agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
+        agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance
     """,
     FLOWN: """
         agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act

@@ -3,14 +3,19 @@
 import numpy as np
 from flying import plan_of
 
-from netem import chain, corrupt, delay, draws, lie, reach
-from netem.draws import Purpose
-from netem.fault import Fault, Verb
-from netem.loss import gilbert_elliott
-from netem.schedule import Schedule
-from netem.trace import Trace
+from netem.core import draws
+from netem.core.draws import Purpose
+from netem.faults import lie
+from netem.faults.fault import Fault, Verb
+from netem.impairments import chain, corrupt, delay, reach
+from netem.impairments.loss import gilbert_elliott
+from netem.impairments.schedule import Schedule
+from netem.impairments.trace import Trace
 from rows.case import covariance, leaves, of, real, share, truth, whole
-from world import disturbance, dynamics, edges, maneuver, noise, sensors, stage
+from world.books import edges
+from world.formation import manoeuvre
+from world.physics import bodies, disturbance, noise, sensors
+from world.recording import stage
 
 LINKS, MANY = 6, 500
 FEW = np.ones(LINKS, dtype=bool)
@@ -32,7 +37,7 @@ THETA, OFFSET = (np.random.default_rng(8).normal(size=(3, *size)) for size in ((
 
 
 def _law(law):
-    return delay.Delay(law, FEW, 0.1, 0.05, np.array([0.01, 0.02, 0.09]), 0.0, False)
+    return delay.MessageDelay(law, FEW, 0.1, 0.05, np.array([0.01, 0.02, 0.09]), 0.0, False)
 
 
 def _plan():
@@ -84,61 +89,70 @@ SLOTS = (10, *_plan().world.links.slots.shape[1:])
 DIRECTED = len(_plan().world.links)
 
 CASES = {
-    **{f"netem.delay.Delay.quantile ({law})": of(_law(law).quantile, share(), rows=MANY) for law in delay.Law},
-    "netem.delay.ticks": of(lambda s: delay.ticks(s, 0.01), share(), rows=MANY),
-    "netem.delay.correlated": of(lambda before, fresh: delay.correlated(before, fresh, 0.7), real(), real(), rows=MANY),
-    "netem.reach.Reach.limit (ramp)": of(
-        reach.Reach(reach.Law.RAMP, FEW, 3.0, 9.0, 2.0, 4.0, 5, True, True).limit, share(LINKS), real(LINKS)
+    **{
+        f"netem.impairments.delay.MessageDelay.quantile ({law})": of(_law(law).quantile, share(), rows=MANY)
+        for law in delay.DelayLaw
+    },
+    "netem.impairments.delay.ticks": of(lambda s: delay.ticks(s, 0.01), share(), rows=MANY),
+    "netem.impairments.delay.correlated": of(
+        lambda before, fresh: delay.correlated(before, fresh, 0.7), real(), real(), rows=MANY
     ),
-    "netem.reach.Reach.limit (log-distance)": of(
-        reach.Reach(reach.Law.LOG_DISTANCE, FEW, 3.0, 9.0, 2.7, 4.0, 5, True, True).limit, share(LINKS), real(LINKS)
+    "netem.impairments.reach.Reach.limit (ramp)": of(
+        reach.Reach(reach.ReachLaw.RAMP, FEW, 3.0, 9.0, 2.0, 4.0, 5, True, True).limit, share(LINKS), real(LINKS)
     ),
-    "netem.reach.squared_distances": of(
+    "netem.impairments.reach.Reach.limit (log-distance)": of(
+        reach.Reach(reach.ReachLaw.LOG_DISTANCE, FEW, 3.0, 9.0, 2.7, 4.0, 5, True, True).limit,
+        share(LINKS),
+        real(LINKS),
+    ),
+    "netem.impairments.reach.squared_distances": of(
         lambda position: reach.squared_distances(NUMBERS - 1, NUMBERS, position), real(LINKS + 1, 3)
     ),
-    "netem.draws.philox": of(_philox, *[whole(2**32)] * 6),
-    "netem.draws.uniform": of(_drawn, whole(999), whole(99)),
-    "netem.chain.ChainLayer.begin": of(CHAINS[2].begin, share(LINKS)),
+    "netem.core.draws.philox": of(_philox, *[whole(2**32)] * 6),
+    "netem.core.draws.uniform": of(_drawn, whole(999), whole(99)),
+    "netem.impairments.chain.ChainLayer.begin": of(CHAINS[2].begin, share(LINKS)),
     **{
-        f"netem.chain.ChainLayer.walk ({states} states)": of(
+        f"netem.impairments.chain.ChainLayer.walk ({states} states)": of(
             layer.walk, whole(2, LINKS), share(9, LINKS, axis=1), out=(1, 0)
         )
         for states, layer in CHAINS.items()
     },
-    "netem.chain.ChainLayer.lost": of(CHAINS[2].lost, whole(2, LINKS), share(LINKS)),
-    "netem.chain.ChainLayer.adds": of(CHAINS[2].adds, whole(2, LINKS)),
-    "netem.corrupt.marks": of(lambda draw: corrupt.marks(np.full((LINKS, 4), 0.2), draw), share(LINKS)),
-    "netem.corrupt.corrupted": of(_at_least_one(corrupt.corrupted, 1), real(9), whole(5), real(), share(2)),
-    "netem.corrupt.corrupted_fields": of(_at_least_one(_corrupted_fields, 1), real(9), whole(5), real(), share(2)),
-    "netem.lie.told": of(lambda theta: lie.told({"theta": theta}, LIAR), real(2, 2)),
-    "netem.schedule.Schedule.closed": of(_at_least_one(SCHEDULE.closed), whole(99)),
-    "netem.trace.Trace.lost": of(_at_least_one(TRACE.lost), whole(20), share(2, LINKS)),
-    "world.disturbance.Kernel.correlation (exponential)": of(KERNELS["exponential"].correlation, real(9, 2)),
-    "world.disturbance.Kernel.correlation (squared-exponential)": of(
+    "netem.impairments.chain.ChainLayer.lost": of(CHAINS[2].lost, whole(2, LINKS), share(LINKS)),
+    "netem.impairments.chain.ChainLayer.adds": of(CHAINS[2].adds, whole(2, LINKS)),
+    "netem.impairments.corrupt.marks": of(lambda draw: corrupt.marks(np.full((LINKS, 4), 0.2), draw), share(LINKS)),
+    "netem.impairments.corrupt.corrupted": of(_at_least_one(corrupt.corrupted, 1), real(9), whole(5), real(), share(2)),
+    "netem.impairments.corrupt.corrupted_fields": of(
+        _at_least_one(_corrupted_fields, 1), real(9), whole(5), real(), share(2)
+    ),
+    "netem.faults.lie.told": of(lambda theta: lie.told({"theta": theta}, LIAR), real(2, 2)),
+    "netem.impairments.schedule.Schedule.closed": of(_at_least_one(SCHEDULE.closed), whole(99)),
+    "netem.impairments.trace.Trace.lost": of(_at_least_one(TRACE.lost), whole(20), share(2, LINKS)),
+    "world.physics.disturbance.Kernel.correlation (exponential)": of(KERNELS["exponential"].correlation, real(9, 2)),
+    "world.physics.disturbance.Kernel.correlation (squared-exponential)": of(
         KERNELS["squared-exponential"].correlation, real(9, 2)
     ),
-    "world.disturbance.Disturbance.next": of(
+    "world.physics.disturbance.Disturbance.next": of(
         lambda before, white, position: PUSH.next(before, white, position, NOMINAL), real(9, 2), real(9, 2), real(9, 2)
     ),
-    "world.dynamics.carried": of(lambda *motion: dynamics.carried(motion, 0.013), *[real(9, 2)] * 4),
-    "world.edges.of_swarms": of(
+    "world.physics.bodies.carried": of(lambda *motion: bodies.carried(motion, 0.013), *[real(9, 2)] * 4),
+    "world.books.edges.of_swarms": of(
         _of_swarms,
         *(real(10, 2), real(DIRECTED, 2), whole(3, DIRECTED), real(*SLOTS, 2), real(*SLOTS, 3), truth(*SLOTS)),
     ),
-    "world.maneuver.corridor": _moments(lambda seconds: maneuver.corridor(100.0 * seconds)),
-    "world.maneuver.ravine": _moments(lambda seconds: maneuver.ravine(60.0 * seconds)),
-    "world.maneuver.hover": _moments(lambda seconds: maneuver.hover(seconds, 3)),
-    "world.maneuver.keyframes": _moments(lambda seconds: maneuver.keyframes(seconds, TIMES, THETA, OFFSET)),
-    "world.noise.normal": of(
+    "world.formation.manoeuvre.corridor": _moments(lambda seconds: manoeuvre.corridor(100.0 * seconds)),
+    "world.formation.manoeuvre.ravine": _moments(lambda seconds: manoeuvre.ravine(60.0 * seconds)),
+    "world.formation.manoeuvre.hover": _moments(lambda seconds: manoeuvre.hover(seconds, 3)),
+    "world.formation.manoeuvre.keyframes": _moments(lambda seconds: manoeuvre.keyframes(seconds, TIMES, THETA, OFFSET)),
+    "world.physics.noise.normal": of(
         lambda tick, src: noise.normal(3, Purpose.SENSOR_NOISE, tick=tick, src=src, axes=3),
         whole(999),
         whole(99),
         rows=MANY,
     ),
-    "world.sensors.noise": of(lambda white: sensors.noise(white, PUSH.covariance), real(9, 2)),
-    "world.sensors.relative": of(lambda position: sensors.relative(position, _plan().world.links), real(10, 2)),
-    "world.stage.spatial": of(stage.spatial, real(9, 2)),
-    "world.stage.ellipses": of(
+    "world.physics.sensors.noise": of(lambda white: sensors.noise(white, PUSH.covariance), real(9, 2)),
+    "world.physics.sensors.relative": of(lambda position: sensors.relative(position, _plan().world.links), real(10, 2)),
+    "world.recording.stage.spatial": of(stage.spatial, real(9, 2)),
+    "world.recording.stage.ellipses": of(
         lambda centre, spread: stage.ellipses(centre, spread, 3.0), real(9, 3), covariance(9, 3, 3)
     ),
 }

@@ -1,0 +1,334 @@
+"""The `affinet` command.
+
+Exit status: 0 pass, 1 fail or vacuous, 2 bad input, 3 a user's own code failed (estimator, law or module), 130 interrupted;
+143 or 129 where SIGTERM or SIGHUP ended a run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import json
+import operator
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import asdict
+from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from affinet.cli import options, show, terminal
+from affinet.planning import plan as planning
+from affinet.planning.plan import Plan, PlanError
+from affinet.runtimes import directories
+from affinet.runtimes.inject import Access, InjectRequest, NotFlying
+from affinet.runtimes.interruption import Interrupted
+from affinet.runtimes.rerun_command import NoViewer, open_viewer
+from affinet.runtimes.run import Runtime, evidence, fly
+from affinet.scenario import loading
+from affinet.scenario.finding import Finding
+from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.words import among, one_line
+from affinet.studies import fit
+from affinet.verdicts import compare
+from netem.processes.leaving import leave, status_of
+from netem.processes.system_errors import about, said
+from netem.processes.user_code import UserCodeError
+from world.books import history
+
+if TYPE_CHECKING:
+    from affinet.studies.study import Result
+    from affinet.testing.hunt import Counterexample
+    from affinet.verdicts.checking import Checker
+    from affinet.verdicts.outcome import Outcome
+
+PASS, FAIL, BAD_INPUT, USER_CODE, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def command() -> NoReturn:
+    """What the shell starts: the process ends here with the command's exit status, whatever threads a module has started."""
+    terminal.settle()
+    status = status_of(main)
+    try:
+        if sys.stdout is not None:  # it was closed
+            sys.stdout.flush()
+    except OSError as error:
+        if status != BAD_INPUT:  # else it has said already what came in between
+            print(one_line(said(error)), file=sys.stderr)  # noqa: T201
+        status = status or BAD_INPUT  # the answer did not get out
+    leave(status)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    parsed = options.parser().parse_args(arguments)
+    try:
+        status = _COMMANDS[parsed.command](parsed)
+    except (ScenarioError, PlanError, NoViewer, NotFlying, history.Damaged) as error:
+        print(one_line(str(error)), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except UserCodeError as error:
+        print(f"{error}; traceback: {_kept(error)}", file=sys.stderr)  # noqa: T201
+        return USER_CODE
+    except OSError as error:
+        print(one_line(said(error)), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except RuntimeError as error:
+        if (refused := _refused(error)) is None:
+            raise
+        print(one_line(refused), file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except Interrupted as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return error.status
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)  # noqa: T201
+        return INTERRUPTED
+    return status
+
+
+def _kept(error: UserCodeError) -> str:
+    """The file that has the traceback, as there is no run directory; or why none has it."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="affinet-", suffix=".log", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as log:
+            traceback.print_exception(error, file=log)
+    except OSError as refused:
+        return f"not kept, {said(refused)}"
+    return log.name
+
+
+def _status(outcome: Outcome) -> int:
+    if outcome.user_code:
+        print(f"traceback: in {Path(outcome.out) / 'logs'}", file=sys.stderr)  # noqa: T201
+        return USER_CODE
+    return PASS if outcome.verdict == "pass" else FAIL
+
+
+def _refused(error: RuntimeError) -> str | None:
+    """In one line what the system refused, where a library says so by an error of its own."""
+    if isinstance(error, BrokenExecutor):
+        return f"a worker process ended: {error}; was there memory enough, and room for its threads (ulimit -v, -u)?"
+    if "can't start new thread" in str(error):
+        return said(OSError(errno.EAGAIN, str(error)))
+    return None
+
+
+def _overrides(parsed: argparse.Namespace) -> list[str]:
+    given = {
+        "agents.estimator": parsed.estimator,
+        "network.availability": parsed.availability,
+        "seed": parsed.seed,
+        "time.duration": parsed.duration,
+    }
+    return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
+
+
+def _scenario(parsed: argparse.Namespace) -> Scenario:
+    return loading.load(parsed.scenario, _overrides(parsed), Path.cwd())
+
+
+def _check(parsed: argparse.Namespace) -> int:
+    try:
+        findings: Sequence[Finding] = planning.make(_scenario(parsed)).findings
+    except PlanError as error:
+        findings = error.findings
+        print(one_line(f"{parsed.scenario}: cannot fly: {error}"), file=sys.stderr)  # noqa: T201
+    flies = not any(finding.fatal for finding in findings)
+    if parsed.json:
+        report = [{"check": f.check, "level": f.level, "says": f.says} for f in findings]
+        print(json.dumps({"flies": flies, "findings": report}))  # noqa: T201
+    else:
+        show.findings(parsed.scenario, findings, flies=flies)
+    return PASS if flies else BAD_INPUT
+
+
+def _run(parsed: argparse.Namespace) -> int:
+    plan = planning.make(_scenario(parsed))
+    return _fly(plan, Path(parsed.scenario).stem, parsed)
+
+
+def _replay(parsed: argparse.Namespace) -> int:
+    overrides = _overrides(parsed)
+    from netem.medium.journal import JournalError  # pyarrow takes a while to import
+
+    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=Path.cwd())
+    flown = parsed.directory / history.FILE
+    before = history.load(flown) if flown.exists() and not overrides else None
+    for finding in plan.findings:
+        if finding.check == "inputs":
+            print(f"note: {finding.says}", file=sys.stderr)  # noqa: T201
+    try:
+        status = _fly(plan, "replay", parsed)
+    except JournalError as error:
+        raise ScenarioError(f"{parsed.directory}: {error}") from error
+    if overrides:
+        return status  # it was to be another run
+    again = parsed.out / history.FILE
+    if before is None or not again.exists():
+        gone = flown if before is None else again
+        print(f"{gone}: not there, so no bit was compared; repeat the run with `affinet run`", file=sys.stderr)  # noqa: T201
+        return status or FAIL
+    links, channels = plan.world.links, plan.channels
+    difference = compare.first_difference(before, history.load(again), links, channels)
+    print(difference or f"the same bits as {parsed.directory}", file=sys.stderr)  # noqa: T201
+    return status if difference is None else FAIL
+
+
+def _check_determinism(parsed: argparse.Namespace) -> int:
+    plan = planning.make(_scenario(parsed))
+    runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
+    with tempfile.TemporaryDirectory(prefix="affinet-") as folder:
+        flown = []
+        for number, runtime in enumerate(runs):
+            with show.Progress(plan, runtime, Path(folder) / str(number)) as watch:
+                done = fly(plan, runtime, Path(folder) / str(number), watch.see)
+            if done.digest is None or done.user_code:
+                print(f"{runtime}: {'; '.join(done.reasons)}", file=sys.stderr)  # noqa: T201
+                return USER_CODE if done.user_code else FAIL
+            flown.append(history.load(Path(folder) / str(number) / history.FILE))
+    for runtime, arrays in zip(runs[1:], flown[1:], strict=True):
+        if difference := compare.first_difference(flown[0], arrays, plan.world.links, plan.channels):
+            print(f"inprocess, then {runtime}: {difference}")  # noqa: T201
+            return FAIL
+    print(f"twice in process and once over processes: {len(flown[0]['error'])} ticks, the same bits")  # noqa: T201
+    return PASS
+
+
+def _study(parsed: argparse.Namespace) -> int:
+    from affinet.studies import judging, report  # pyarrow and matplotlib take a while to import
+    from affinet.studies import study as studies
+
+    study = studies.load(parsed.study)
+    planned = studies.plans(study, quick=parsed.quick)
+    out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
+    results: list[Result] = []
+    with directories.unless_empty(out):
+        try:
+            with show.Grid(study.title, len(planned)) as grid:
+                for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
+                    results.append(result)
+                    grid.see(result)
+        except BrokenExecutor:
+            gone = f"a process that flew cases is gone, for want of memory perhaps; {out} has those done"
+            print(gone, file=sys.stderr)  # noqa: T201
+            return FAIL
+        finally:
+            if results:  # whatever happened meanwhile, what was flown is kept
+                report.save(out, study, results)
+    try:
+        verdicts = judging.judge(study, results)
+        report.tell(out, verdicts)
+        show.claims(study, verdicts, out)
+        report.draw(out, study, results)
+    except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
+        log = report.failed(out)
+        print(one_line(f"{out} has the data, but not all of the report: {error!r}; {log} says where"), file=sys.stderr)  # noqa: T201
+        return FAIL
+    return PASS
+
+
+def _fit(parsed: argparse.Namespace) -> int:
+    model = fit.inputs(parsed.directory, parsed.order)
+    print(json.dumps(asdict(model)) if parsed.json else "\n".join(fit.overrides(model)))  # noqa: T201
+    return PASS
+
+
+def _hunt(parsed: argparse.Namespace) -> int:
+    from affinet.testing import (
+        hunt,  # hypothesis takes a while to import
+        strategies,
+    )
+    from affinet.verdicts import invariants
+
+    given = _scenario(parsed)
+    invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
+    verbs = parsed.verbs or list(strategies.VERBS)
+    if strangers := sorted(set(verbs) - set(strategies.VERBS)):
+        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
+    if parsed.out and not parsed.out.parent.is_dir():
+        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
+    folder = parsed.out.absolute().parent if parsed.out else Path.cwd()
+    for name, lies_in in given.own_modules.items():
+        if folder != lies_in:
+            raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
+    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
+    with directories.unless_empty(file), show.HuntProgress(parsed.budget) as chase:
+        quarry, coverage = hunt.hunt(
+            given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
+        )
+        if quarry is not None:
+            with about(file):
+                file.write_text(loading.to_toml(quarry.scenario), encoding="utf-8")
+    show.hunted(quarry, coverage)
+    status = PASS if quarry is None else _confirm(quarry, invariant, file)
+    if parsed.json:
+        found = (
+            None if quarry is None else {"scenario": str(file), "finding": str(quarry.finding), "digest": quarry.digest}
+        )
+        print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
+    return status
+
+
+def _confirm(quarry: Counterexample, invariant: Checker, file: Path) -> int:
+    plan = planning.make(loading.load(str(file)))
+    out = directories.for_run(file.stem)
+    with show.Progress(plan, file.stem, out) as watch:
+        flown = fly(plan, "processes", out, watch.see)
+    same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
+    landed = evidence(plan, flown)
+    found = invariant(landed) if landed else "; ".join(flown.reasons)
+    print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
+    return FAIL
+
+
+def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
+    viewer = open_viewer() if parsed.view else None
+    parsed.out = parsed.out or directories.for_run(name)
+    with show.Progress(plan, name, parsed.out) as watch:
+        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
+    if parsed.json:
+        print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
+    else:
+        show.outcome(outcome, plan)
+    return _status(outcome)
+
+
+def _inject(parsed: argparse.Namespace) -> int:
+    wish = InjectRequest(
+        parsed.verb,
+        links=tuple(getattr(parsed, "links", ())),
+        groups=getattr(parsed, "groups", ()),
+        loss=getattr(parsed, "loss", 0.0),
+        lasts_s=getattr(parsed, "lasts", None),
+        in_flight=getattr(parsed, "in_flight", "drop"),
+    )
+    flown = loading.resolved(parsed.directory)
+    try:
+        order = wish.order(flown)
+    except ValueError as error:
+        raise ScenarioError(f"{parsed.verb}: {error}") from error
+    answer = Access.to(parsed.directory).ask(order)
+    if answer.refused:
+        raise ScenarioError(f"{parsed.verb}: {answer.refused}")
+    show.answer(answer, flown.time.dt)
+    return PASS
+
+
+_COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
+    "run": _run,
+    "check": _check,
+    "replay": _replay,
+    "check-determinism": _check_determinism,
+    "hunt": _hunt,
+    "study": _study,
+    "fit": _fit,
+    "inject": _inject,
+}
+
+if __name__ == "__main__":
+    command()

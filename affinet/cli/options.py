@@ -1,0 +1,147 @@
+"""The command line: which commands there are, and what each can be told."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from affinet.scenario import files, loading
+
+
+def parser() -> argparse.ArgumentParser:
+    """Reads a command line; `command` is the word of the command."""
+    whole = argparse.ArgumentParser(
+        prog="affinet", description="Fly a swarm of agents through a network that loses, delays and cuts."
+    )
+    commands = whole.add_subparsers(required=True, dest="command", metavar="COMMAND")
+    run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
+    check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")
+    replay = commands.add_parser("replay", help="fly again what was flown, and compare")
+    determinism = commands.add_parser(
+        "check-determinism", help="fly a scenario twice in process and once over processes, and compare every bit"
+    )
+    for command in (run, check, determinism):
+        command.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(loading.shipped())}")
+    replay.add_argument("directory", type=Path, metavar="DIR", help="the run directory")
+    replay.add_argument(
+        "--verdicts",
+        action="store_true",
+        help="take every verdict from its journal, whatever the seed; without it the models decide again",
+    )
+    for command in (run, check, determinism, replay):
+        _add_overrides(command)
+    for command in (run, replay):
+        command.add_argument(
+            "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
+        )
+        command.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
+        command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+    _add_hunt(commands)
+    _add_study(commands)
+    _add_fit(commands)
+    _add_inject(commands)
+    return whole
+
+
+def _add_overrides(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="override any key, like time.dt=0.02"
+    )
+    command.add_argument("--estimator", metavar="NAME", help="agents.estimator")
+    command.add_argument(
+        "--availability", metavar="P", help="network.availability, the probability that a message gets through"
+    )
+    command.add_argument("--seed", metavar="N", help="seed")
+    command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
+    command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+
+
+def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    inject = commands.add_parser("inject", help="change the air of a run while it flies over processes")
+    inject.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
+    verbs = inject.add_subparsers(dest="verb", required=True, metavar="VERB")
+    cut = verbs.add_parser("cut", help="links that carry nothing: 1-2, 1->2, leaders->followers")
+    cut.add_argument("links", nargs="+")
+    partition = verbs.add_parser("partition", help="groups between which nothing passes: 1,2,3/4,5,6,7")
+    partition.add_argument("groups", type=_groups)
+    lose = verbs.add_parser("lose", help="a probability with which messages are lost on top")
+    lose.add_argument("loss", type=float, metavar="P")
+    lose.add_argument("--links", nargs="+", default=["all"], help="default: all")
+    for verb in (cut, partition, lose):
+        verb.add_argument(
+            "--for", dest="lasts", type=float, metavar="S", help="simulated seconds (default: until healed)"
+        )
+    for verb in (cut, partition):
+        verb.add_argument(
+            "--in-flight", choices=["drop", "deliver", "hold"], default="drop", help="default: %(default)s"
+        )
+    verbs.add_parser("heal", help="end what was injected; what the scenario scripts stays")
+    verbs.add_parser("show", help="what is imposed now")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
+    return int(text)
+
+
+def _scenario_file(text: str) -> Path:
+    if not text.endswith(".toml"):
+        raise argparse.ArgumentTypeError(f"a scenario is a TOML file: call it {text}.toml")
+    return Path(text)
+
+
+def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    hunt = commands.add_parser(
+        "hunt",
+        help="look for the smallest fault that breaks an invariant",
+        description="Draw schedules of faults, fly them in process, and shrink the first that breaks an invariant; "
+        "the smallest is written as a scenario and confirmed over processes. Exit status 1 when one was found.",
+    )
+    hunt.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(loading.shipped())}")
+    _add_overrides(hunt)
+    hunt.add_argument(
+        "--invariant",
+        required=True,
+        action="append",
+        metavar="CHECKER",
+        help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'",
+    )
+    hunt.add_argument(
+        "--budget", type=_count, default=100, metavar="N", help="schedules to draw (default: %(default)s)"
+    )
+    hunt.add_argument(
+        "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
+    )
+    hunt.add_argument(
+        "--out", type=_scenario_file, metavar="FILE", help="the smallest, as a scenario (default: hunted-SCENARIO.toml)"
+    )
+
+
+def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    study = commands.add_parser(
+        "study",
+        help="fly a scenario over a grid of settings and many seeds; a figure, and a verdict on every claim",
+        description="Exit status 0 whatever the verdicts on the claims: that a claim does not hold is a finding.",
+    )
+    study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
+    study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
+    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
+
+
+def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    fitting = commands.add_parser(
+        "fit", help="an autoregressive model of the inputs of a run, for filters that predict them"
+    )
+    fitting.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
+    fitting.add_argument(
+        "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
+    )
+    fitting.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _groups(text: str) -> tuple[tuple[int, ...], ...]:
+    try:
+        return tuple(tuple(int(agent) for agent in group.split(",")) for group in text.split("/"))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: write groups of agents as 1,2,3/4,5,6,7") from error

@@ -1,0 +1,193 @@
+"""What a person at a terminal sees: progress on standard error, tables on standard output."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich import progress as bar
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from affinet.cli.progress import Bar
+from affinet.planning.plan import Plan
+from affinet.scenario.finding import Finding
+from affinet.verdicts.outcome import Outcome
+from netem.faults.control import Answer
+
+if TYPE_CHECKING:
+    from affinet.studies.study import Result, Study
+    from affinet.testing.hunt import Counterexample, Coverage
+    from affinet.testing.strategies import Entries
+    from analysis.claims.checks import ClaimVerdict
+
+_SAYS = "{task.fields[says]}"
+_LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
+_VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
+
+
+class Progress:
+    """How a run goes, with the real-time factor, on standard error."""
+
+    def __init__(self, plan: Plan, name: str, out: Path) -> None:
+        self._name, self._out = name, out
+        self._dt = plan.world.dt
+        self._first: tuple[int, float] | None = None
+        self._bar = Bar(
+            name, plan.world.ticks, bar.BarColumn(), bar.TextColumn(_SAYS), bar.TimeRemainingColumn(), says="starting"
+        )
+
+    def __enter__(self) -> Progress:
+        self._bar.tell(f"{self._name} flies in {self._out}")
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
+
+    def see(self, tick: int, error: float) -> None:
+        """Show how far it is."""
+        now = time.perf_counter()
+        self._first = self._first or (tick, now)
+        elapsed = now - self._first[1]
+        factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
+        self._bar.see(tick, f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
+
+
+class HuntProgress:
+    """How a hunt goes, on standard error."""
+
+    def __init__(self, budget: int) -> None:
+        self._budget = budget
+        self._broken = 0
+        self._bar = Bar("hunting", budget, bar.BarColumn(), bar.TextColumn(_SAYS))
+
+    def __enter__(self) -> HuntProgress:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
+
+    def see(self, coverage: Coverage, broken: Entries | None) -> None:
+        """Show how far it is, and every schedule that breaks the invariant."""
+        if broken is not None:
+            self._broken += 1
+            self._bar.tell(f"breaks: {', '.join(entry['verb'] for entry in broken)}")
+        says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
+        self._bar.see(min(coverage.schedules, self._budget), says)
+
+
+class Grid:
+    """How far a study is, on standard error."""
+
+    def __init__(self, title: str, cases: int) -> None:
+        self._cases, self._done = cases, 0
+        self._bar = Bar(title, cases, bar.BarColumn(), bar.TextColumn(_SAYS), bar.TimeRemainingColumn())
+
+    def __enter__(self) -> Grid:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._bar.__exit__(*failure)
+
+    def see(self, result: Result) -> None:
+        """Show that a case is done."""
+        self._done += 1
+        self._bar.see(self._done, f"{self._done}/{self._cases} cases  {', '.join(result.labels.values())}")
+
+
+def claims(study: Study, verdicts: Sequence[ClaimVerdict], out: Path) -> None:
+    """What a study says of the claims it examines."""
+    table = Table("claim", "", "found", title=_plain(f"{study.title} ({study.source})"))
+    for verdict in verdicts:
+        holds = "[green]holds[/]" if verdict.holds else "[red]does not hold[/]"
+        table.add_row(_plain(verdict.says), holds, _plain(verdict.found))
+    console = Console()
+    console.print(table)
+    console.print(_plain(f"data and figure in {out}"))
+
+
+def hunted(quarry: Counterexample | None, coverage: Coverage) -> None:
+    """What a hunt has found, and what it tried."""
+    console = Console()
+    if quarry is None:
+        console.print("nothing found that breaks it", highlight=False)
+    else:
+        console.print(_plain(f"{quarry.finding}"))
+        for entry in quarry.scenario.timeline:
+            said = entry.model_dump(mode="json", exclude_none=True)
+            console.print(_plain(f"  {said.pop('verb')} {said}"))
+    table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
+    for counted in (coverage.verbs, coverage.selectors):
+        for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
+            table.add_row(_plain(name), str(number))
+        table.add_section()
+    console.print(table)
+
+
+def outcome(outcome: Outcome, plan: Plan) -> None:
+    """What came of a run."""
+    table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
+    flown, messages = outcome.flown, outcome.messages
+    errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
+    errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
+    rows = [
+        ("estimator, law", f"{flown['estimator']}, {flown['law']}"),
+        ("seed", f"{flown['seed']}"),
+        ("versions", ", ".join(f"{name} {version}" for name, version in flown["versions"].items())),
+        ("flown", f"{outcome.ticks} ticks, {outcome.ticks * plan.world.dt:g} s in {outcome.wall_s:.1f} s"),
+        ("speed", f"{outcome.ticks_per_s:.0f} ticks/s, {outcome.real_time_factor:.2f} x real time"),
+        *(
+            (what, "  ".join(f"{name} {_figure(value)} {unit}" for name, value in of.items()))
+            for what, (of, unit) in errors.items()
+        ),
+        (
+            "messages",
+            f"{messages['offered']} offered, {messages['copies']} doubled, "
+            f"{messages['delivered']} delivered, {messages['in_flight']} in flight",
+        ),
+        (
+            "dropped",
+            ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
+        ),
+        ("lost by nobody's order", f"{messages['uninstructed']}"),
+        *(("fault", str(bite)) for bite in outcome.faults),
+        ("digest", str(outcome.digest)),
+        ("directory", outcome.out),
+    ]
+    for name, value in rows:
+        table.add_row(name, _plain(value))
+    console = Console()
+    console.print(table)
+    for reason in outcome.reasons:
+        console.print(_plain(reason), soft_wrap=True)
+
+
+def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:
+    """What was checked."""
+    table = Table("check", "", "says", title=_plain(f"{name}: {'can fly' if flies else 'cannot fly'}"))
+    for finding in found:
+        table.add_row(_plain(finding.check), _LEVELS[finding.level], _plain(finding.says))
+    Console().print(table)
+
+
+def answer(told: Answer, dt: float) -> None:
+    """What the medium says it holds."""
+    console = Console()
+    console.print(f"from tick {told.k} ({told.k * dt:.2f} s) on:", highlight=False)
+    for line in told.holds or ["nothing is imposed"]:
+        console.print(_plain(f"  {line}"))
+
+
+def _plain(text: str) -> Text:
+    """Text of a user's as it stands: no markup, no emoji, and nothing that moves the terminal's cursor."""
+    return Text("".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text))
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

@@ -1,0 +1,176 @@
+"""Scenario -> the world that is flown, and what its agents are told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from affinet.scenario import sections, selectors
+from affinet.scenario.sections import Scenario, ScenarioError
+from agents.brief import Brief
+from analysis.models.affine import Manoeuvre
+from analysis.models.arrays import Array
+from analysis.models.pursuit import Target
+from netem.core.links import Links
+from world.formation import manoeuvre
+from world.formation.nominal import PRESETS, Formation
+from world.physics.disturbance import Disturbance, Kernel
+from world.physics.target import MovingTarget
+from world.physics.world import World
+
+# Presets that are flown in so many dimensions.
+_MANOEUVRES = {"corridor": (2, manoeuvre.corridor), "ravine": (3, manoeuvre.ravine)}
+
+
+class Keyframes(NamedTuple):
+    """Times (s), theta (F, D, D), offset (F, D), in metres, and angle (F,), in radians, if there is one."""
+
+    times: Sequence[float]
+    theta: Array
+    offset: Array
+    angle: Array | None
+
+
+def formation_of(given: Scenario) -> Formation:
+    """Who flies.
+
+    Raises
+    ------
+    ScenarioError
+        When an edge or a leader is nobody.
+    """
+    section = given.formation
+    if section.preset:
+        preset = PRESETS[section.preset]
+        nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
+    else:
+        nodes = np.array(section.nodes, dtype=np.float64)
+        edges = tuple(selectors.edge(edge) for edge in section.edges or [])
+        leaders = ()
+    leaders = leaders if section.leaders is None else tuple(section.leaders)
+    for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
+        if strangers := sorted({agent for agent in numbers if not 1 <= agent <= len(nodes)}):
+            raise ScenarioError(f"formation.{key}: no agents {strangers}; agents are 1 to {len(nodes)}")
+    return Formation(section.scale * nodes, edges, leaders)
+
+
+def world_of(given: Scenario, formation: Formation) -> World:
+    """Its physics, sensors and manoeuvre.
+
+    Raises
+    ------
+    ScenarioError
+        When a covariance or a manoeuvre does not fit the formation.
+    """
+    return World(
+        seed=given.seed,
+        dt=given.time.dt,
+        ticks=given.time.ticks,
+        order=given.dynamics.order,
+        formation=formation,
+        links=Links.both_ways(formation.agents, formation.edges),
+        manoeuvre=_manoeuvre(given, formation.dimension),
+        sensor=sections.sensor(given.sensing, formation.dimension),
+        disturbance=_disturbance(given, formation.dimension),
+        pursuit=_pursuit(given, formation.dimension),
+        start=given.formation.start,
+        spread=given.formation.spread,
+        swarms=1,
+    )
+
+
+def _disturbance(given: Scenario, dimension: int) -> Disturbance:
+    section = given.dynamics
+    kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
+    return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
+
+
+def _pursuit(given: Scenario, dimension: int) -> MovingTarget | None:
+    section, dt = given.target, given.time.dt
+    if section is None:
+        return None
+    start = np.zeros((section.order, dimension))
+    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
+        if values is not None and derivative < section.order:
+            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
+    ticks = np.round(np.array(section.latencies) / dt).astype(np.int64)
+    if (np.abs(ticks * dt - section.latencies) > 1e-6 * dt).any():
+        raise ScenarioError(f"target.latencies: {section.latencies} s are not whole numbers of ticks of {dt:g} s")
+    target = Target(section.order, section.intensity, ticks, np.array(section.variances, dtype=np.float64))
+    return MovingTarget(target, dt, start)
+
+
+def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
+    seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
+    section = given.manoeuvre
+    if section.preset == "hover":
+        return manoeuvre.hover(seconds, dimension)
+    if section.preset is not None:
+        flown_in, flown = _MANOEUVRES[section.preset]
+        if dimension != flown_in:
+            raise ScenarioError(
+                f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
+            )
+        return flown(seconds)
+    frames = keyframes_of(given, dimension)
+    for number, (earlier, later) in enumerate(pairwise(frames.times), start=2):
+        if later - earlier < given.time.dt:
+            raise ScenarioError(
+                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after "
+                "the one before; move it, or lower time.dt"
+            )
+    return manoeuvre.keyframes(seconds, *frames)
+
+
+def keyframes_of(given: Scenario, dimension: int) -> Keyframes:
+    """What the keyframes of a scenario say.
+
+    Raises
+    ------
+    ScenarioError
+        When one does not fit the formation.
+    """
+    section, square = given.manoeuvre, (dimension, dimension)
+    theta, offset = [], []
+    for number, frame in enumerate(section.keyframes, start=1):
+        key = f"manoeuvre.keyframes.{number}"
+        theta.append(sections.array(f"{key}.theta", frame.theta, square))
+        offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
+    times = [frame.time for frame in section.keyframes]
+    angles = [frame.angle for frame in section.keyframes if frame.angle is not None]
+    return Keyframes(times, np.array(theta), np.array(offset), np.array(angles) if angles else None)
+
+
+def brief_of(world: World, L: Array) -> Brief:
+    """The places of all agents, with the stress matrix L, shape (N, N)."""
+    formation, links = world.formation, world.links
+    relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
+    weights = -np.take_along_axis(L, links.neighbours, axis=1)
+    return Brief(
+        dt=world.dt,
+        nominal=formation.nominal,
+        relative=np.where(links.present[..., None], relative, 0.0),
+        present=links.present,
+        back=links.back,
+        stress=np.where(links.present, weights, 0.0),
+        leads=links.present & formation.is_leader[links.neighbours],
+        sensor=world.sensor,
+        process=_process(world),
+        leader=formation.is_leader,
+        target=None if world.pursuit is None else world.pursuit.target,
+        mission=world.manoeuvre,
+    )
+
+
+def _process(world: World) -> Array:
+    """B_i^T Q B_i of every agent's edges, shape (N, n D, n D): what they know of the disturbances."""
+    links, Q_D = world.links, world.disturbance.covariance
+    Q_A = world.disturbance.between(world.formation.nominal)
+    own, theirs = np.arange(links.agents)[:, None], links.neighbours
+    first, second = theirs[:, :, None], theirs[:, None, :]
+    edges = Q_A[own, own][..., None] - Q_A[own, theirs][:, :, None] - Q_A[own, theirs][:, None, :] + Q_A[first, second]
+    real = links.present[:, :, None] & links.present[:, None, :]
+    return np.asarray(np.kron(np.where(real, edges, 0.0), Q_D), dtype=np.float64)

@@ -1,0 +1,146 @@
+"""What fits: a run into the memory of a machine, its delays into the run, and the parameters of algorithms into floats."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from affinet.planning.link_classes import LinkClass
+from affinet.scenario.finding import Finding
+from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
+from affinet.scenario.units import LARGEST, SMALLEST
+from netem.core.links import Links
+from world.books.history import History
+from world.formation.nominal import Formation
+from world.physics.world import World
+
+_COPIES = 2  # the arrays of a run, and what is made of them at its end
+_AT_WORK = 4  # arrays like the covariance of the disturbances, while it is put together
+_LEAST_OF_A_TICK = 1e-6  # a delay below this share of a tick would pass as none
+
+
+def first_tick(given: Scenario) -> Scenario:
+    """The scenario, over after one tick: what does not grow with the run is all there."""
+    return given.model_copy(update={"time": given.time.model_copy(update={"duration": given.time.dt})})
+
+
+def swarm(formation: Formation, links: Links, memory: int) -> Finding:
+    """Whether what agents are told of each other fits into a memory of so many bytes."""
+    edges = links.slots.shape[1] * formation.dimension
+    needed = _AT_WORK * np.dtype(np.float64).itemsize * formation.agents * edges**2
+    return _fits(
+        needed,
+        memory,
+        f"{formation.agents} agents with up to {links.slots.shape[1]} neighbours",
+        "give them fewer edges",
+    )
+
+
+def run(first: World, channels: int, reports: Mapping[str, tuple[int, ...]], time: TimeSection, memory: int) -> Finding:
+    """Whether a run fits into a memory of so many bytes.
+
+    Parameters
+    ----------
+    first
+        The world of its first tick.
+    channels, reports
+        How many channels there are, and what the estimator reports, by name, with the shape for one agent.
+    time
+        Of the run.
+    memory
+        Of the machine, in bytes.
+    """
+    history = History(replace(first, ticks=1), channels, reports)
+    history.ticks = 1
+    maps = (first.manoeuvre.theta, first.manoeuvre.offset)
+    of_a_tick = [*history.arrays().values(), *(of_ticks[0] for of_ticks in maps)]
+    each = _COPIES * sum(array.nbytes for array in of_a_tick)
+    most = int(memory / each)
+    return _fits(
+        each * time.ticks,
+        memory,
+        f"{time.ticks} ticks of {first.formation.agents} agents",
+        f"at most {most} ticks fit, a time.duration of {most * time.dt:g} s",
+    )
+
+
+def _fits(needed: float, memory: int, what: str, way_out: str) -> Finding:
+    said = f"{what} take {needed / 2**30:.3g} GiB of memory"
+    has = f"this machine has {memory / 2**30:.3g} GiB"
+    if needed > memory:
+        return Finding("memory", "error", f"{said}, and {has}; {way_out}")
+    return Finding("memory", "ok", f"{said}; {has}")
+
+
+def delays(
+    classes: Iterable[LinkClass], message_bits: np.ndarray[Any, np.dtype[np.float64]], time: TimeSection
+) -> None:
+    """Refuse what no message of the run outlives, or none would notice.
+
+    Raises
+    ------
+    ScenarioError
+        Naming the key, and the bound.
+    """
+    for one in classes:
+        if one.delay_ticks > time.ticks:
+            raise ScenarioError(
+                f"network.delay_ticks: {one.delay_ticks} ticks, and the run has {time.ticks}: give fewer"
+            )
+        key, profile = f"network.profiles.{one.name}", one.profile
+        for number, loss in enumerate(profile.loss or [], start=1):
+            delay(f"{key}.loss.{number}.extra_delay", getattr(loss, "extra_delay", 0.0), time)
+        if (model := profile.delay) is not None:
+            for name in ("mean", "jitter"):
+                delay(f"{key}.delay.{name}", getattr(model, name) or 0.0, time)
+            if model.model == "table":
+                for seconds in (one.measured.min(), one.measured.max()):
+                    delay(f"{key}.delay.table", float(seconds), time)
+        if profile.rate is not None:
+            least = float(message_bits[1:].max()) / time.duration
+            if profile.rate.rate < least:
+                raise ScenarioError(
+                    f"{key}.rate.rate: at {profile.rate.rate:g} bit/s a message takes longer than the run of "
+                    f"{time.duration:g} s; give at least {least:g}"
+                )
+
+
+def delay(key: str, seconds: float, time: TimeSection) -> None:
+    """Refuse a delay that is longer than the run, or too short for its ticks.
+
+    Raises
+    ------
+    ScenarioError
+        Naming the key, and the bound.
+    """
+    if seconds > time.duration:
+        raise ScenarioError(f"{key}: {seconds:g} s is longer than the run; give at most {time.duration:g} s")
+    if 0.0 < seconds < _LEAST_OF_A_TICK * time.dt:
+        least = _LEAST_OF_A_TICK * time.dt
+        raise ScenarioError(
+            f"{key}: {seconds:g} s is nothing in ticks of {time.dt:g} s; give 0, or at least {least:g} s"
+        )
+
+
+def parameters(key: str, given: Any) -> None:
+    """Refuse numbers that are too large, or too small to tell from 0, in the parameters of an algorithm.
+
+    Raises
+    ------
+    ScenarioError
+        Naming the key, and the bound.
+    """
+    match given:
+        case dict():
+            for name, value in given.items():
+                parameters(f"{key}.{name}", value)
+        case list() | tuple():
+            for number, value in enumerate(given, start=1):
+                parameters(f"{key}.{number}", value)
+        case int() | float() if not abs(given) <= LARGEST:
+            raise ScenarioError(f"{key}: should be at most {LARGEST:g} in size, got {given}")
+        case int() | float() if 0 < abs(given) < SMALLEST:
+            raise ScenarioError(f"{key}: is too small to tell from 0: should be at least {SMALLEST:g}, got {given}")

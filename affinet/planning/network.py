@@ -1,0 +1,243 @@
+"""Network section -> the air: what impairs each link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from affinet.planning import limits, recordings
+from affinet.planning.echo import echo
+from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
+from affinet.scenario import profiles
+from affinet.scenario.finding import Finding
+from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.sections import NetworkSection, Scenario, ScenarioError, TimeSection, said_at
+from agents.exchange import Channels
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core import channels
+from netem.core.links import Links
+from netem.impairments import reach, trace
+from netem.impairments.chain import ChainLayer, steady
+from netem.impairments.corrupt import Mark
+from netem.impairments.jamming import Zone
+from netem.impairments.profile import Profile
+from netem.impairments.rate import Rate
+from netem.impairments.reach import Reach
+from netem.impairments.trace import MeasuredAvailability, Trace
+from world.formation.nominal import Formation
+
+_ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
+
+
+def plan(
+    given: Scenario, formation: Formation, links: Links, message_bits: Array, ruled: Mask | None = None
+) -> tuple[Profile, tuple[Finding, ...]]:
+    """The air of a scenario, and what is to be said of it; `ruled` are the links that ever meet it, shape (L,), if not all.
+
+    Raises
+    ------
+    ScenarioError
+        When a profile is not there, cannot ever deliver, or selects nothing.
+    """
+    network, dt = given.network, given.time.dt
+    groups = classes(network, formation, links)
+    heard = [one for one in groups if one.comms]
+    limits.delays(heard, message_bits, given.time)
+    traced = [
+        _trace(one, links, one.rows if ruled is None else one.rows & ruled, given.time)
+        for one in groups
+        if one.losses(profiles.Traced)
+    ]
+    profile = Profile(
+        dt=dt,
+        coupled=network.coupled,
+        least_delay=1 if given.time.exchange == "next-tick" else 0,
+        chains=tuple(layer for group in _by_channels(groups) for layer in _chain_layers(group, links)),
+        traces=tuple(held for held, _ in traced),
+        schedules=tuple(one.schedule(links) for one in groups if one.losses(SCHEDULES)),
+        reaches=tuple(_reach(one, dt) for one in groups if one.losses(REACHES)),
+        zones=_zones(network, formation, links),
+        listed=_listed(groups),
+        delays=tuple(law for one in heard for law in one.delays(dt)),
+        duplicate=_each(heard, links, lambda profile: profile.duplicate or 0.0),
+        reorder=_each(heard, links, lambda profile: profile.reorder or 0.0),
+        corrupt=np.stack([_each(heard, links, partial(_chance, kind)) for kind in list(Mark)[1:]], axis=-1),
+        bias=_each(heard, links, _bias),
+        rate=_rate(heard, links, message_bits),
+        message_bits=message_bits,
+    )
+    notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
+    notes += [note for _, said in traced for note in said]
+    return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)
+
+
+def degraded(
+    given: Scenario, formation: Formation, links: Links, message_bits: Array, name: str, key: str, ruled: Mask
+) -> tuple[Profile, list[Finding]]:
+    """The air of links that have the profile of this name in place of their own, and the notes on it.
+
+    Parameters
+    ----------
+    given, formation, links, message_bits
+        As of `plan`.
+    name, key
+        Of the profile, and the key that names it.
+    ruled
+        The links that ever have it, shape (L,).
+
+    Raises
+    ------
+    ScenarioError
+        As `plan` does.
+    """
+    with said_at(key):
+        profiles.resolve(name, given.network.profiles)
+    network = given.network.model_copy(update={"profile": name, "links": []})
+    try:
+        air, said = plan(given.model_copy(update={"network": network}), formation, links, message_bits, ruled)
+    except ScenarioError as error:
+        raise ScenarioError(f"{key}: {error}") from error
+    return air, [finding for finding in said if finding.check == "trace"]
+
+
+def message_bits(names: Sequence[str], spoken: Channels, links: Links, dimension: int) -> Array:
+    """Size of a message on each channel: its envelope, 8 bytes a number and 1 a truth; what a rate limit counts."""
+
+    def payload(name: str) -> int:
+        if name == channels.MEASUREMENT:
+            return int(links.degree.max(initial=0)) * dimension * _NUMBER_BYTES
+        sizes = [
+            int(np.prod(field.shape)) * (_TRUTH_BYTES if field.dtype is bool else _NUMBER_BYTES)
+            for field in spoken.get(name, {}).values()
+        ]
+        return sum(sizes)
+
+    return np.array([8.0 * (_ENVELOPE_BYTES + payload(name)) for name in names])
+
+
+def _by_channels(classes: Iterable[LinkClass]) -> list[list[LinkClass]]:
+    grouped: dict[tuple[bool, bool], list[LinkClass]] = {}
+    for one in classes:
+        grouped.setdefault((one.sensing, one.comms), []).append(one)
+    return list(grouped.values())
+
+
+def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer]:
+    layers, never = [], steady()
+    depth = max(len(one.chains) for one in classes)
+    for lane in range(depth):
+        chosen, by_packet = [never] * len(links), np.zeros(len(links), dtype=bool)
+        for one in classes:
+            if lane < len(one.chains):
+                chain, by_packet_here = one.chains[lane]
+                for row in np.flatnonzero(one.rows):
+                    chosen[row] = chain
+                by_packet[one.rows] = by_packet_here
+        if any(chain.loss.any() or chain.extra_delay.any() for chain in chosen):
+            first = classes[0]
+            layers.append(ChainLayer.of(lane, chosen, by_packet, sensing=first.sensing, comms=first.comms))
+    return layers
+
+
+def _trace(one: LinkClass, links: Links, rows: Mask, time: TimeSection) -> tuple[Trace, list[Finding]]:
+    file = Path(one.losses(profiles.Traced).file)
+    try:
+        if file.is_dir():
+            measured, notes = recordings.trace(file, links, rows, time, sensing=one.sensing)
+        else:
+            measured = trace.from_csv(file, links)
+            notes = _on_measured(measured, rows, time)
+        held = trace.table(measured, links, rows, time.dt, time.ticks)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: no such file") from error
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: {error}") from error
+    said = [Finding("trace", "note", f"profile {one.name!r}: {file.name}: {note}") for note in notes]
+    return Trace(*held, one.sensing, one.comms), said
+
+
+def _on_measured(measured: MeasuredAvailability, rows: Mask, time: TimeSection) -> list[str]:
+    moments, notes = measured.time[rows[measured.link]], []
+    if len(moments) and (last := float(moments.max())) < time.duration - time.dt:
+        notes.append(f"its last row is of {last:g} s, and each value holds to the end of the run ({time.duration:g} s)")
+    if measured.splits_ticks(time.dt, time.ticks):
+        notes.append(f"it changes within ticks of {time.dt:g} s: each tick has its mean over time")
+    return notes
+
+
+def _reach(one: LinkClass, dt: float) -> Reach:
+    model = one.losses(REACHES)
+    match model:
+        case profiles.Disk():
+            shape = (reach.ReachLaw.RAMP, one.rows, model.range, model.range, 0.0, 0.0, 1)
+        case profiles.Ramp():
+            shape = (reach.ReachLaw.RAMP, one.rows, model.inner, model.outer, 0.0, 0.0, 1)
+        case _:
+            spell = max(1, round(model.coherence / dt))
+            shape = (reach.ReachLaw.LOG_DISTANCE, one.rows, 0.0, model.range, model.exponent, model.shadowing, spell)
+    return Reach(*shape, one.sensing, one.comms)
+
+
+def _zones(network: NetworkSection, formation: Formation, links: Links) -> tuple[Zone, ...]:
+    zones = []
+    for number, zone in enumerate(network.zones, start=1):
+        key = f"network.zones.{number}"
+        if len(zone.centre) != formation.dimension:
+            raise ScenarioError(f"{key}.centre: needs {formation.dimension} coordinates, in metres")
+        if network.coupled and zone.channels:
+            raise ScenarioError(f"{key}.channels: coupled = true gives sensing and comms one verdict")
+        rows = np.zeros(len(links), dtype=bool)
+        rows[select(zone.links, formation, links, f"{key}.links")] = True
+        sensing, comms = zone.channels != "comms", zone.channels != "sensing"
+        zones.append(Zone(np.array(zone.centre), zone.radius, zone.share, rows, sensing, comms))
+    return tuple(zones)
+
+
+def _listed(groups: Iterable[LinkClass]) -> Integers:
+    rows = [
+        (row, number, one.sensing, one.comms)
+        for one in groups
+        if (model := one.losses(profiles.Listed))
+        for row in np.flatnonzero(one.rows).tolist()
+        for number in model.messages
+    ]
+    return np.array(sorted(set(rows)), dtype=np.int64).reshape(-1, 4)
+
+
+def _each(classes: Iterable[LinkClass], links: Links, value: Callable[[LinkProfile], float]) -> Array:
+    figures = np.zeros(len(links))
+    for one in classes:
+        figures[one.rows] = value(one.profile)
+    return figures
+
+
+def _chance(kind: Mark, profile: LinkProfile) -> float:
+    return sum(corruption.p for corruption in profile.corrupt or [] if corruption.kind == kind.label)
+
+
+def _bias(profile: LinkProfile) -> float:
+    return sum(corruption.by or 0.0 for corruption in profile.corrupt or [])
+
+
+def _rate(classes: Sequence[LinkClass], links: Links, message_bits: Array) -> Rate | None:
+    largest = float(message_bits[1:].max())
+    for one in classes:
+        if (limit := one.profile.rate) and 8 * (limit.queue + limit.burst) < largest:
+            raise ScenarioError(
+                f"network.profiles.{one.name}.rate: queue and burst hold {limit.queue + limit.burst} bytes, "
+                f"and a message has up to {largest / 8:g}: some can never be delivered"
+            )
+    if not any(one.profile.rate for one in classes):
+        return None
+
+    def of(name: str, without: float) -> Array:
+        figures = np.full(len(links), without)
+        for one in classes:
+            if one.profile.rate:
+                figures[one.rows] = getattr(one.profile.rate, name)
+        return figures
+
+    return Rate(of("rate", np.inf), 8.0 * of("burst", 0.0), 8.0 * of("queue", np.inf))

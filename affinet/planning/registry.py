@@ -1,0 +1,150 @@
+"""Estimators and control laws by name: entry points of any installed package, or "module:Class"."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import is_dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from affinet.planning import limits
+from affinet.scenario.sections import ScenarioError
+from affinet.scenario.words import among
+from agents.estimators.base import Estimator
+from agents.laws.base import Law
+from agents.loading import parameters
+from agents.loading.calling import Calling, NoSuchAlgorithm, load, name_of
+from agents.loading.parameters import ParameterError
+from agents.process import Choice
+from netem.processes.user_code import UserCodeError, definition, text_of
+
+ESTIMATORS = "affinet.estimators"
+LAWS = "affinet.controllers"
+_PROTOCOLS: Mapping[str, tuple[type, tuple[str, ...]]] = {
+    ESTIMATORS: (Estimator, ("channels", "init", "sense", "fuse")),
+    LAWS: (Law, ("init", "command")),
+}
+
+
+def names(group: str) -> list[str]:
+    """The names that installed packages offer in a group."""
+    return sorted(_offered(group))
+
+
+def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mapping[str, Path]) -> Choice:
+    """The algorithm of this name with these parameters, checked against its fields.
+
+    Parameters
+    ----------
+    group
+        `ESTIMATORS` or `LAWS`.
+    key
+        Of the scenario, for error messages.
+    name
+        An entry point, or "module:Class".
+    given
+        Its parameters; those not given keep their defaults.
+    own
+        Folders in which modules of the user's own lie, by "module:Class".
+
+    Raises
+    ------
+    ScenarioError
+        When there is no such algorithm, or it has no such parameter, or a value does not fit.
+    UserCodeError
+        When its module cannot be imported, or it is not what an algorithm of this group has to be.
+    """
+    path = _path(group, key, name)
+    algorithm = _load(key, path, own.get(name))
+    _refuse_another_kind(group, algorithm)
+    return _made(name, path, algorithm, given, own.get(name))
+
+
+def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, Path]) -> None:
+    """Refuse parameters that do not fit, also of algorithms that are not in use: a study may choose them.
+
+    Raises
+    ------
+    ScenarioError
+        When there is no such algorithm, or it has no such parameter, or a value does not fit.
+    UserCodeError
+        When its module cannot be imported.
+    """
+    if not given:
+        return
+    offered = {name: path for group in _PROTOCOLS for name, path in _offered(group).items()}
+    for name, table in given.items():
+        key = f"agents.parameters.{name}"
+        if name not in offered and ":" not in name:
+            raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(offered))}")
+        path = offered.get(name, name)
+        _made(name, path, _load(key, path, own.get(name)), table, own.get(name))
+
+
+@contextmanager
+def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
+    """What an algorithm refuses by such an error is a problem of the scenario's key; whatever else it does is its own."""
+    try:
+        yield
+    except UserCodeError as error:
+        if isinstance(error.__cause__, refusal):
+            raise ScenarioError(f"{key}: {text_of(error.__cause__)}") from error
+        raise
+
+
+def _offered(group: str) -> dict[str, str]:
+    return {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}
+
+
+def _path(group: str, key: str, name: str) -> str:
+    if ":" in name:
+        return name
+    offered = _offered(group)
+    if name not in offered:
+        raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(offered))}, or give 'module:Class'")
+    return offered[name]
+
+
+def _load(key: str, path: str, folder: Path | None) -> type:
+    try:
+        algorithm = load(path, None if folder is None else str(folder))
+    except NoSuchAlgorithm as error:
+        raise ScenarioError(f"{key}: cannot load {path}: {error}") from error
+    if not is_dataclass(algorithm):
+        raise UserCodeError(name_of(algorithm), "is not a dataclass of its parameters", definition(algorithm))
+    return algorithm
+
+
+def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any], folder: Path | None) -> Choice:
+    key = f"agents.parameters.{name}"
+    try:
+        with Calling(algorithm, "__init__"):
+            parameters.arguments(algorithm, given)
+    except UserCodeError as error:
+        if isinstance(refused := error.__cause__, ParameterError):
+            known = ", ".join(parameters.names(algorithm)) or "no parameters"
+            where, says = ".".join([key, *refused.path]), refused.says
+            raise ScenarioError(f"{where}: {says}; {name} has {known}") from error
+        raise
+    limits.parameters(key, given)
+    choice = Choice(path, dict(given), None if folder is None else str(folder))
+    with refusing(key, ValueError):
+        choice.build()
+    return choice
+
+
+def _refuse_another_kind(group: str, algorithm: type) -> None:
+    protocol, methods = _PROTOCOLS[group]
+    missing = [method for method in methods if not _has(algorithm, method, protocol)]
+    if missing:
+        has_no = f"has no method {', '.join(missing)}: {protocol.__name__} in docs/estimators.md says what each does"
+        raise UserCodeError(name_of(algorithm), has_no, definition(algorithm))
+
+
+def _has(algorithm: type, method: str, protocol: type) -> bool:
+    with Calling(algorithm, method):
+        written = getattr(algorithm, method, None)
+    unwritten: frozenset[str] = getattr(algorithm, "__abstractmethods__", frozenset())
+    return callable(written) and written is not getattr(protocol, method) and method not in unwritten

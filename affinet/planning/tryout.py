@@ -1,0 +1,75 @@
+"""One tick in silence: what law and estimator want of each other, and what they do wrong, shows before anything starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from affinet.scenario.sections import ScenarioError
+from agents.agent import Agent, AgentAction
+from agents.exchange import Heard
+from analysis.models.arrays import Mask
+from analysis.models.pursuit import Sighting
+from netem.core import channels
+from world.books.history import TAKEN
+
+_LONGEST_NAME = 100  # of a file in an archive
+_NOT_FOR_A_FILE = frozenset({"file", "allow_pickle"})  # parameters of what writes arrays.npz
+
+
+def silent_tick(agents: Agent) -> Mapping[str, tuple[int, ...]]:
+    """All agents as one batch, as in process: what they report, and the shape of each for one agent.
+
+    Raises
+    ------
+    UserCodeError
+        When estimator or law fail, or return what they should not.
+    ScenarioError
+        When a report has a name that every run has already.
+    """
+    batch = agents.brief.present.shape[:1]
+    action = _tick(agents, batch, positioned=True)
+    reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
+    if taken := sorted(reports.keys() & (TAKEN | _NOT_FOR_A_FILE)):
+        said = f"the estimator reports {', '.join(taken)}, which every run has already: give it another name"
+        raise ScenarioError(f"agents: {said}")
+    place = (agents.brief.dimension,)
+    if reports.get(channels.PLACE, place) != place:
+        said = f"where an agent believes it is, (..., {place[0]}), not {reports[channels.PLACE]}: give it another name"
+        raise ScenarioError(f"agents: the estimator reports {channels.PLACE!r}, which is {said}")
+    if long := [name for name in reports if len(name) > _LONGEST_NAME]:
+        raise ScenarioError(f"agents: a report has a name of {len(long[0])} letters: give it at most {_LONGEST_NAME}")
+    return reports
+
+
+def alone(agent: Callable[[int], Agent], positioned: Mask) -> None:
+    """One agent of each kind by itself, as in a process of its own: with no leading axes, and no more than it is told.
+
+    Raises
+    ------
+    UserCodeError
+        When estimator or law fail, or return what they should not.
+    """
+    agents = [agent(row) for row in sorted({int(np.argmax(positioned)), int(np.argmin(positioned))})]
+    for one in agents:
+        _tick(one, (), positioned=bool(positioned[0]) if len(agents) == 1 else one is agents[0])
+
+
+def _tick(agents: Agent, batch: tuple[int, ...], *, positioned: bool) -> AgentAction:
+    brief = agents.brief
+    nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
+    motion = np.repeat(nowhere[..., None, :], agents.law.order - 1, axis=-2) if agents.law.order > 1 else None
+    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, motion)
+    silence = {
+        channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
+        for channel, fields in agents.channels().items()
+    }
+    unseen = np.zeros_like(brief.relative)
+    told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
+    sighting = None
+    if brief.target is not None:
+        sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), *np.zeros((2, *batch), dtype=np.int64))
+    heard = {**silence, channels.CENTRE: Heard(told, nobody)}
+    _, action = agents.act(state, 0, heard, nowhere if positioned else None, motion, sighting)
+    return action

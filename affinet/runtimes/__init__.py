@@ -1,0 +1,1 @@
+"""A plan flown: in this process, side by side, or over processes."""

@@ -1,0 +1,204 @@
+"""A process of a run, as the launcher has it: its pipes, what it told, how it ended."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from affinet.runtimes.silence import ProcessStatus, StatusHistory
+from affinet.runtimes.told import LONGEST_LINE, Beat, Event, NotItsOwn, beat, printable, read, shown
+from netem.processes.supervised import brief_bytes, called
+
+_LAST_LINES, _LAST_BYTES = 12, 1 << 16
+_LONGEST_REASON = 4000
+
+
+class RunFailed(RuntimeError):
+    """The run ended before its last tick: why."""
+
+
+class UserCodeFailed(RunFailed):
+    """It did because a user's own code did something wrong."""
+
+
+@dataclass
+class Child:
+    """A process of the run.
+
+    Parameters
+    ----------
+    role
+        "netem", "world", "centre" or "agent".
+    number
+        Of an agent.
+    process, log
+        The process, and the file its standard error goes to.
+    expected_to_die
+        Whether its death is in the script, or the run is over.
+    killed
+        Whether the script had it killed.
+    is_ready, is_done
+        Whether it has told so.
+    doing, beat_s
+        What it does, and when it told so, by the clock of its crew; None before its first beat.
+    looks
+        What the system says of it, since it was first looked at because nothing moved.
+    """
+
+    role: str
+    number: int | None
+    process: subprocess.Popen[bytes]
+    log: Path
+    expected_to_die: bool = False
+    killed: bool = False
+    is_ready: bool = False
+    is_done: bool = False
+    rss_mb: float = 0.0
+    doing: Beat | None = None
+    beat_s: float = 0.0
+    looks: StatusHistory | None = None
+    _pending: bytes = b""
+
+    @property
+    def name(self) -> str:
+        """For people, and for those who wait for it."""
+        return self.role if self.number is None else called(self.number)
+
+    @property
+    def who(self) -> str:
+        """Its name, and its number among the processes of the machine."""
+        return f"{self.name} (pid {self.process.pid})"
+
+    @property
+    def is_mute(self) -> bool:
+        """Whether its events have ended."""
+        return self.process.stdout is None or self.process.stdout.closed
+
+    @property
+    def events_fd(self) -> int:
+        """Where its events come from."""
+        assert self.process.stdout is not None
+        return self.process.stdout.fileno()
+
+    def order(self, order: str) -> None:
+        """Give it an order; a child that is gone cannot take it, and its end of file will say so."""
+        self._write(f"{order}\n".encode())
+
+    def brief(self, brief: Any) -> None:
+        """Give it its brief, which it reads when it has come that far."""
+        # Longer than a pipe holds: to wait for one that imports, or is frozen, would keep a death of another from being seen.
+        try:
+            threading.Thread(target=self._write, args=(brief_bytes(brief),), daemon=True).start()
+        except RuntimeError as error:  # what Python makes of it where the system has no more threads
+            raise OSError(errno.EAGAIN, str(error)) from error
+
+    def pause(self) -> None:
+        """Stop it, as the script says."""
+        self.process.send_signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on."""
+        self.process.send_signal(signal.SIGCONT)
+
+    def measure(self) -> None:
+        """Note its resident memory."""
+        with suppress(psutil.NoSuchProcess):
+            self.rss_mb = max(self.rss_mb, psutil.Process(self.process.pid).memory_info().rss / 2**20)
+
+    def look(self) -> ProcessStatus:
+        """What the system says of it.
+
+        Raises
+        ------
+        RunFailed
+            When it is gone.
+        """
+        if self.process.poll() is not None:  # something that it had started keeps its pipe open
+            raise RunFailed(self.obituary())
+        process = psutil.Process(self.process.pid)
+        used = process.cpu_times()
+        now = ProcessStatus(process.status(), used.user + used.system)
+        self.looks = StatusHistory(now, now, now) if self.looks is None else self.looks.then(now)
+        return now
+
+    def hear(self) -> list[Event] | None:
+        """What it has told since it was last heard, or None at its end of file.
+
+        Raises
+        ------
+        RunFailed
+            When it failed, or told what is not its own to tell.
+        """
+        chunk = os.read(self.events_fd, 65536)
+        if not chunk:
+            return None
+        *lines, self._pending = (self._pending + chunk).split(b"\n")
+        if len(self._pending) > LONGEST_LINE:
+            said = shown(self._pending)
+            raise RunFailed(f"{self.who}: it said {said} on its standard output, and does not end the line")
+        events = (self._event(line) for line in lines)
+        return [event for event in events if event["event"] != "beat"]
+
+    def free(self) -> None:
+        """Give back what the launcher holds of a process that is gone, or about to be."""
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe:
+                with suppress(BrokenPipeError):
+                    pipe.close()
+
+    def obituary(self) -> str:
+        """How it ended, and its last lines."""
+        code = self.process.wait()
+        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit status {code}"
+        with self.log.open("rb") as log:
+            log.seek(max(0, log.seek(0, os.SEEK_END) - _LAST_BYTES))
+            lines = printable(log.read().decode(errors="replace")).splitlines()[-_LAST_LINES:]
+        said = "".join(f"\n    {line}" for line in lines) if lines else " It had said nothing."
+        return f"{self.who} was {how}.{' Its last lines:' if lines else ''}{said}"
+
+    def report(self) -> dict[str, Any]:
+        """For the summary."""
+        return {
+            "role": self.role,
+            "id": self.number,
+            "pid": self.process.pid,
+            "rss_mb": round(self.rss_mb, 1),
+            "exit": self.process.returncode,
+        }
+
+    def _event(self, line: bytes) -> Event:
+        try:
+            event = read(self.role, line)
+        except NotItsOwn as error:
+            raise RunFailed(f"{self.who}: {error} (docs/protocol.md)") from error
+        match event["event"]:
+            case "failed":
+                raise RunFailed(f"{self.name}: {printable(event['reason'])[:_LONGEST_REASON]}")
+            case "user-code":
+                raise UserCodeFailed(f"{self.name}: {printable(event['reason'])[:_LONGEST_REASON]}")
+            case "beat":
+                self.doing = beat(event)
+            case "ready" if self.is_ready or self.is_done:
+                raise RunFailed(f"{self.who}: it said twice that it is ready (docs/protocol.md)")
+            case "done" if self.is_done or not self.is_ready:
+                raise RunFailed(f"{self.who}: it said that it is done, and was not flying (docs/protocol.md)")
+            case "ready":
+                self.is_ready = True
+            case "done":  # it has done its part: agents leave while the world still writes
+                self.is_done = self.expected_to_die = True
+        return event
+
+    def _write(self, data: bytes) -> None:
+        stdin: Any = self.process.stdin
+        with suppress(BrokenPipeError, ValueError):  # it is gone, or the run is over and the pipe closed
+            stdin.write(data)
+            stdin.flush()

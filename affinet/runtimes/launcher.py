@@ -1,0 +1,260 @@
+"""Runtime 2: a swarm of processes over Zenoh, started, watched, killed and restarted from here."""
+
+from __future__ import annotations
+
+import secrets
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from affinet.planning.plan import Plan
+from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
+from affinet.runtimes.inject import Access
+from affinet.runtimes.interruption import Interrupted, Interruption
+from affinet.runtimes.supervision import ProcessGroup, module
+from affinet.runtimes.told import Event
+from agents.centre.filter import Centre
+from agents.centre.process import CentreBrief
+from agents.process import AgentBrief
+from netem.process import MediumBrief
+from netem.processes.system_errors import afterwards, said
+from netem.wire import keys
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
+from world.brief import WorldBrief
+
+
+@dataclass
+class LaunchRecord:
+    """What came of a run over processes.
+
+    Parameters
+    ----------
+    in_flight, uninstructed
+        Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
+    fired
+        In which tick each trigger fired that did.
+    failure, user_code
+        Why the run ended early, if it did, and whether a user's own code is why.
+    start_s, wall_s
+        From the first process started to the first tick, and from there to the end, in seconds.
+    processes
+        Every process there was.
+    """
+
+    in_flight: int | None = None
+    uninstructed: int | None = None
+    fired: dict[int, int] = field(default_factory=dict)
+    failure: str | None = None
+    user_code: bool = False
+    start_s: float = 0.0
+    wall_s: float = 0.0
+    processes: list[dict[str, Any]] = field(default_factory=list)
+
+
+class Launcher:
+    """Flies one plan over processes."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        out: Path,
+        *,
+        watch: Callable[[int, float], None],
+        viewer: str | None = None,
+        programs: Mapping[int, Sequence[str]] | None = None,
+        interruption: Interruption | None = None,
+    ) -> None:
+        """Nothing is started yet.
+
+        Parameters
+        ----------
+        plan, out
+            What to fly, and the run directory.
+        watch
+            Called with the tick and the tracking error now and then.
+        viewer
+            URL of a Rerun viewer that is listening.
+        programs
+            Command lines that fly some agents in place of `python -m agents` (docs/protocol.md).
+        interruption
+            What may ask the run to end.
+        """
+        self._plan = plan
+        self._out = out
+        self._viewer = viewer
+        self._watch = watch
+        self._programs = programs or {}
+        self._interruption = interruption or Interruption()
+        self._run = keys.fresh()
+        self._logins: dict[str, Login] = {}
+        self._agents: dict[int, Child] = {}
+        self.flight = LaunchRecord()
+
+    def fly(self) -> LaunchRecord:
+        """Run to the end, to the first thing that goes wrong, or until the run is asked to end."""
+        try:
+            self._fly_with_a_crew()
+        except (RunFailed, Interrupted) as failure:
+            self.flight.failure = str(failure)
+            self.flight.user_code = isinstance(failure, UserCodeFailed)
+        except OSError as error:
+            self.flight.failure = f"the swarm could not be launched: {said(error)}"
+        return self.flight
+
+    def _fly_with_a_crew(self) -> None:
+        logs = self._out / "logs"
+        logs.mkdir(parents=True, exist_ok=True)
+        crew = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption)
+        launched = time.perf_counter()
+        with (
+            afterwards(partial(self._note, crew), partial(_remove_unwritten, self._out)),
+            tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private,
+            crew,
+        ):
+            self._private = Path(private)
+            self._start(crew)
+            with Access(self._run, self._logins[CONTROL]).granted(self._out):
+                self._fly(crew, launched)
+
+    def _note(self, crew: ProcessGroup) -> None:
+        self.flight.processes = [child.report() for child in crew.children]
+
+    def _start(self, crew: ProcessGroup) -> None:
+        private = self._private
+        self._logins = self._make_logins(private)
+        crew.start("world", module("world"), self._world_brief(self._logins[WORLD]))
+        crew.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
+        if self._plan.centre:
+            login = self._logins[CENTRE]
+            crew.start("centre", module("agents.centre.process"), self._centre_brief(self._plan.centre, login))
+        for number in range(1, self._plan.world.links.agents + 1):
+            self._start_agent(crew, number)
+        crew.await_ready(crew.children)
+        (private / "users").unlink()  # the medium knows them now, and nobody else has to
+
+    def _make_logins(self, private: Path) -> dict[str, Login]:
+        endpoint = f"unixsock-stream/{private}/z.sock"
+        names = [
+            HUB,
+            WORLD,
+            CONTROL,
+            CENTRE,
+            *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1)),
+        ]
+        logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
+        users = private / "users"
+        users.touch(mode=0o600)
+        users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
+        return logins
+
+    def _fly(self, crew: ProcessGroup, launched: float) -> None:
+        world, medium = crew.children[0], crew.children[1]
+        world.order("go")
+        first_tick = time.perf_counter()
+        self.flight.start_s = first_tick - launched
+        while awaited := [child for child in (world, medium) if not child.is_done]:
+            for child, event in crew.listen():
+                self._heed(crew, child, event)
+                self.flight.wall_s = time.perf_counter() - first_tick
+            crew.blame_the_silent(awaited)
+        crew.release()
+        medium.order("leave")
+        crew.await_all_gone()
+
+    def _heed(self, crew: ProcessGroup, child: Child, event: Event) -> None:
+        match event["event"]:
+            case "tick":
+                self._watch(event["k"], event["error"])
+                crew.children[event["k"] % len(crew.children)].measure()
+            case "kill" | "restart" | "pause" | "resume" as order:
+                self._move(crew, order, event)
+                child.order(order)
+            case "fired":
+                self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
+            case "done" if child.role == WORLD:
+                self.flight.uninstructed = event["uninstructed"]
+            case "done" if child.role == HUB:
+                self.flight.in_flight = event["in_flight"]
+
+    def _move(self, crew: ProcessGroup, order: str, event: Event) -> None:
+        match order:
+            case "kill":
+                for number in event["agents"]:
+                    crew.kill(self._agents[number])
+            case "restart":
+                remembering = event["remembering"]
+                crew.await_ready([self._start_agent(crew, number, number in remembering) for number in event["agents"]])
+            case "pause":
+                for number in event["agents"]:
+                    self._agents[number].pause()
+            case "resume":
+                for number in event["agents"]:
+                    self._agents[number].resume()
+
+    def _start_agent(self, crew: ProcessGroup, number: int, remembers: bool = False) -> Child:
+        login = self._logins[agent_name(number)]
+        program = self._programs.get(number) or module("agents")
+        self._agents[number] = crew.start("agent", program, self._agent_brief(number, login, remembers), number)
+        return self._agents[number]
+
+    def _world_brief(self, login: Login) -> WorldBrief:
+        return WorldBrief(
+            run=self._run,
+            login=login,
+            out=str(self._out),
+            world=self._plan.world,
+            channels=self._plan.channels,
+            faults=self._plan.faults,
+            triggers=self._plan.triggers,
+            reports=self._plan.reports,
+            books=self._plan.books(self._viewer),
+        )
+
+    def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
+        return MediumBrief(
+            run=self._run,
+            login=login,
+            dictionary_file=str(users),
+            seed=self._plan.scenario.seed,
+            links=self._plan.world.links,
+            channels=self._plan.channels,
+            profiles=self._plan.profiles,
+            faults=self._plan.faults,
+            triggers=self._plan.triggers,
+            injected=self._plan.injected,
+            recorded=None if self._plan.journal is None else str(self._plan.journal),
+            positioned=self._plan.positioned,
+        )
+
+    def _centre_brief(self, centre: Centre, login: Login) -> CentreBrief:
+        return CentreBrief(self._run, login, self._plan.world.ticks, centre)
+
+    def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
+        plan, row = self._plan, number - 1
+        links = plan.world.links
+        return AgentBrief(
+            run=self._run,
+            login=login,
+            agent=number,
+            neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
+            estimator=plan.estimator,
+            law=plan.law,
+            leaders=plan.scenario.agents.leaders,
+            leader_gain=plan.scenario.agents.leader_gain,
+            limit=plan.scenario.agents.limit,
+            reports=plan.reports,
+            brief=plan.brief_of(row),
+            checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
+            remembers=remembers,
+        )
+
+
+def _remove_unwritten(out: Path) -> None:
+    # A world that is killed before its first batch leaves tables without even a schema, which nothing can read.
+    for table in out.glob("*.arrows"):
+        if not table.stat().st_size:
+            table.unlink()

@@ -1,0 +1,195 @@
+"""Fly a plan in one of the runtimes, and leave a run directory behind."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from affinet.planning.plan import Plan
+from affinet.runtimes.inprocess import InProcessSwarm
+from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
+from affinet.runtimes.launcher import Launcher
+from affinet.runtimes.rerun_command import NotMended, NoViewer, mend
+from affinet.verdicts import accounts, outcome
+from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.outcome import Outcome
+from analysis.models.arrays import Array
+from netem.processes.system_errors import said
+from netem.processes.user_code import UserCodeError
+from netem.wire import keys
+from world.books import history
+from world.books.history import History, Moments
+from world.recording.file import wrong_with
+
+Runtime = Literal["processes", "inprocess"]
+Watch = Callable[[int, float], None]
+
+
+def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | None = None) -> Outcome:
+    """Run a plan.
+
+    Parameters
+    ----------
+    plan
+        What to fly.
+    runtime
+        Over processes, or in this one; the answers are the same bits.
+    out
+        The run directory, new.
+    watch
+        Called with the tick reached and its tracking error, in square metres, now and then.
+    viewer
+        URL of a Rerun viewer that is listening.
+
+    Raises
+    ------
+    FileExistsError
+        When `out` holds a run already.
+    OSError
+        When `out` cannot be made or written to. What the system refuses later fails the run, and is told in its outcome.
+    Interrupted
+        When a signal asked the run to end; its outcome is written down all the same.
+    """
+    outcome.prepare(plan, out)
+    fly_in = _over_processes if runtime == "processes" else _in_process
+    with interruptible() as interruption:
+        done = fly_in(plan, out, watch, viewer, interruption)
+        try:
+            done.save()
+        except OSError as error:
+            done = done.failing(f"the summary is not written: {said(error)}")
+    interruption.heed()
+    return done
+
+
+def rehearse(plan: Plan) -> Evidence:
+    """Run a plan in this process, and leave nothing behind.
+
+    Raises
+    ------
+    UserCodeError
+        When estimator or law do something wrong.
+    """
+    swarm, flown = InProcessSwarm(plan), History(plan.world, len(plan.channels), plan.reports)
+    started = time.perf_counter()
+    swarm.fly(flown.extend, plan.books(None).batch)
+    return _judged(plan, swarm, flown, time.perf_counter() - started, Path())
+
+
+def evidence(plan: Plan, done: Outcome) -> Evidence | None:
+    """A run with the arrays in its directory; None where it left none."""
+    path = Path(done.out) / history.FILE
+    return Evidence(plan, history.load(path), done) if path.exists() else None
+
+
+def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
+    from netem.medium import journal  # pyarrow takes a while to import, and the start should not wait for it
+
+    launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
+    flight = launcher.flight
+    launcher.fly()
+    path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
+    failure, timeline, told = flight.failure, plan.timeline, None
+    try:
+        if book.exists():
+            timeline = plan.facing(journal.injected(journal.read(book))).timeline
+        for trigger, tick in flight.fired.items():
+            timeline = timeline.fired([trigger], tick)
+        if book.exists() and not path.exists():
+            told = accounts.of_journal(plan, timeline, book)
+    except journal.JournalError as error:
+        failure = "; ".join([*filter(None, [failure]), str(error)])
+    if failure and not path.exists() and recording.exists():
+        try:
+            mend(recording)  # the world was killed, or never got far: it could not close its recording
+        except (NotMended, NoViewer, OSError) as error:
+            failure += f"; {said(error) if isinstance(error, OSError) else error}"
+    if not failure and plan.scenario.record.enabled:
+        failure = wrong_with(recording)
+    return outcome.judge(
+        plan,
+        timeline,
+        history.load(path) if path.exists() else None,
+        in_flight=flight.in_flight,
+        uninstructed=flight.uninstructed,
+        failure=failure,
+        user_code=flight.user_code,
+        accounts=told,
+        wall_s=flight.wall_s,
+        processes=flight.processes,
+        out=out,
+    )
+
+
+def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
+    from world.recording.logbook import RunWriter  # takes a second to import; over processes only the world needs it
+
+    swarm, books, flown = (
+        InProcessSwarm(plan),
+        plan.books(viewer),
+        History(plan.world, len(plan.channels), plan.reports),
+    )
+    started, failure, broken = time.perf_counter(), None, None
+    try:
+        with RunWriter(out, keys.fresh(), plan.world, plan.channels, books) as logbook:
+
+            def see(moments: Moments, next_position: Array) -> None:
+                flown.extend(moments, next_position)
+                logbook.write(moments, swarm.timeline)
+                watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
+                interruption.heed()
+
+            broken = _flown(swarm, see, books.batch, out)
+            failure = None if broken is None else str(broken)
+    except Interrupted as error:
+        failure = str(error)
+    except OSError as error:
+        failure = f"the run could not be written down: {said(error)}"
+    wall_s = time.perf_counter() - started
+    try:
+        if flown.ticks:
+            flown.save(out / history.FILE)
+    except OSError as error:
+        failure = failure or f"the run could not be written down: {said(error)}"
+    return _judged(plan, swarm, flown, wall_s, out, failure, user_code=broken is not None).outcome
+
+
+def _flown(swarm: InProcessSwarm, see: Callable[[Moments, Array], None], batch: int, out: Path) -> UserCodeError | None:
+    """Why the swarm did not fly to the end, if a user's own code is why; its log has the traceback."""
+    try:
+        swarm.fly(see, batch)
+    except UserCodeError as error:
+        log = out / "logs" / "inprocess.log"
+        log.parent.mkdir(exist_ok=True)
+        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8", errors="backslashreplace")
+        return error
+    return None
+
+
+def _judged(
+    plan: Plan,
+    swarm: InProcessSwarm,
+    flown: History,
+    wall_s: float,
+    out: Path,
+    failure: str | None = None,
+    *,
+    user_code: bool = False,
+) -> Evidence:
+    arrays = flown.arrays()
+    done = outcome.judge(
+        plan,
+        swarm.timeline,
+        arrays if flown.ticks else None,
+        in_flight=None if failure else swarm.in_flight,
+        uninstructed=0,
+        failure=failure,
+        user_code=user_code,
+        wall_s=wall_s,
+        processes=[],
+        out=out,
+    )
+    return Evidence(plan, arrays, done)

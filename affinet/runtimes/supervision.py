@@ -1,0 +1,286 @@
+"""The launcher's end of supervision: children it started, what they tell, and how they end.
+
+A child's standard output carries its events, so its end of file is its death, seen at once and without polling. The other
+end is `netem/processes/supervised.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import time
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from affinet.runtimes.child import Child, RunFailed
+from affinet.runtimes.interruption import Interruption
+from affinet.runtimes.silence import holding_up, stalled
+from affinet.runtimes.told import Beat, Event
+from netem.processes.supervised import BEAT_S
+from netem.wire.session import ENVIRONMENT
+
+_GRACE_S = 1.2
+# To start takes a second of processor time, and there may be a hundred on two cores.
+_START_S, _START_EACH_S = 30.0, 3.0
+_LATE_BEATS = 2
+_NAMED = 6
+# What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
+_RUN = """import json, runpy, sys
+path, _, package = sys.argv[1:]
+sys.path[:] = json.loads(path)
+runpy.run_module(package, run_name="__main__", alter_sys=True)"""
+
+
+def module(package: str) -> list[str]:
+    """The command line of `python -m package`, with the search path of this process."""
+    path = [os.path.abspath(entry) for entry in sys.path if entry]
+    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", package]
+
+
+class ProcessGroup:
+    """All children of a run; leaving the block leaves none behind.
+
+    Its clock, `now_s`, runs only while it listens, and never for longer than it meant to: time in which the launcher itself
+    was stopped, or did not come to look, is nobody's silence.
+    """
+
+    def __init__(self, logs: Path, patience_s: float, interruption: Interruption) -> None:
+        """No children yet.
+
+        Parameters
+        ----------
+        logs
+            Where their standard error goes, a file each.
+        patience_s
+            How long nothing may move before somebody is to blame, in seconds.
+        interruption
+            What may ask the run to end.
+        """
+        self._logs = logs
+        self._patience_s = patience_s
+        self._interruption = interruption
+        self._selector = selectors.DefaultSelector()
+        self.now_s = self._moved_s = self._looked_s = 0.0
+        self.children: list[Child] = []
+
+    def __enter__(self) -> ProcessGroup:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end_all()
+        self._selector.close()
+
+    def start(self, role: str, program: Sequence[str], brief: Any, number: int | None = None) -> Child:
+        """Start a program, and give it its brief."""
+        log = self._logs / (f"{role}.log" if number is None else f"{role}-{number}.log")
+        with log.open("ab") as standard_error:
+            process = subprocess.Popen(
+                program,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=standard_error,
+                env=os.environ | ENVIRONMENT,
+                start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
+            )
+        child = Child(role, number, process, log)
+        self.children.append(child)
+        self._selector.register(child.events_fd, selectors.EVENT_READ, child)
+        child.brief(brief)
+        return child
+
+    def await_ready(self, children: Collection[Child]) -> None:
+        """Wait until all of them are ready; as long as somebody gets anywhere, that may take as long as it takes.
+
+        Raises
+        ------
+        RunFailed
+            When one dies or fails, or none gets anywhere for too long.
+        """
+        patience_s = _START_S + _START_EACH_S * len(self.children)
+        waiting, stopped_s = list(children), dict[str, float]()
+        self._moved_s = self.now_s
+        while waiting:
+            self.listen()
+            waiting = [child for child in waiting if not child.is_ready]
+            if self.now_s - self._looked_s < BEAT_S:
+                continue
+            self._looked_s = self.now_s
+            stopped_s = {child.name: stopped_s.get(child.name, self.now_s) for child in waiting if child.look().stopped}
+            late = self.now_s - self._moved_s >= patience_s
+            if late or any(self.now_s - since_s >= self._patience_s for since_s in stopped_s.values()):
+                blamed = [child for child in waiting if late or child.name in stopped_s]
+                raise RunFailed(f"{_said_of(blamed)}, and not ready: waited {self.now_s - self._moved_s:.1f} s for it")
+        for child in children:
+            child.measure()
+            child.looks = None
+        self._moved_s = self.now_s
+
+    def listen(self) -> list[tuple[Child, Event]]:
+        """What the children tell until the next beat is due; it may be nothing.
+
+        Raises
+        ------
+        RunFailed
+            When a child dies out of turn, fails, or tells what is not its own to tell.
+        Interrupted
+            When the run was asked to end.
+        """
+        self._interruption.heed()
+        began_s = time.monotonic()
+        ready = self._selector.select(BEAT_S)
+        self.now_s += min(time.monotonic() - began_s, BEAT_S)
+        return [(key.data, event) for key, _ in ready for event in self._hear(key.data)]
+
+    def blame_the_silent(self, awaited: Collection[Child]) -> None:
+        """Go on as long as something moves, or somebody works at it.
+
+        Parameters
+        ----------
+        awaited
+            Those for whom the launcher waits.
+
+        Raises
+        ------
+        RunFailed
+            When nothing moves: who is to blame.
+        """
+        quiet_s = self.now_s - self._moved_s
+        if quiet_s < self._patience_s / 2 or self.now_s - self._looked_s < BEAT_S:
+            return
+        self._looked_s = self.now_s
+        alive = {child.name: child for child in self.children if not (child.killed or child.is_done)}
+        beats = {name: self._lately(child) for name, child in alive.items()}
+        culprits = [alive[name] for name in holding_up(beats, [child.name for child in awaited])]
+        for child in culprits:
+            child.look()
+        if quiet_s < self._patience_s:
+            return
+        if not culprits:
+            raise RunFailed(f"nothing moved for {quiet_s:.1f} s, and nobody is to blame: {_who_waits(beats, beats)}")
+        looks = {child.name: child.looks for child in culprits if child.looks is not None}
+        trusted = [child.name for child in culprits if child.role != "agent"]
+        if blamed := stalled(looks, self._patience_s, trusted):
+            said = _said_of([alive[name] for name in blamed])
+            raise RunFailed(f"{said}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}")
+
+    def kill(self, child: Child) -> None:
+        """Kill a child as the script says, wait until it is gone, and keep nothing of it but its report."""
+        child.expected_to_die = child.killed = True
+        child.measure()
+        child.process.kill()
+        child.process.wait()
+        self._forget(child)
+
+    def release(self) -> None:
+        """The run is over: from now on everybody may leave."""
+        for child in self.children:
+            child.expected_to_die = True
+            child.resume()
+
+    def await_all_gone(self) -> None:
+        """Wait until every child has left; as long as they go, or work at it, that may take as long as it takes.
+
+        Raises
+        ------
+        RunFailed
+            When one does not leave, or left with an error.
+        """
+        self._moved_s = self.now_s
+        staying = [child for child in self.children if child.process.poll() is None]
+        while staying:
+            self._await_end(staying[0])
+            if len(staying) > len(staying := [child for child in staying if child.process.poll() is None]):
+                self._moved_s = self.now_s
+            if self.now_s - self._moved_s >= self._patience_s:
+                self._blame_those_who_stay(staying)
+        for child in self.children:
+            if child.process.returncode and not child.killed:
+                raise RunFailed(child.obituary())
+
+    def _await_end(self, child: Child) -> None:
+        if not child.is_mute:
+            self.listen()
+            return
+        self._interruption.heed()
+        with suppress(subprocess.TimeoutExpired):
+            child.process.wait(BEAT_S)
+            return
+        self.now_s += BEAT_S
+
+    def _blame_those_who_stay(self, staying: Sequence[Child]) -> None:
+        for child in staying:
+            with suppress(RunFailed):  # it has left by now
+                child.look()
+        looks = {child.name: child.looks for child in staying if child.looks is not None}
+        trusted = [child.name for child in staying if child.role != "agent"]
+        if blamed := stalled(looks, self._patience_s, trusted):
+            said = _said_of([child for child in staying if child.name in blamed])
+            raise RunFailed(f"{said}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run")
+
+    def _lately(self, child: Child) -> Beat | None:
+        """What a child does, unless it has not said so for a while, or never does."""
+        return child.doing if self.now_s - child.beat_s <= _LATE_BEATS * BEAT_S else None
+
+    def _hear(self, child: Child) -> list[Event]:
+        before = child.doing
+        events = child.hear()
+        if events is None:
+            self._forget(child)
+            if not child.expected_to_die:
+                raise RunFailed(child.obituary())
+            return []
+        if events or child.doing != before:
+            self._moved_s = self.now_s
+            self._forget_looks()
+        child.beat_s = self.now_s
+        return events
+
+    def _forget_looks(self) -> None:
+        for child in self.children:
+            child.looks = None
+
+    def _forget(self, child: Child) -> None:
+        if not child.is_mute:
+            self._selector.unregister(child.events_fd)
+            child.free()
+
+    def _end_all(self) -> None:
+        # The world goes first: it has a recording to close.
+        alive = [child for child in self.children if child.process.poll() is None]
+        for child in sorted(alive, key=lambda child: child.role != "world"):
+            child.process.terminate()
+            child.resume()  # one that is stopped could not hear that it has to leave
+        deadline = time.monotonic() + _GRACE_S
+        for child in alive:
+            try:
+                child.process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                child.process.kill()
+                child.process.wait()
+        for child in self.children:
+            child.free()
+
+
+def _said_of(children: Sequence[Child]) -> str:
+    said = ", ".join(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children[:_NAMED])
+    return f"{said} and {len(children) - _NAMED} more" if len(children) > _NAMED else said
+
+
+def _who_waits(beats: Mapping[str, Beat | None], whom: Collection[str]) -> str:
+    waiting = {name: beat for name, beat in beats.items() if beat and not set(whom).isdisjoint(beat.waits)}
+    said = [f"{name} waits for {_of_whom(beat)}" for name, beat in islice(waiting.items(), _NAMED)]
+    more = [f"and {len(waiting) - _NAMED} more"] if len(waiting) > _NAMED else []
+    return "; ".join([*said, *more]) or "the launcher waits for it"
+
+
+def _of_whom(beat: Beat) -> str:
+    whom = ", ".join(beat.waits[:_NAMED]) + (
+        f" and {len(beat.waits) - _NAMED} more" if len(beat.waits) > _NAMED else ""
+    )
+    return f"{whom} ({beat.what}, tick {beat.tick})"

@@ -1,0 +1,162 @@
+"""Scenario files: TOML -> `Scenario`, with overrides, and every error said with its file, key and what would be right."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import ValidationError
+
+from affinet.scenario import files, inputs, source
+from affinet.scenario.explain import explained
+from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.source import Source
+from affinet.scenario.words import one_line
+
+FILE = inputs.SCENARIO
+_FOLDER = "scenarios"
+
+
+def shipped() -> list[str]:
+    """Names of the scenarios that come with affinet."""
+    return files.shipped(_FOLDER)
+
+
+def load(name: str, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
+    """The scenario in a file, or one that is shipped, with `a.b=c` overrides applied.
+
+    Parameters
+    ----------
+    name
+        Of the scenario, or the path of its file. Paths in the file, and modules it names, are relative to its folder.
+    overrides
+        Changes to it.
+    folder
+        What paths and modules in the overrides are relative to; by default the scenario's own folder.
+
+    Raises
+    ------
+    ScenarioError
+        When there is no such scenario, or something in it is wrong.
+    """
+    file = files.read(name, _FOLDER, "scenario")
+    origin, asked_from = Source(file.name, file.text, tuple(overrides)), folder or file.folder
+    scenario = _validated(inputs.anchored(file.says, file.folder), origin, asked_from)
+    scenario._own = inputs.own(scenario, lambda key, _: _folders(origin, key, asked_from, file.folder))
+    return scenario
+
+
+def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
+    """The scenario of a run directory, as it was flown, with overrides applied.
+
+    Parameters
+    ----------
+    out
+        The run directory. What the run read is taken from the copies in there.
+    overrides, folder
+        Changes to it, and what paths and modules in them are relative to, by default the run directory.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none, or it cannot be read any more.
+    """
+    file = out / FILE
+    try:
+        raw = json.loads(file.read_text(encoding="utf-8"))
+        if not isinstance(raw, dict):
+            raise TypeError(f"{FILE} holds no table")
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise ScenarioError(f"{out}: no run directory: {error}; name one that `affinet run` printed") from error
+    origin, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
+    scenario = _validated(inputs.anchored(raw, out.absolute()), origin, asked_from)
+    shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}
+
+    def folders(key: str, name: str) -> Sequence[Path]:
+        return _folders(origin, key, asked_from, *([shelves[name]] if name in shelves else []))
+
+    scenario._own = inputs.own(scenario, folders)
+    return scenario
+
+
+def extended(given: Scenario, entries: Sequence[Mapping[str, Any]]) -> Scenario:
+    """The scenario with further entries in its timeline, said as a file says them.
+
+    Raises
+    ------
+    ScenarioError
+        When something in them is wrong.
+    """
+    raw = given.model_dump(mode="json", exclude_none=True)
+    raw["timeline"] += entries
+    scenario = _validated(raw, Source("in code", "", ()), Path())
+    scenario._own = given.own_modules
+    return scenario
+
+
+def to_toml(given: Scenario) -> str:
+    """The scenario as a file says it."""
+    return tomli_w.dumps(given.model_dump(mode="json", exclude_none=True, exclude_defaults=True) | _verbs(given))
+
+
+def _verbs(given: Scenario) -> dict[str, Any]:
+    # The verb of an entry is a default of its model, and must be said all the same.
+    entries = [
+        {"verb": entry.model_dump()["verb"]} | entry.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+        for entry in given.timeline
+    ]
+    return {"timeline": entries} if entries else {}
+
+
+def _folders(origin: Source, key: str, asked_from: Path, *folders: Path) -> Sequence[Path]:
+    """Where the module lies that a key names: beside who named it; overrides may name one that lies beside the file, too."""
+    return (asked_from, *folders) if origin.overrides_say(key) else folders
+
+
+def _validated(raw: dict[str, Any], origin: Source, folder: Path) -> Scenario:
+    for override in origin.overrides:
+        _override(raw, override, folder)
+    try:
+        scenario = Scenario.model_validate(raw)
+    except ValidationError as error:
+        raise ScenarioError(
+            explained(error, Scenario, origin)
+        ) from None  # it has all that pydantic says, in better words
+    scenario._source = origin
+    return scenario
+
+
+def _value(override: str, text: str) -> Any:
+    """What the text behind the = says: a value as a file says it, or a word without quotes."""
+    try:
+        text.encode()
+        said = tomllib.loads(f"value = {text}")
+    except UnicodeEncodeError as error:
+        raise ScenarioError(f"--set {one_line(override)}: not UTF-8, as TOML must be") from error
+    except (ValueError, RecursionError):
+        return text.strip()
+    if said.keys() != {"value"}:
+        raise ScenarioError(
+            f"--set {one_line(override)}: it says more than one value; give each key a --set of its own"
+        )
+    return said["value"]
+
+
+def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
+    key, equals, text = override.partition("=")
+    *tables, name = source.parts(key)
+    if not equals or not name:
+        raise ScenarioError(f"--set {one_line(override)}: write it as key=value, like network.availability=0.5")
+    value = _value(override, text)
+    table: Any = raw
+    for step in tables:
+        table = table.setdefault(step, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"--set {one_line(override)}: {step} is not a table")
+    said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)
+    table[name] = reduce(lambda outer, step: outer[step], [*tables, name], inputs.anchored(said, folder))

@@ -1,0 +1,314 @@
+"""Link profiles as they stand in a scenario: typed models of every impairment, with the presets that come with affinet."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
+
+from affinet.scenario.units import (
+    AtLeast1,
+    Below1,
+    BitsPerSecond,
+    Finite,
+    NotNegative,
+    Positive,
+    Probability,
+    Steps,
+    Ticks,
+)
+from affinet.scenario.words import among
+from netem.impairments import netem_string
+
+Step = Literal["time", "packet"]
+
+_ENDLESS = 1e300  # s: beyond, a whole number is no float
+
+
+class Section(BaseModel):
+    """A table of a scenario."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Bernoulli(Section):
+    """Independent loss with probability p."""
+
+    model: Literal["bernoulli"]
+    p: Probability
+
+
+class Gilbert(Section):
+    """Bursts of losses, by what they look like: mean loss, and mean burst in steps."""
+
+    model: Literal["gilbert"]
+    loss: Probability
+    burst: AtLeast1
+    extra_delay: NotNegative = 0.0
+    step: Step = "time"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Gilbert:
+        most = self.burst / (self.burst + 1.0)
+        if self.loss > most:
+            raise ValueError(
+                f"bursts of mean length {self.burst:g} lose at most {most:.4g}; lengthen burst or lower loss"
+            )
+        return self
+
+
+class GilbertElliott(Section):
+    """Good and bad periods: p and r are the chances to go from good to bad and back, `good` and `bad` the losses in them."""
+
+    model: Literal["gilbert-elliott"]
+    p: Probability
+    r: Probability
+    bad: Probability = 1.0
+    good: Probability = 0.0
+    extra_delay: NotNegative = 0.0
+    step: Step = "time"
+
+
+class Markov(Section):
+    """The four-state model of netem's `loss state`."""
+
+    model: Literal["markov"]
+    p13: Probability
+    p31: Probability
+    p32: Probability
+    p23: Probability
+    p14: Probability
+    step: Step = "time"
+
+
+class Bursts(Section):
+    """Mean loss, in bursts whose lengths 1, 2, ... have these probabilities."""
+
+    model: Literal["bursts"]
+    loss: Probability
+    lengths: Annotated[list[NotNegative], Field(min_length=1)]
+
+
+class Listed(Section):
+    """Exactly these messages of every link and channel, counted from 0."""
+
+    model: Literal["list"]
+    messages: Annotated[list[Ticks], Field(min_length=1)]
+
+
+class Traced(Section):
+    """Availability from a CSV file (time,src,dst,availability), or from the journal of an earlier run (its directory)."""
+
+    model: Literal["trace"]
+    file: str
+
+
+class Disk(Section):
+    """Everything within `range` metres, nothing beyond."""
+
+    model: Literal["disk"]
+    range: Positive
+
+
+class Ramp(Section):
+    """Everything up to `inner` metres, nothing from `outer` on, in proportion between."""
+
+    model: Literal["ramp"]
+    inner: NotNegative
+    outer: Positive
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Ramp:
+        if self.inner > self.outer:
+            raise ValueError(f"inner {self.inner:g} m lies beyond outer {self.outer:g} m")
+        return self
+
+
+class LogDistance(Section):
+    """Log-distance path loss with shadowing: half of the messages pass at `range` metres."""
+
+    model: Literal["log-distance"]
+    range: Positive
+    exponent: Positive = 3.0
+    shadowing: NotNegative = 4.0
+    coherence: NotNegative = 0.0
+
+
+class RoundRobin(Section):
+    """Every agent attends to one neighbour at a time, for `hold` ticks."""
+
+    model: Literal["round-robin"]
+    hold: Steps = 1
+
+
+class Slotted(Section):
+    """Every agent speaks in its own slot of `hold` ticks, one after the other."""
+
+    model: Literal["slotted"]
+    hold: Steps = 1
+
+
+class DutyCycle(Section):
+    """Open for `on` ticks of every `period`."""
+
+    model: Literal["duty-cycle"]
+    period: Steps
+    on: Steps
+
+    @model_validator(mode="after")
+    def _shorter(self) -> DutyCycle:
+        if self.on > self.period:
+            raise ValueError(f"on ({self.on} ticks) is longer than the period ({self.period} ticks)")
+        return self
+
+
+Loss = Annotated[
+    Bernoulli
+    | Gilbert
+    | GilbertElliott
+    | Markov
+    | Bursts
+    | Listed
+    | Traced
+    | Disk
+    | Ramp
+    | LogDistance
+    | RoundRobin
+    | Slotted
+    | DutyCycle,
+    Field(discriminator="model"),
+]
+
+LOSSES: dict[str, type[Section]] = {
+    get_args(model.model_fields["model"].annotation)[0]: model for model in get_args(get_args(Loss)[0])
+}
+
+
+def _delays(given: Any) -> list[float] | str | None:
+    if given is None or isinstance(given, str):
+        return given
+    if isinstance(given, list) and given and all(type(one) in (int, float) and 0 <= one < _ENDLESS for one in given):
+        return list(map(float, given))
+    raise ValueError("give delays in seconds, at least 0, like [0.010, 0.012], or the name of a file with one a line")
+
+
+class DelayModel(Section):
+    """One-way delay in seconds; `jitter` is a half-width (uniform) or a standard deviation (normal, pareto).
+
+    `table` holds measured delays, or names a file of them.
+    """
+
+    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"]
+    mean: NotNegative | None = None
+    jitter: NotNegative | None = None
+    table: Annotated[list[float] | str | None, PlainValidator(_delays)] = None
+    correlation: Below1 = 0.0
+    order: Literal["free", "kept"] = "free"
+
+    @model_validator(mode="after")
+    def _whole(self) -> DelayModel:
+        needs = {"table": {"table"}, "constant": {"mean"}, "exponential": {"mean"}}.get(self.model, {"mean", "jitter"})
+        given = {name for name in ("mean", "jitter", "table") if getattr(self, name) is not None}
+        if given != needs:
+            raise ValueError(f"the model {self.model!r} is given by {' and '.join(sorted(needs))}")
+        if self.model == "pareto" and not (self.mean and self.jitter):
+            raise ValueError("a Pareto delay needs a mean and a jitter above 0")
+        return self
+
+
+class Corruption(Section):
+    """Messages that arrive wrong, with probability p; `by` is what a bias adds to every number."""
+
+    kind: Literal["stale", "bias", "nan", "bit-flip"]
+    p: Probability
+    by: Finite | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Corruption:
+        if (self.kind == "bias") != (self.by is not None):
+            raise ValueError("give `by` with the kind 'bias', and with no other")
+        return self
+
+
+class RateLimit(Section):
+    """A token bucket: rate in bits per second, burst and queue in bytes."""
+
+    rate: BitsPerSecond
+    queue: Steps = 10_000
+    burst: Ticks = 0
+
+
+class LinkProfile(Section):
+    """What happens to the messages of a link. `like` names a profile to start from, `netem` is an option string of tc netem."""
+
+    like: str | None = None
+    netem: Annotated[str | None, Field(exclude=True)] = None  # a scenario as resolved has what it means instead
+    loss: list[Loss] | None = None
+    delay: DelayModel | None = None
+    duplicate: Probability | None = None
+    reorder: Probability | None = None
+    corrupt: list[Corruption] | None = None
+    rate: RateLimit | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_netem(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or not isinstance(given.get("netem"), str):
+            return given
+        read = netem_string.read(given["netem"]).profile
+        if twice := sorted(read.keys() & given.keys()):
+            raise ValueError(f"{', '.join(twice)}: given by netem and beside it")
+        return given | read
+
+    @model_validator(mode="after")
+    def _whole(self) -> LinkProfile:
+        kinds = [corruption.kind for corruption in self.corrupt or []]
+        if len(set(kinds)) < len(kinds) or sum(corruption.p for corruption in self.corrupt or []) > 1.0:
+            raise ValueError("corrupt: name each kind once; their probabilities add up to at most 1")
+        for what in (("trace",), ("disk", "ramp", "log-distance"), ("round-robin", "slotted", "duty-cycle"), ("list",)):
+            if sum(loss.model in what for loss in self.loss or []) > 1:
+                raise ValueError(f"loss: at most one of {', '.join(what)}")
+        return self
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Where netem's own semantics mislead."""
+        return netem_string.read(self.netem).notes if self.netem else ()
+
+    def over(self, base: LinkProfile) -> LinkProfile:
+        """This profile, with what it does not say taken from another."""
+        said = {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
+        return base.model_copy(update={"netem": None} | said)
+
+
+@cache
+def presets() -> dict[str, LinkProfile]:
+    """The profiles that come with affinet."""
+    raw = tomllib.loads((resources.files("affinet.shipped") / "profiles.toml").read_text(encoding="utf-8"))
+    return {name: LinkProfile.model_validate(profile) for name, profile in raw.items()}
+
+
+def resolve(name: str, own: dict[str, LinkProfile]) -> LinkProfile:
+    """The profile of a name, with all it is like.
+
+    Raises
+    ------
+    ValueError
+        When there is none, or profiles are like each other in a circle.
+    """
+    chain: list[str] = []
+    found = LinkProfile()
+    while True:
+        if name in chain:
+            raise ValueError(f"profiles are like each other in a circle: {' -> '.join([*chain, name])}")
+        chain.append(name)
+        here = own.get(name) or presets().get(name)
+        if here is None:
+            raise ValueError(f"no profile {name!r}; {among(name, sorted({*own, *presets()}))}")
+        found = found.over(here)
+        if here.like is None:
+            return found
+        name = here.like

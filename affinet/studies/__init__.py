@@ -1,0 +1,1 @@
+"""Many runs, claims about them, and figures."""

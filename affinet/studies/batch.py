@@ -1,0 +1,241 @@
+"""Many runs of one plan, flown side by side: what comes of each, tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from affinet.planning.plan import Plan
+from affinet.runtimes.inprocess import FlownTick, InProcessSwarm
+from affinet.runtimes.side_by_side import side_by_side
+from analysis.metrics import consistency, errors
+from analysis.metrics.localization import EdgeInformation, centroid, distance, ringing, weights
+from analysis.models.arrays import Array, Mask
+from analysis.models.information import position, reported
+from netem.core import channels
+from netem.faults.timeline import Timeline
+from world.books.edges import of_swarms
+from world.books.history import Moment
+from world.books.localized import FirstMeasurements
+
+# As many as fit into a cache of a few megabytes together; more at once are not faster.
+_AT_ONCE = 50
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What came of many runs.
+
+    Parameters
+    ----------
+    seconds
+        Of the ticks kept, shape (T,).
+    error
+        Tracking error (15) in those ticks, shape (R, T), in square metres; NaN or infinite where a run has diverged.
+    mean_error
+        Its mean over all ticks of each run, shape (R,).
+    psi
+        Convergence indicators (16) in those ticks, shape (R, T, N).
+    procrustes, estimation_error, covariance_trace
+        As in `analysis.metrics.errors`, in those ticks, shape (R, T), in metres, metres and square metres.
+    nees, nis
+        Means over the edges, as in `analysis.metrics.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
+    localization, drift, ringing
+        Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
+        metres, and which share of the steps since the moment before went back; NaN where
+        nobody localizes, the second also while anybody is silent.
+    found, agreed, ideal, apart, behind, effort
+        Of agents that pursue a target, in those ticks, shape (R, T): how far the target is from where each finds it by itself,
+        from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal
+        are apart; how far agents are from the places that they steer for; how hard they steer. Root mean squares over the
+        agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
+    peak
+        The longest input of any agent since the moment before, shape (R, T), in metres per second or per second squared.
+    first
+        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position`, and
+        the `target` where there is one, (T, D), in metres.
+    """
+
+    seconds: Array
+    error: Array
+    mean_error: Array
+    psi: Array
+    procrustes: Array
+    estimation_error: Array
+    covariance_trace: Array
+    nees: Array
+    nis: Array
+    localization: Array
+    drift: Array
+    ringing: Array
+    found: Array
+    agreed: Array
+    ideal: Array
+    apart: Array
+    behind: Array
+    effort: Array
+    peak: Array
+    first: Mapping[str, Array]
+
+    def together(self, other: Runs) -> Runs:
+        """These runs and others of the same ticks."""
+        joined = {
+            field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
+            for field in fields(self)
+            if field.name not in {"seconds", "first"}
+        }
+        return Runs(self.seconds, first=self.first, **joined)
+
+
+def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
+    """The runs of a plan with each of these seeds.
+
+    Parameters
+    ----------
+    plan, seeds
+        What to fly, and with which draws.
+    every
+        Ticks from one that is kept to the next.
+
+    Raises
+    ------
+    NotABatch
+        When the plan cannot be flown side by side.
+    """
+    parts = [_fly(plan, seeds[first : first + _AT_ONCE], every) for first in range(0, len(seeds), _AT_ONCE)]
+    return reduce(Runs.together, parts)
+
+
+def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
+    together, size = side_by_side(plan, seeds), plan.world.formation.agents
+    swarm = InProcessSwarm(together)
+    tracking: list[Array] = []
+    kept: list[dict[str, Array]] = []
+    first: list[dict[str, Array]] = []
+    peak = np.zeros(len(seeds))
+    places = _Places(plan, len(seeds))
+
+    def of_runs(array: Any) -> Any:
+        return array.reshape(len(seeds), size, *array.shape[1:])
+
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
+        for instant in swarm.ticks():
+            flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
+            target = of_runs(together.world.goal(instant.tick, instant.scene))
+            tracking.append(errors.tracking_error(flown, target, present))
+            places.measure(instant, plan.timeline)
+            peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
+            if instant.tick % every == 0:
+                moment = swarm.moment(instant)
+                looked_at = _looked_at(together, present, moment, of_runs)
+                awake = of_runs(~swarm.timeline.at(instant.tick).idle)
+                kept.append({"peak": peak, **looked_at, **_pursued(together, awake, moment, of_runs)})
+                first.append(_shown(plan, moment))
+                places.keep(moment)
+                peak = np.zeros(len(seeds))
+        error = np.stack(tracking, axis=1)
+        mean_error = error.mean(axis=1)
+    return Runs(
+        seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
+        error=error[:, ::every],
+        mean_error=mean_error,
+        **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+        first={name: np.stack([one[name] for one in first]) for name in first[0]},
+        **places.found(len(kept)),
+    )
+
+
+class _Places:
+    """Where the agents of many runs believe they are, and what all their measurements say."""
+
+    def __init__(self, plan: Plan, runs: int) -> None:
+        self._wanted = channels.PLACE in plan.reports
+        self._runs = runs
+        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
+        self._kept: list[Array] = []
+        self._recent: list[Array] = []
+        self._since = 0
+        self._rang: list[Array] = []
+
+    def measure(self, instant: FlownTick, timeline: Timeline) -> None:
+        """Take in the measurements of a tick; all runs have the faults of one."""
+        if self._wanted:
+            measured, fates = self._of_runs(instant.measured), self._of_runs(instant.verdicts.fate[0])
+            self._first.tick(timeline, instant.tick, measured, fates)
+            self._recent.append(self._of_runs(instant.action.estimate.reports[channels.PLACE]))
+            self._since += 1
+
+    def keep(self, moment: Moment) -> None:
+        """Keep what the agents believe in a tick."""
+        if self._wanted:
+            self._kept.append(self._of_runs(moment.reports[channels.PLACE]))
+            self._rang.append(ringing(np.stack(self._recent, axis=1))[:, -self._since :].mean(axis=1))
+            self._recent, self._since = self._recent[-2:], 0  # a step, and the step before it
+
+    def found(self, moments: int) -> dict[str, Array]:
+        """How far off they were, how far their centroid has gone, and how much they rang, shape (R, T)."""
+        if not self._wanted:
+            nothing = np.full((self._runs, moments), np.nan)
+            return {"localization": nothing, "drift": nothing, "ringing": nothing}
+        place, edges = np.stack(self._kept, axis=1), self._first.edges()
+        edges = EdgeInformation(edges.information[:, None], edges.pull[:, None])
+        centre = centroid(place, weights(edges))
+        return {
+            "localization": distance(place, edges),
+            "drift": np.linalg.norm(centre - centre[:, :1], axis=-1),
+            "ringing": np.stack(self._rang, axis=1),
+        }
+
+    def _of_runs(self, array: Any) -> Any:
+        return array.reshape(self._runs, -1, *array.shape[1:])
+
+
+def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """What is kept of a tick of all runs of a plan; `of_runs` splits what begins with all agents into (R, N)."""
+    formation = plan.world.formation
+    nominal = formation.nominal[: formation.agents // plan.world.swarms]
+    edges = of_swarms(
+        plan.world,
+        position=moment.position,
+        measured=moment.measured,
+        fates=moment.fates[0],
+        estimate=moment.estimate,
+        covariance=moment.covariance,
+        known=moment.known,
+    )
+    innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+    return {
+        "psi": of_runs(moment.psi),
+        "procrustes": errors.procrustes_error(of_runs(moment.position), nominal, present),
+        "estimation_error": errors.estimation_error(edges.estimate, edges.true, edges.known),
+        "covariance_trace": errors.covariance_trace(edges.covariance, formation.dimension),
+        "nees": consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known).mean,
+        "nis": innovations.mean,
+    }
+
+
+def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
+    """Of the first run."""
+    size, nominal = plan.world.formation.agents, plan.world.formation.nominal
+    shown = {name: said[:size] for name, said in (*moment.reports.items(), ("position", moment.position))}
+    return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
+
+
+def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """How well a target is found and followed by those awake (R, N) in a tick of all runs, shape (R,)."""
+    names = ("found", "agreed", "ideal", "apart", "behind", "effort")
+    pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
+    if pursuit is None or not reported(moment.reports):
+        return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
+    said = moment.reports
+    target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)
+    agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"][:, 0]))
+    number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
+    mean = np.where(awake[..., None], information, 0.0).sum(axis=1) / number[:, None]
+    ideal = position(mean, target.shape[-1], pursuit.target.order)[:, None]
+    off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))
+    return {name: errors.root_mean_square(each, awake) for name, each in zip(names, off, strict=True)}

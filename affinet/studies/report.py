@@ -1,0 +1,149 @@
+"""What a study leaves: data as Parquet, figures, and the verdicts.
+
+`curves.parquet` has a row for each moment of each case, with mean and standard deviation over its runs; `runs.parquet` has a
+row for each run, with what stands for each quantity over its time.
+"""
+
+from __future__ import annotations
+
+import json
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from affinet.runtimes import directories
+from affinet.studies.judging import graph_rates
+from affinet.studies.quantities import NAMES, Quantity, over_time
+from affinet.studies.study import Result, Study
+from analysis.claims.checks import ClaimVerdict
+from analysis.figures import curves, target
+from analysis.figures.curves import Curve
+from analysis.figures.target import TargetRun
+from analysis.models.arrays import Array
+from analysis.models.information import reported, unpacked
+from netem.core.channels import PLACE
+
+_CLAIMS = "claims.json"
+_MOST_FLIGHTS = 8  # in one picture
+
+
+def prepare(out: Path | str) -> Path:
+    """The directory for what a study leaves, made before anything flies: this one, or by default one of this name.
+
+    Raises
+    ------
+    OSError
+        When it holds a study already, or cannot be made.
+    """
+    if isinstance(out, str):
+        return directories.for_study(out)
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / _CLAIMS).exists():
+        raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
+    return out
+
+
+def save(out: Path, study: Study, results: list[Result]) -> None:
+    """Write the data into a directory."""
+    pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
+    pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
+
+
+def tell(out: Path, verdicts: list[ClaimVerdict]) -> None:
+    """Write the verdicts into a directory."""
+    (out / _CLAIMS).write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
+
+
+def failed(out: Path) -> Path:
+    """Write down of what a report has just failed; the file that says so."""
+    log = out / "report.log"
+    log.write_text(traceback.format_exc(), encoding="utf-8")
+    return log
+
+
+def draw(out: Path, study: Study, results: list[Result]) -> None:
+    """Draw the figures into a directory."""
+    if any(claim.check == "slower_with_anchor" for claim in study.claims):
+        curves.rates(out / "rates.png", study.title, graph_rates())
+    if all(reported(one.runs.first) for one in results):
+        _draw_pursuit(out, study, results)
+    if all(PLACE in one.runs.first for one in results):
+        curves.evolution(
+            out / "evolution.png",
+            study.title,
+            [(one.labels, one.runs.seconds, one.runs.first[PLACE]) for one in results],
+        )
+    axes = [axis.name for axis in study.axes]
+    drawn, quantity = _curves(results, study.quantity, study.since), curves.said(*NAMES[study.quantity])
+    bound = None if study.bound is None else (study.bound.at, study.bound.says)
+    if study.figure == "curves":
+        curves.curves(out / "figure.png", study.title, drawn, axes, quantity, bound)
+        dimension = results[0].plan.world.formation.dimension
+        normalised = {what.upper(): _curves(results, what, study.since) for what in ("nees", "nis")}
+        curves.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
+    elif study.figure == "sweep":
+        curves.sweep(out / "figure.png", study.title, drawn, axes, study.along or "", quantity, bound)
+    elif study.figure == "map":
+        curves.settings(out / "figure.png", study.title, drawn, axes)
+    else:
+        (one,) = results
+        corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
+        numbers = np.flatnonzero(one.followers)
+        path, seen = out / "figure.png", corrected[:, :, numbers]
+        curves.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())
+
+
+def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:
+    if len(results) <= _MOST_FLIGHTS:
+        target.pursued(out / "target.png", study.title, [_flight(one) for one in results])
+    one, *_ = results
+    fused, known = (_first_of_vector(one, one.runs.first[name]) for name in ("fused", "information"))
+    if (fused != known).any():
+        target.agreement(out / "agreement.png", study.title, one.runs.seconds, fused, known)
+
+
+def _first_of_vector(one: Result, information: Array) -> Array:
+    _, vectors = unpacked(information, one.plan.world.formation.dimension, information.shape[-2] - 1)
+    return vectors[..., 0, 0]
+
+
+def _flight(one: Result) -> TargetRun:
+    first = one.runs.first
+    return TargetRun(
+        labels=one.labels,
+        seconds=one.runs.seconds,
+        target=first["target"],
+        position=first["position"],
+        places=one.plan.world.formation.nominal,
+        found=first["found"],
+        reference=first["reference"][:, :, 0],
+    )
+
+
+def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Curve]:
+    return [
+        Curve(one.labels, one.runs.seconds, getattr(one.runs, quantity), over_time(one.runs, quantity, (since, None)))
+        for one in results
+    ]
+
+
+def _moments(one: Result) -> pa.Table:
+    number = len(one.runs.seconds)
+    columns = {name: [label] * number for name, label in one.labels.items()} | {"seconds": one.runs.seconds}
+    with np.errstate(invalid="ignore", over="ignore"):
+        for name in NAMES:
+            values = getattr(one.runs, name)
+            columns |= {f"mean_{name}": values.mean(axis=0), f"std_{name}": values.std(axis=0)}
+    return pa.table(columns)
+
+
+def _runs(one: Result, since: float) -> pa.Table:
+    number = len(one.runs.mean_error)
+    labels = {name: [label] * number for name, label in one.labels.items()}
+    with np.errstate(invalid="ignore", over="ignore"):
+        overall = {name: over_time(one.runs, name, (since, None)) for name in NAMES}
+    return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error} | overall)

@@ -1,0 +1,304 @@
+"""Studies: a scenario over a grid of settings and many seeds, a figure, and a verdict on every claim.
+
+A study is a TOML file like those in `affinet/shipped/studies/`: axes of values that override the scenario, and claims, each
+with the check that decides it (`judging.py`, `analysis/claims/checks.py`); `report.py` writes down what came of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+
+from affinet.planning import plan as planning
+from affinet.planning.plan import Plan, PlanError
+from affinet.scenario import files
+from affinet.scenario import loading as scenarios
+from affinet.scenario.explain import explained, named_in
+from affinet.scenario.profiles import Section
+from affinet.scenario.sections import ScenarioError
+from affinet.scenario.source import Source
+from affinet.scenario.units import Finite, NotNegative
+from affinet.studies import checks
+from affinet.studies.batch import Runs, fly_all
+from affinet.studies.checks import Wrong
+from affinet.studies.pool import in_processes
+from affinet.studies.quantities import Quantity
+from analysis.metrics.indicator import Bounds, bounds
+from analysis.models.arrays import Mask
+from analysis.models.graph import adjacency
+from netem.processes.user_code import UserCodeError
+
+Labels = dict[str, str]
+_FOLDER = "studies"
+_KEPT = 600  # moments of a curve
+
+
+# What checks compare with, and want to be told; the others need nothing.
+_WANTED: dict[str, frozenset[str]] = {
+    "flat": frozenset({"level"}),
+    "approaches": frozenset({"to", "level"}),
+    "stays_below": frozenset({"level"}),
+    "leaves": frozenset({"level"}),
+    "lower": frozenset({"to"}),
+    "ratio": frozenset({"to", "between"}),
+    "value": frozenset({"level", "between"}),
+}
+
+
+class Axis(Section):
+    """A setting that is varied: for each value its label, and the overrides it stands for."""
+
+    name: str
+    values: dict[str, list[str]]
+
+
+class Claim(Section):
+    """What a paper says, for `each` label of some axes, and the check that decides it over the cases of these labels.
+
+    With `levels`, a level for each label of the one axis in `each`, it says so of these labels only.
+    """
+
+    says: str
+    each: list[str] = Field(default_factory=list)
+    check: Literal[
+        "flat",
+        "approaches",
+        "stays_below",
+        "leaves",
+        "indicator_below_error",
+        "lower",
+        "ratio",
+        "exponential",
+        "slower_with_anchor",
+        "value",
+    ]
+    of: Labels = Field(default_factory=dict)
+    to: Labels | None = None
+    quantity: Quantity | None = None
+    to_quantity: Quantity | None = None
+    level: Finite | None = None
+    levels: dict[str, Finite] | None = None
+    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    since: NotNegative = 0.0
+    until: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _compared(self) -> Claim:
+        level = self.level if self.levels is None else self.levels
+        given = {
+            key for key, value in (("to", self.to), ("level", level), ("between", self.between)) if value is not None
+        }
+        wanted = _WANTED.get(self.check, frozenset())
+        if missing := sorted(wanted - given):
+            raise ValueError(f"the check {self.check!r} needs {' and '.join(missing)}")
+        if useless := sorted(given - wanted):
+            raise ValueError(f"the check {self.check!r} has no use for {' and '.join(useless)}")
+        if self.to_quantity is not None and self.to is None:
+            raise ValueError("to_quantity is that of what is compared with: give to")
+        if self.levels is not None and (len(self.each) != 1 or self.level is not None):
+            raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
+        return self
+
+    def settings(self, axes: Iterable[Axis]) -> Iterator[Labels]:
+        """Every setting that it speaks of: a label of each of the axes it is for."""
+        values = {axis.name: list(axis.values) for axis in axes}
+        if self.levels is not None:
+            values[self.each[0]] = list(self.levels)
+        for labels in itertools.product(*(values[name] for name in self.each)):
+            yield dict(zip(self.each, labels, strict=True))
+
+
+class Bound(Section):
+    """A line in the figure that no curve should cross, and what it says."""
+
+    at: Finite
+    says: str
+
+
+class Size(Section):
+    """How large the study is: runs of each case, and overrides for all of them."""
+
+    runs: Annotated[int, Field(ge=1, le=1_000_000)]
+    set: list[str] = Field(default_factory=list)
+
+
+class Study(Section):
+    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis, `since` a second."""
+
+    title: str
+    source: str
+    figure: Literal["curves", "sweep", "indicator", "map"]
+    scenario: str
+    quantity: Quantity = "error"
+    bound: Bound | None = None
+    set: list[str] = Field(default_factory=list)
+    full: Size
+    quick: Size
+    axes: list[Axis]
+    along: str | None = None
+    since: NotNegative = 0.0
+    skip: list[Labels] = Field(default_factory=list)
+    claims: list[Claim] = Field(default_factory=list)
+    _source: Source | None = PrivateAttr(default=None)
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path | None:
+        """Of the file that says it: paths in it, and modules it names, are relative to that."""
+        return self._folder
+
+    @model_validator(mode="after")
+    def _drawn(self) -> Study:
+        if self.figure == "map" and self.quantity != "error":
+            raise ValueError(f"a map shows the mean tracking error, and no {self.quantity}")
+        return self
+
+    def size(self, *, quick: bool) -> Size:
+        """How large it is."""
+        return self.quick if quick else self.full
+
+    def refuse(self, found: Iterable[Wrong]) -> None:
+        """Say what was found to be wrong, if anything was.
+
+        Raises
+        ------
+        ScenarioError
+            With the place in the file, and the keys of all that is wrong.
+        """
+        if wrong := list(found):
+            raise ScenarioError(named_in(self._source or Source("in code", "", ()), wrong))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setting of a study: its label on every axis, and the runs of it."""
+
+    labels: Labels
+    overrides: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A case, what was flown, and what came of its runs."""
+
+    labels: Labels
+    plan: Plan
+    runs: Runs
+
+    @property
+    def followers(self) -> Mask:
+        """Who is no leader, shape (N,)."""
+        return ~self.plan.world.formation.is_leader
+
+    @property
+    def bounds(self) -> Bounds:
+        """Those of the indicator (18) where nothing is lost."""
+        world = self.plan.world
+        heard = adjacency(np.ones(len(world.links), dtype=bool), world.links.src, world.links.dst, world.links.agents)
+        return bounds(world.formation.nominal, heard, world.sensor.common)
+
+
+def shipped() -> list[str]:
+    """Names of the studies that come with affinet."""
+    return files.shipped(_FOLDER)
+
+
+def load(name: str) -> Study:
+    """The study in a file, or one that is shipped.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none, or something in it is wrong.
+    """
+    file = files.read(name, _FOLDER, "study")
+    source = Source(file.name, file.text, ())
+    try:
+        study = Study.model_validate(file.says)
+    except ValidationError as error:
+        raise ScenarioError(explained(error, Study, source)) from None  # it has all that pydantic says, in better words
+    study._source = source
+    study._folder = file.folder
+    study.refuse(checks.of_file(study))
+    return study
+
+
+def cases(study: Study, *, quick: bool) -> Iterator[Case]:
+    """Every setting of its grid."""
+    size = study.size(quick=quick)
+    for labels in itertools.product(*(axis.values for axis in study.axes)):
+        chosen = [axis.values[label] for axis, label in zip(study.axes, labels, strict=True)]
+        overrides = (*study.set, *size.set, *itertools.chain.from_iterable(chosen))
+        case = Case(dict(zip((axis.name for axis in study.axes), labels, strict=True)), overrides)
+        if not any(selected(case, left_out) for left_out in study.skip):
+            yield case
+
+
+def fly(planned: Sequence[tuple[Case, Plan]], runs: int) -> Iterator[Result]:
+    """So many runs of each case, as many cases at a time as there are processors; each as it is done."""
+    with closing(in_processes(_fly, [(plan, runs) for _, plan in planned])) as flown:
+        for case, plan in planned:
+            with _in_case(case):
+                done = next(flown)
+            yield Result(case.labels, plan, done)
+
+
+def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
+    """All its cases with what flies in them: whatever cannot fly, be drawn or be judged is found before any has flown.
+
+    Raises
+    ------
+    ScenarioError
+        When something cannot.
+    UserCodeError
+        When a user's own estimator or law does something wrong.
+    """
+    todo = list(cases(study, quick=quick))
+    study.refuse(checks.of_cases(study, todo, study.size(quick=quick).runs))
+    planned = [(case, _planned(study, case)) for case in todo]
+    study.refuse(checks.of_plans(study, planned, [_every(plan) for _, plan in planned]))
+    return planned
+
+
+def _planned(study: Study, case: Case) -> Plan:
+    folder = study.folder or Path()
+    name = str(folder / study.scenario) if study.scenario.endswith(".toml") else study.scenario
+    try:
+        with _in_case(case):
+            return planning.make(scenarios.load(name, case.overrides, study.folder))
+    except (ScenarioError, PlanError) as error:
+        where = f"{study._source.file}: " if study._source else ""
+        said = str(error).removeprefix("--set: ")  # which nobody typed
+        raise ScenarioError(f"{where}case {checks.named(case.labels)}: {said}") from error
+
+
+@contextmanager
+def _in_case(case: Case) -> Iterator[None]:
+    """What a user's own code does wrong in the block, it does in this case."""
+    try:
+        yield
+    except UserCodeError as error:
+        error.during = f"case {checks.named(case.labels)}"
+        raise
+
+
+def _every(plan: Plan) -> int:
+    return max(1, plan.world.ticks // _KEPT)
+
+
+def _fly(given: tuple[Plan, int]) -> Runs:
+    plan, runs = given
+    first = plan.scenario.seed
+    return fly_all(plan, range(first, first + runs), _every(plan))
+
+
+def selected(one: Case | Result, labels: Mapping[str, str]) -> bool:
+    """Whether a case has all these labels."""
+    return all(one.labels[name] == label for name, label in labels.items())

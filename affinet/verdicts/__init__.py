@@ -1,0 +1,1 @@
+"""What came of a run, and whether what must hold did."""

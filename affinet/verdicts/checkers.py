@@ -1,0 +1,303 @@
+"""Checkers: what should hold of a run. How they are made and compose is in `affinet.verdicts.checking`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
+from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.outcome import Verdict
+from agents.loading.calling import Calling
+from agents.loading.returned import WrongReturn, shown
+from analysis.metrics import consistency, localization
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core import channels
+from netem.faults.fault import Fault, Verb
+from world.books.localized import FirstMeasurements
+from world.physics import sensors
+
+_STANDARD_ERRORS = 3.0
+
+
+Signal = Callable[[Evidence], Mask]
+
+
+def error_below(level: float) -> Signal:
+    """Whether the tracking error is below a level, in square metres, in each tick."""
+    above_zero("error_below", level=level)
+    return lambda evidence: evidence.error < level
+
+
+def always(signal: Signal, *, since: float = 0.0, until: float | None = None, name: str = "always") -> Checker:
+    """A signal (T,) holds in every tick from `since` to `until`, in seconds."""
+    times(name, since=since, until=until)
+
+    def check(evidence: Evidence) -> CheckResult:
+        span = span_of(evidence, since, until)
+        holds = _truths(name, signal, evidence)[span.start : span.stop]
+        return every(
+            name, evidence, span, holds, lambda tick: f"it does not hold; the error is {evidence.error[tick]:.4g} m²"
+        )
+
+    return Checker(name, check)
+
+
+def eventually(signal: Signal, *, since: float = 0.0, within: float | None = None, name: str = "eventually") -> Checker:
+    """A signal (T,) holds in some tick from `since` on, `within` so many seconds."""
+    times(name, since=since, within=within)
+
+    def check(evidence: Evidence) -> CheckResult:
+        span = span_of(evidence, since, None if within is None else since + within)
+        holds = _truths(name, signal, evidence)[span.start : span.stop]
+        if not len(holds):
+            return CheckResult(name, "vacuous", None, "the run ended before")
+        if holds.any():
+            tick = span.start + int(np.argmax(holds))
+            return CheckResult(name, "pass", None, f"from tick {tick} ({tick * evidence.dt:g} s)")
+        return CheckResult(name, "fail", span.stop - 1, f"never, up to {(span.stop - 1) * evidence.dt:g} s")
+
+    return Checker(name, check)
+
+
+def bounded(level: float) -> Checker:
+    """The tracking error stays below a level, in square metres."""
+    name = f"bounded({level:g})"
+    above_zero(name, level=level)
+    return always(error_below(level), name=name)
+
+
+def converged(level: float, by: float) -> Checker:
+    """From a time on, in seconds, the tracking error stays below a level, in square metres."""
+    name = f"converged({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
+    return always(error_below(level), since=by, name=name)
+
+
+def recovers(level: float, within: float) -> Checker:
+    """So many seconds after each fault that ends, and until another begins, the tracking error is below a level (m2).
+
+    A fault is not looked at where another still holds at its end, or begins before the error has had its time. Vacuous where
+    none is left, or none of them ever lifted the error above the level.
+    """
+    name = f"recovers({level:g}, within={within:g})"
+    above_zero(name, level=level)
+    times(name, within=within)
+
+    def check(evidence: Evidence) -> CheckResult:
+        faults = [bite.fault for bite in evidence.bites if bite.at is not None]
+        spent = 0
+        for fault in sorted(faults, key=lambda fault: fault.end or evidence.ticks):
+            if fault.end is None or _others_hold(faults, fault, fault.end):
+                continue
+            deadline = fault.end + evidence.tick(within)
+            following = [other.start for other in faults if other is not fault and other.start >= fault.end]
+            end = min([evidence.ticks, *following])
+            if deadline >= end or (evidence.error[fault.start : end] < level).all():
+                continue
+            spent += 1
+            good = evidence.error[deadline:end] < level
+            if not good.all():
+                tick = deadline + int(np.argmin(good))
+                after = (tick - fault.end) * evidence.dt
+                says = f"{evidence.error[tick]:.4g} m² {after:g} s after the end of '{fault.describe()}'"
+                return CheckResult(name, "fail", tick, says)
+        if not spent:
+            return CheckResult(name, "vacuous", None, f"no fault that ended had lifted the error above {level:g} m²")
+        return CheckResult(name, "pass", None, f"after {spent} faults")
+
+    return Checker(name, check)
+
+
+def never_heard_across_a_cut() -> Checker:
+    """While a cut or partition holds, nothing that was said under it arrives over its links."""
+    name = "never_heard_across_a_cut()"
+
+    def check(evidence: Evidence) -> CheckResult:
+        newest, links, cuts = evidence.arrays["newest"], evidence.plan.world.links, 0
+        for number, fault in enumerate(evidence.timeline.faults):
+            if fault.verb not in (Verb.CUT, Verb.PARTITION) or fault.trigger is not None:
+                continue
+            held = evidence.timeline.held(number)
+            under = newest[fault.start : fault.end][:, :, held]
+            cuts += under.size
+            heard = np.argwhere(under >= fault.start)
+            if len(heard):
+                tick, channel, place = heard[0].tolist()
+                row = int(np.flatnonzero(held)[place])
+                who = f"{links.dst[row]} heard {links.src[row]} on {evidence.plan.channels[channel]}"
+                return CheckResult(name, "fail", fault.start + tick, f"{who} across '{fault.describe()}'")
+        return CheckResult(
+            name, "pass" if cuts else "vacuous", None, f"{cuts} times silent" if cuts else "nothing was cut"
+        )
+
+    return Checker(name, check)
+
+
+def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
+    """The filters' covariances tell the truth: mean NEES over all edges inside its chi-square band, in most ticks.
+
+    In a share `level` of the ticks from `since` on, or fewer by no more than chance explains, the mean over the edges estimated
+    lies in the two-sided band of that probability. Edges and ticks count as independent, so the band is a little narrow.
+    """
+    name = f"consistent({level:g}, since={since:g})"
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"{name}: level is a share of the ticks between 0 and 1")
+    times(name, since=since)
+
+    def check(evidence: Evidence) -> CheckResult:
+        span = span_of(evidence, since, None)
+        mean, number = _mean_nees(evidence, span)
+        tested = number > 0
+        if not tested.any():
+            return CheckResult(name, "vacuous", None, "no edge was estimated")
+        dimension = evidence.plan.world.formation.dimension
+        low, high = consistency.band(level, dimension, np.maximum(number, 1))
+        inside = (mean >= low) & (mean <= high)
+        share, least = inside[tested].mean(), level - _STANDARD_ERRORS * np.sqrt(level * (1.0 - level) / tested.sum())
+        says = (
+            f"{share:.1%} of the ticks inside the band, mean NEES {mean[tested].mean():.3g} for {dimension} dimensions"
+        )
+        if share >= least and np.isfinite(mean[tested]).all():
+            return CheckResult(name, "pass", None, says)
+        return CheckResult(name, "fail", span.start + int(np.argmax(~inside & tested)), says)
+
+    return Checker(name, check)
+
+
+def collision_free(distance: float) -> Checker:
+    """No two bodies come closer than a distance, in metres."""
+    name = f"collision_free({distance:g})"
+    above_zero(name, distance=distance)
+
+    def check(evidence: Evidence) -> CheckResult:
+        position, agents = evidence.position, evidence.plan.world.links.agents
+        one, other = np.triu_indices(agents, 1)
+        apart = np.linalg.norm(position[:, one] - position[:, other], axis=-1)
+        apart = np.where(evidence.embodied[:, one] & evidence.embodied[:, other], apart, np.inf)
+        return every(
+            name,
+            evidence,
+            range(evidence.ticks),
+            (apart >= distance).all(axis=-1),
+            lambda tick: _closest(apart[tick], one, other),
+        )
+
+    return Checker(name, check)
+
+
+def agreement(level: float, by: float = 0.0) -> Checker:
+    """From a time on, in seconds, the maps Theta that neighbours perceive differ by an indicator psi (16) below a level.
+
+    Vacuous for estimators that perceive no map.
+    """
+    name = f"agreement({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
+
+    def check(evidence: Evidence) -> CheckResult:
+        psi, span = evidence.arrays["psi"], span_of(evidence, by, None)
+        told = psi[span.start : span.stop]
+        if not len(told) or np.isnan(told).all():
+            return CheckResult(name, "vacuous", None, "nobody perceived a map and heard another")
+        agreed = np.isnan(told) | (told < level)
+        return every(
+            name,
+            evidence,
+            span,
+            agreed.all(axis=-1),
+            lambda tick: f"psi of agent {int(np.argmin(agreed[tick - span.start])) + 1} is {np.nanmax(psi[tick]):.4g}",
+        )
+
+    return Checker(name, check)
+
+
+def energy(level: float) -> Checker:
+    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s (m2/s3 of accelerations)."""
+    name = f"energy({level:g})"
+    above_zero(name, level=level)
+
+    def check(evidence: Evidence) -> CheckResult:
+        power = np.where(evidence.present[..., None], evidence.arrays["input"] ** 2, 0.0).sum(axis=(1, 2))
+        spent = np.cumsum(power) * evidence.dt
+        return every(name, evidence, range(evidence.ticks), spent < level, lambda tick: f"{spent[tick]:.4g} are spent")
+
+    return Checker(name, check)
+
+
+def localized(level: float, by: float = 0.0) -> Checker:
+    """From a time on, in seconds, agents are where the best answer to all first measurements puts them, to a level, in metres.
+
+    That is the root of the mean squared distance, both relative to their weighted centroid; vacuous where nobody localizes.
+    """
+    name = f"localized({level:g}, by={by:g})"
+    above_zero(name, level=level)
+    times(name, by=by)
+
+    def check(evidence: Evidence) -> CheckResult:
+        if channels.PLACE not in evidence.arrays:
+            return CheckResult(name, "vacuous", None, "nobody said where it is")
+        span = span_of(evidence, by, None)
+        known = FirstMeasurements.of(
+            evidence.plan.world, evidence.timeline, evidence.arrays["measured"], evidence.arrays["fates"][:, 0]
+        )
+        off = localization.distance(evidence.arrays[channels.PLACE][span.start : span.stop], known.edges())
+        if np.isnan(off).all():
+            return CheckResult(name, "vacuous", None, "what was measured does not join all agents")
+        return every(name, evidence, span, off < level, lambda tick: f"they are {off[tick - span.start]:.4g} m off")
+
+    return Checker(name, check)
+
+
+def smooth(share: float) -> Checker:
+    """Estimated positions do not ring: no more than a share of their steps go back on the step before."""
+    name = f"smooth({share:g})"
+    if not 0.0 <= share < 1.0:
+        raise ValueError(f"{name}: share is one of the steps, at least 0 and below 1")
+
+    def check(evidence: Evidence) -> CheckResult:
+        if channels.PLACE not in evidence.arrays:
+            return CheckResult(name, "vacuous", None, "nobody said where it is")
+        place = evidence.arrays[channels.PLACE]
+        always = ~np.isnan(place).any(axis=(0, 2))
+        if not always.any():
+            return CheckResult(name, "vacuous", None, "nobody said all along where it is")
+        back = float(localization.ringing(place[:, always]).mean())
+        return CheckResult(name, "pass" if back <= share else "fail", None, f"{back:.2%} of the steps go back")
+
+    return Checker(name, check)
+
+
+def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> Verdict:
+    """The verdict of a test: a failure outweighs what proved nothing, and that outweighs a pass."""
+    verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
+    ranked: tuple[Verdict, ...] = ("fail", "vacuous", "pass")
+    return next(verdict for verdict in ranked if verdict in verdicts)
+
+
+def _truths(name: str, signal: Signal, evidence: Evidence) -> Mask:
+    with Calling(signal, name):
+        holds = signal(evidence)
+        if not isinstance(holds, np.ndarray) or holds.dtype != np.bool_ or holds.shape != (evidence.ticks,):
+            raise WrongReturn(f"a signal must be bool (T,) = ({evidence.ticks},), got {shown(holds)}")
+    return holds
+
+
+def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:
+    return any(other is not fault and other.start < tick and other.active(tick) for other in faults)
+
+
+def _closest(apart: Array, one: Integers, other: Integers) -> str:
+    pair = int(np.argmin(apart))
+    return f"agents {one[pair] + 1} and {other[pair] + 1} are {apart[pair]:.3g} m apart"
+
+
+def _mean_nees(evidence: Evidence, span: range) -> consistency.Normalised:
+    """Of the edges estimated in each tick."""
+    links, arrays = evidence.plan.world.links, evidence.arrays
+    part = slice(span.start, span.stop)
+    known = arrays["known"][part] & (evidence.awake & evidence.present)[part, :, None]
+    true = sensors.relative(evidence.position[part], links)[:, links.slots]
+    return consistency.of_errors(arrays["estimate"][part], true, arrays["covariance"][part], known)

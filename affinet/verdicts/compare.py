@@ -1,0 +1,119 @@
+"""Two runs compared bit by bit: the first thing in which they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.models.arrays import Mask
+from netem.core.links import Links
+from world.books import history
+from world.books.history import Arrays
+
+_OF_LINKS = ("measured",)
+_OF_CHANNELS = ("fates", "newest")
+# In the order in which a tick makes them, so that a cause is named before what follows from it; what estimators report and the
+# input come after.
+_MADE = (
+    "target",
+    "position",
+    "error",
+    "measured",
+    "fates",
+    "newest",
+    "copies",
+    "late",
+    "dropped",
+    "known",
+    "estimate",
+    "covariance",
+    "psi",
+    "feasible",
+)
+_OF_NOBODY = ("error", "copies", "late", "dropped")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where two runs part.
+
+    Parameters
+    ----------
+    tick
+        The first in which they differ.
+    quantity
+        The first array in which they do.
+    where
+        The agent, or the link and channel.
+    one, other
+        The two values.
+    """
+
+    tick: int
+    quantity: str
+    where: str
+    one: str
+    other: str
+
+    def __str__(self) -> str:
+        at = f" of {self.where}" if self.where else ""
+        return f"tick {self.tick}: {self.quantity}{at} is {self.one} in one run and {self.other} in the other"
+
+
+def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequence[str]) -> Difference | None:
+    """The first difference of two runs over the same links and channels; None when every bit is the same."""
+    names = (*_MADE, *sorted((one.keys() | other.keys()) - {*_MADE, "input"}), "input")
+    for name in names:
+        forms = [_form(arrays.get(name)) for arrays in (one, other)]
+        if forms[0] != forms[1]:  # their values cannot be held against each other
+            return Difference(0, name, "", *forms)
+    parted = [
+        (tick, place, name)
+        for place, name in enumerate(names)
+        if (tick := _first_tick(one[name], other[name])) is not None
+    ]
+    if not parted:
+        return None
+    tick, _, name = min(parted)
+    if tick >= min(len(one[name]), len(other[name])):
+        lengths = [f"{len(arrays['error'])} ticks long" for arrays in (one, other)]
+        return Difference(tick, "the run", "", *lengths)
+    here, there = one[name][tick : tick + 1], other[name][tick : tick + 1]
+    place = tuple(np.argwhere(_unlike(here, there))[0].tolist())
+    return Difference(
+        tick, name, _where(name, place[1:], links, channels), repr(here[place].item()), repr(there[place].item())
+    )
+
+
+def _form(array: NDArray[Any] | None) -> str:
+    """What kind of numbers, and how many of them in a tick."""
+    return "missing" if array is None else f"{array.dtype} {array.shape[1:]}"
+
+
+def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:
+    common = min(len(one), len(other))
+    unlike = _unlike(one[:common], other[:common])
+    in_tick = np.logical_or.reduce(unlike, axis=tuple(range(1, unlike.ndim)))
+    if in_tick.any():
+        return int(np.argmax(in_tick))
+    return None if len(one) == len(other) else common
+
+
+def _unlike(one: NDArray[Any], other: NDArray[Any]) -> Mask:
+    """Where two arrays differ in any bit: a NaN is like itself, and 0.0 is not -0.0."""
+    if one.dtype.kind == "f":
+        one, other = (history.one_nan(array).view(np.uint64) for array in (one, other))
+    unlike: Mask = np.not_equal(one, other)
+    return unlike
+
+
+def _where(name: str, row: tuple[int, ...], links: Links, channels: Sequence[str]) -> str:
+    if name in _OF_LINKS:
+        return f"{links.src[row[0]]}->{links.dst[row[0]]}"
+    if name in _OF_CHANNELS:
+        return f"{channels[row[0]]} on {links.src[row[1]]}->{links.dst[row[1]]}"
+    return "" if name in _OF_NOBODY else f"agent {row[0] + 1}"

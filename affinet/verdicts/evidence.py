@@ -1,0 +1,93 @@
+"""What a run leaves to judge it by: its plan, its faults where they came to lie, and its arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from affinet.planning.plan import Plan
+from affinet.verdicts.bites import Bite
+from affinet.verdicts.outcome import Outcome
+from analysis.models.arrays import Array, Mask
+from netem.faults.timeline import Timeline
+from world.books.history import Arrays
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A run, for checkers and tests.
+
+    Parameters
+    ----------
+    plan
+        What was flown.
+    arrays
+        What happened; every array begins with the ticks (docs/testing.md).
+    outcome
+        The run's own verdict.
+    """
+
+    plan: Plan
+    arrays: Arrays
+    outcome: Outcome
+
+    @property
+    def timeline(self) -> Timeline:
+        """Its faults, where they came to lie."""
+        return self.outcome.timeline
+
+    @property
+    def ticks(self) -> int:
+        """How many were flown."""
+        return len(self.arrays["error"])
+
+    @property
+    def dt(self) -> float:
+        """Tick, in seconds."""
+        return self.plan.world.dt
+
+    @property
+    def seconds(self) -> Array:
+        """The time of each tick, shape (T,)."""
+        times: Array = np.arange(self.ticks, dtype=np.float64) * self.dt
+        return times
+
+    @property
+    def error(self) -> Array:
+        """Tracking error (15), shape (T,), in square metres."""
+        return self.arrays["error"]
+
+    @property
+    def position(self) -> Array:
+        """Of the agents in each tick, shape (T, N, D), in metres."""
+        return self.arrays["position"][: self.ticks]
+
+    @property
+    def bites(self) -> tuple[Bite, ...]:
+        """What each fault took hold of."""
+        return self.outcome.faults
+
+    @cached_property
+    def present(self) -> Mask:
+        """Agents that take part, shape (T, N)."""
+        return self.timeline.present(range(self.ticks))
+
+    @cached_property
+    def embodied(self) -> Mask:
+        """Agents that have a body in the air, shape (T, N)."""
+        return self._of_conditions(lambda now: ~now.vanished)
+
+    @cached_property
+    def awake(self) -> Mask:
+        """Agents whose processes live and run, shape (T, N)."""
+        return self._of_conditions(lambda now: ~now.idle)
+
+    def tick(self, seconds: float) -> int:
+        """The tick of a time."""
+        return round(seconds / self.dt)
+
+    def _of_conditions(self, read: Any) -> Mask:
+        return np.array([read(self.timeline.at(tick)) for tick in range(self.ticks)], dtype=bool)

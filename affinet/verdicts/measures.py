@@ -1,0 +1,45 @@
+"""How far off a run was, in what matters of it: where agents are at rest or pursue a target, no formation is tracked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from affinet.planning.plan import Plan
+from analysis.metrics import localization
+from analysis.metrics.errors import root_mean_square
+from analysis.models.arrays import Array
+from analysis.models.information import reported
+from netem.core import channels
+from netem.faults.timeline import Timeline
+from world.books.history import Arrays
+from world.books.localized import FirstMeasurements
+
+Figures = dict[str, float | None]
+
+
+def figures(values: Array) -> Figures:
+    """Mean, last and largest of what there is in each tick, shape (T,); None for one that is no finite number."""
+    if not len(values):
+        return {"mean": None, "final": None, "max": None}
+    with np.errstate(over="ignore", invalid="ignore"):  # of a run that has diverged
+        found = {"mean": values.mean(), "final": values[-1], "max": values.max()}
+    return {name: float(value) if np.isfinite(value) else None for name, value in found.items()}
+
+
+def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]:
+    """The errors that matter, in metres, of agents that find out where they are, or pursue a target; none of others.
+
+    `localization_error` is that of the checker `localized`, in the ticks in which there is one; `goal_distance` how far agents
+    are from their places about the target, `target_error` how far the target is from where they steer for: root mean squares.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        if channels.PLACE in plan.reports:
+            known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["fates"][:, 0])
+            off = localization.distance(arrays[channels.PLACE], known.edges())
+            return {"localization_error": figures(off[~np.isnan(off)])}
+        if plan.world.pursuit is not None and reported(plan.reports):
+            target = arrays["target"] - plan.world.formation.nominal
+            off = arrays["reference"][:, :, 0] - target
+            missed = root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
+            return {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
+    return {}

@@ -1,0 +1,246 @@
+"""What came of a run: its verdict, its figures, and the files it leaves behind."""
+
+from __future__ import annotations
+
+import json
+import platform
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from affinet.planning.plan import Plan
+from affinet.scenario import inputs, loading
+from affinet.verdicts import measures
+from affinet.verdicts.accounts import Accounts
+from affinet.verdicts.bites import Bite, bites
+from affinet.verdicts.measures import Figures
+from netem.faults.timeline import Timeline
+from netem.medium.verdict import Fate, Ledger
+from netem.processes import system_errors
+from world.books import history
+from world.books.history import Arrays, digest
+
+_SUMMARY = "summary.json"
+_LEFT_BY_A_RUN = (loading.FILE, _SUMMARY, history.FILE, "journal.arrows", "graph.arrows", "run.rrd")
+
+Verdict = Literal["pass", "fail", "vacuous"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds.
+
+    `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
+    where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
+    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early.
+    """
+
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    user_code: bool
+    digest: str | None
+    flown: dict[str, Any]
+    ticks: int
+    wall_s: float
+    simulated_s: float
+    tracking_error: Figures
+    errors: dict[str, Figures]
+    messages: dict[str, Any]
+    faults: tuple[Bite, ...]
+    timeline: Timeline
+    processes: tuple[dict[str, Any], ...]
+    out: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values; a figure that does not exist is null."""
+        plain = {name: value for name, value in vars(self).items() if name not in ("simulated_s", "timeline")}
+        if plain.pop("errors"):
+            del plain["tracking_error"]
+        plain |= self.errors
+        plain["faults"] = [bite.to_json() for bite in self.faults]
+        plain["wall_s"] = round(self.wall_s, 3)
+        plain["ticks_per_s"] = round(self.ticks_per_s, 1)
+        plain["real_time_factor"] = round(self.real_time_factor, 3)
+        return plain
+
+    @property
+    def ticks_per_s(self) -> float:
+        """Ticks flown per second of wall time."""
+        return self.ticks / self.wall_s if self.wall_s > 0 else 0.0
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per second of wall time."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
+
+    def failing(self, reason: str) -> Outcome:
+        """The outcome of a run that failed for this reason too."""
+        return replace(self, verdict="fail", reasons=(*self.reasons, reason))
+
+    def save(self) -> None:
+        """Write `summary.json` into the run directory.
+
+        Raises
+        ------
+        OSError
+            When it cannot be written.
+        """
+        path = Path(self.out) / _SUMMARY
+        with system_errors.about(path):
+            path.write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
+
+
+def judge(
+    plan: Plan,
+    timeline: Timeline,
+    arrays: Arrays | None,
+    *,
+    in_flight: int | None,
+    uninstructed: int | None,
+    failure: str | None,
+    user_code: bool,
+    accounts: Accounts | None = None,
+    wall_s: float,
+    processes: list[dict[str, Any]],
+    out: Path,
+) -> Outcome:
+    """The outcome of a run.
+
+    Parameters
+    ----------
+    plan
+        What was flown.
+    timeline
+        Its faults, where they came to lie.
+    arrays
+        What happened; None when the run left no arrays.
+    in_flight, uninstructed
+        Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
+    failure, user_code
+        Why the run ended early, if it did, and whether a user's own code is why.
+    accounts
+        What the journal says where there are no arrays.
+    wall_s
+        From the first tick to the last, in seconds.
+    processes, out
+        Every process there was, and the run directory.
+    """
+    ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
+    messages = _messages(arrays, accounts, in_flight, uninstructed)
+    faults = [] if arrays is None else bites(plan, timeline, arrays)
+    wrong = [failure] if failure else []
+    if not failure:
+        wrong += _what_is_wrong(arrays, messages)
+    idle = [bite for bite in faults if not bite.touched]
+    empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
+    empty += _untracked(arrays)
+    verdict: Verdict = "fail" if wrong else "vacuous" if empty else "pass"
+    reasons = wrong or empty
+    return Outcome(
+        verdict=verdict,
+        reasons=tuple(reasons),
+        user_code=user_code,
+        digest=None if arrays is None else digest(arrays),
+        flown=_flown(plan),
+        ticks=ticks,
+        wall_s=wall_s,
+        simulated_s=ticks * plan.world.dt,
+        tracking_error=_tracking(arrays),
+        errors={} if arrays is None else measures.errors(plan, timeline, arrays),
+        messages=messages,
+        faults=tuple(faults),
+        timeline=timeline,
+        processes=tuple(processes),
+        out=str(out),
+    )
+
+
+def prepare(plan: Plan, out: Path) -> None:
+    """Make the run directory, and write down what is about to be flown, with a copy of all it reads.
+
+    Raises
+    ------
+    FileExistsError
+        When it holds a run already.
+    OSError
+        When it cannot be made, or written to.
+    """
+    try:
+        str(out).encode()
+    except UnicodeEncodeError as error:
+        raise OSError(
+            f"{str(out)!r} is no UTF-8, as what writes recordings wants it; name another with --out"
+        ) from error
+    out.mkdir(parents=True, exist_ok=True)
+    if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
+        raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory with --out")
+    text = inputs.keep(plan.scenario, plan.journal, out).model_dump_json(indent=2, exclude_none=True) + "\n"
+    with system_errors.about(out / loading.FILE):
+        try:
+            file = (out / loading.FILE).open("x", encoding="utf-8")
+        except FileExistsError as error:
+            raise FileExistsError(f"{str(out)!r} holds a run already; name another directory with --out") from error
+        with file:
+            file.write(text)
+
+
+def _messages(
+    arrays: Arrays | None, accounts: Accounts | None, in_flight: int | None, uninstructed: int | None
+) -> dict[str, Any]:
+    if arrays is not None:
+        ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+        in_flight = ledger.outstanding if in_flight is None else in_flight
+    elif accounts is not None:
+        ledger, in_flight = accounts.ledger, accounts.in_flight
+    else:
+        ledger = Ledger(offered=0, copies=0, delivered=0, dropped={})
+    return {
+        "offered": ledger.offered,
+        "copies": ledger.copies,
+        "delivered": ledger.delivered,
+        "dropped": ledger.dropped,
+        "in_flight": in_flight,
+        "uninstructed": uninstructed,
+    }
+
+
+def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]:
+    wrong = []
+    if arrays is None or not np.isfinite(arrays["position"]).all():
+        wrong.append("the swarm diverged: a position is not a number any more")
+    elif np.isinf(arrays["error"]).any():
+        wrong.append("the swarm diverged: its tracking error is too large for a number")
+    elif not np.isfinite(arrays["estimate"][arrays["known"]]).all():
+        wrong.append("an estimate is not a number any more")
+    if messages["uninstructed"]:
+        wrong.append(f"{messages['uninstructed']} messages were lost that nobody ordered")
+    booked = messages["delivered"] + sum(messages["dropped"].values()) + (messages["in_flight"] or 0)
+    if messages["offered"] + messages["copies"] != booked:
+        offered = f"{messages['offered']} messages offered and {messages['copies']} doubled"
+        wrong.append(f"the accounts do not close: {offered}, {booked} accounted for")
+    return wrong
+
+
+def _untracked(arrays: Arrays | None) -> list[str]:
+    if arrays is None or not len(arrays["error"]):
+        return ["no tick was flown: it proved nothing"]
+    ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
+    if nobody:
+        return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
+    if (arrays["fates"][:, 1:] == Fate.SILENT).all():
+        return ["nobody was awake in any tick: it proved nothing"]
+    return []
+
+
+def _tracking(arrays: Arrays | None) -> Figures:
+    return measures.figures(np.empty(0) if arrays is None else arrays["error"])
+
+
+def _flown(plan: Plan) -> dict[str, Any]:
+    agents = plan.scenario.agents
+    packages = {"affinet": "affinet", "numpy": "numpy", "zenoh": "eclipse-zenoh"}
+    versions = {name: version(package) for name, package in packages.items()} | {"python": platform.python_version()}
+    return {"estimator": agents.estimator, "law": agents.law, "seed": plan.scenario.seed, "versions": versions}

@@ -1,0 +1,112 @@
+"""The Kalman core: predict and correct, over stacks of independent filters.
+
+The state of one relative edge stacks position, velocity and acceleration, D numbers each, as far as the model of motion has
+them, so that the observed position is its first D entries. Sums run in `matmul`, matrix by matrix: a stack of filters gives
+the bits of each alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Literal
+
+import numpy as np
+
+from agents.algebra.small import inverse
+from analysis.models.algebra import product
+from analysis.models.arrays import Array, Mask
+
+Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
+
+# How many of position, velocity and acceleration are in the state.
+ORDER: Mapping[Model, int] = {"random-walk": 1, "constant-velocity": 2, "constant-acceleration": 3}
+
+
+@cache
+def motion(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
+    """Transition F and process covariance Q of a model of motion.
+
+    The model of paper 000, (20)-(21), is "constant-acceleration". The others end the Taylor series earlier: what drives them is
+    a white acceleration or a white velocity, held for a tick.
+
+    Parameters
+    ----------
+    model
+        Which.
+    dimension
+        D.
+    dt
+        Tick, in seconds.
+    sigma_w
+        Standard deviation of what drives it: of the acceleration, in metres per second squared, with constant acceleration
+        (its step from tick to tick) and with constant velocity; of the velocity, in metres per second, with a random walk.
+
+    Returns
+    -------
+    tuple of Array
+        Both (S, S), with S = 3 D, 2 D or D; ordered (position, velocity, acceleration).
+    """
+    F, Q = embedded(model, dimension, dt, sigma_w)
+    size = ORDER[model] * dimension
+    return F[:size, :size], Q[:size, :size]
+
+
+@cache
+def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
+    """A model of motion in a state of three derivatives, whichever it has itself: F and Q, both (3 D, 3 D).
+
+    The first derivative that the model leaves out is the noise that drives it, a fresh one in every tick; those beyond are 0.
+    The rest moves exactly as in `motion`.
+    """
+    order = ORDER[model]
+    taylor = np.array([[1.0, dt, dt * dt / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    transition = np.where(np.arange(3) < order, taylor, 0.0)
+    deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt * dt / 2, dt, 1.0])
+    axes = np.eye(dimension)
+    F, Q = np.kron(transition, axes), sigma_w * sigma_w * np.kron(np.outer(deflection, deflection), axes)
+    return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
+
+
+def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float]) -> tuple[Array, Array]:
+    """Means and covariances of filters before the first measurement: zero, and as wide as the standard deviations say.
+
+    Parameters
+    ----------
+    shape
+        Of the stack of filters.
+    dimension
+        D.
+    deviations
+        Of position, and of its derivatives as far as the state has them, in SI units.
+    """
+    prior = np.repeat(deviations, dimension)
+    covariance = np.broadcast_to(np.diag(prior * prior), (*shape, len(prior), len(prior))).copy()
+    return np.zeros((*shape, len(prior))), covariance
+
+
+def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:
+    """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S)."""
+    return product(mean, F.T), product(F, covariance, F.T) + Q
+
+
+def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> tuple[Array, Array]:
+    """The filters after an observation of their position, where it is usable (Algorithm 1, lines 7-11).
+
+    Parameters
+    ----------
+    mean, covariance
+        Predicted, shapes (..., S) and (..., S, S).
+    observed
+        Positions, shape (..., D).
+    R
+        Their covariance, shape (..., D, D).
+    usable
+        Where there is an observation, shape (...); the others are left as predicted.
+    """
+    dimension = observed.shape[-1]
+    innovation = observed - mean[..., :dimension]
+    gain = product(covariance[..., :dimension], inverse(covariance[..., :dimension, :dimension] + R))
+    gain = np.where(usable[..., None, None], gain, 0.0)
+    corrected = mean + product(gain, innovation[..., None])[..., 0]
+    return corrected, covariance - product(gain, covariance[..., :dimension, :])

@@ -1,0 +1,1 @@
+"""The filter that hears everybody."""

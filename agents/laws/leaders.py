@@ -1,0 +1,66 @@
+"""How leaders are steered: after the manoeuvre, or holding their distances; and what no body can exceed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.brief import Brief, Reading
+from agents.estimate import Estimate
+from agents.laws.base import weighted
+from analysis.models.affine import Manoeuvre
+from analysis.models.arrays import Array
+
+
+def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array) -> Array:
+    """A leader's input: the target's velocity, and a pull toward the target, shape (..., D), in metres per second.
+
+    Parameters
+    ----------
+    gain
+        Of the pull, per second.
+    position
+        The leader's own, shape (..., D), in metres.
+    """
+    astray = mission.target(tick, brief.nominal) - position
+    return mission.velocity(tick, brief.nominal, brief.dt) + gain * astray
+
+
+def hold_distances(brief: Brief, gain: float, estimate: Estimate) -> Array:
+    """A leader's input among leaders that keep their distances, shape (..., D), in metres per second (paper 004, section 3.5).
+
+    The gradient of sum_j (|z_ij|^2 - |p_ij|^2)^2 / 4 over the other leaders, which all know each other.
+
+    Parameters
+    ----------
+    gain
+        Per second and square metre.
+    """
+    z, p = estimate.relative, brief.relative
+    stretch = (z * z).sum(axis=-1) - (p * p).sum(axis=-1)
+    return -gain * weighted(np.where(brief.leads & estimate.known, stretch, 0.0), z)
+
+
+def saturated(command: Array, limit: float) -> Array:
+    """Inputs (..., D) shortened to this length, in their unit, where they are longer."""
+    length = np.sqrt((command * command).sum(axis=-1, keepdims=True))
+    return command * (limit / np.maximum(length, limit))
+
+
+def pilot_of_accelerations(
+    brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array, velocity: Array
+) -> Array:
+    """A leader's input: the target's acceleration, and a critically damped pull, shape (..., D), in metres per second squared.
+
+    Parameters
+    ----------
+    gain
+        Natural frequency of the pull, per second.
+    position, velocity
+        The leader's own, shape (..., D), in metres and metres per second.
+    """
+    acceleration = mission.acceleration(tick, brief.nominal, brief.dt)
+    # The velocity at the tick itself; that from one tick to the next would be half a tick ahead.
+    wanted = mission.velocity(tick, brief.nominal, brief.dt) - 0.5 * brief.dt * acceleration
+    astray = mission.target(tick, brief.nominal) - position
+    pull = gain * gain * astray + 2.0 * gain * (wanted - velocity)
+    return acceleration + pull

@@ -1,0 +1,181 @@
+"""The control laws of paper 000, Table II, for single integrators.
+
+Each law is a frozen dataclass of its gains with two pure methods over arrays with any leading axes. All steer by
+sum_j l_ij zhat_ij over the edges for which there is an estimate; an edge without one contributes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from agents.brief import Brief, Own, Reading
+from agents.estimate import Estimate
+from agents.exchange import Heard
+from agents.laws.base import Law, Nothing, stress_force, weighted
+from analysis.models.arrays import Array
+from analysis.models.unsuited import Unsuited
+
+
+class Integral(NamedTuple):
+    """The running sum of the stress force, shape (..., D)."""
+
+    force: Array
+
+
+class LastHeard(NamedTuple):
+    """The neighbours' velocities as last heard, shape (..., n, D)."""
+
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class Rest:
+    """u_i = 0: agents that stay where they are, to find out where that is."""
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = False
+    by_position: ClassVar[bool] = False
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+        """Nothing to remember."""
+        return Nothing()
+
+    def command(
+        self,
+        brief: Brief,
+        state: Nothing,
+        tick: Reading,  # noqa: ARG002
+        own: Own,
+        estimate: Estimate,  # noqa: ARG002
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Nothing, Array]:
+        """Stay."""
+        return state, np.zeros(np.broadcast_shapes(own.input.shape, brief.nominal.shape))
+
+
+@dataclass(frozen=True)
+class Static:
+    """u_i = -alpha sum_j l_ij zhat_ij (Table II, static leaders).
+
+    Parameters
+    ----------
+    alpha
+        Gain, per second.
+    """
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
+    alpha: float = 10.0
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
+        """Nothing to remember."""
+        return Nothing()
+
+    def command(
+        self,
+        brief: Brief,
+        state: Nothing,
+        tick: Reading,  # noqa: ARG002
+        own: Own,  # noqa: ARG002
+        estimate: Estimate,
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Nothing, Array]:
+        """Fall toward the formation."""
+        return state, -self.alpha * stress_force(brief, estimate)
+
+
+@dataclass(frozen=True)
+class ConstantVelocity:
+    """u_i,k = -alpha sum_j l_ij zhat_ij,k - eta sum_t sum_j l_ij zhat_ij,t (Table II, constant-velocity leaders).
+
+    Parameters
+    ----------
+    alpha
+        Proportional gain, per second.
+    eta
+        Integral gain, per second. The sum over ticks is bare, so eta stands for a continuous gain times dt.
+    """
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
+    alpha: float = 10.0
+    eta: float = 0.1
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> Integral:
+        """No force yet."""
+        return Integral(np.zeros((*batch, brief.dimension)))
+
+    def command(
+        self,
+        brief: Brief,
+        state: Integral,
+        tick: Reading,  # noqa: ARG002
+        own: Own,  # noqa: ARG002
+        estimate: Estimate,
+        inputs: Heard,  # noqa: ARG002
+    ) -> tuple[Integral, Array]:
+        """Fall toward the formation, and learn the velocity it moves with."""
+        force = stress_force(brief, estimate)
+        total = state.force + force
+        return Integral(total), -self.alpha * force - self.eta * total
+
+
+@dataclass(frozen=True)
+class VaryingVelocity:
+    """u_i = -(1 / gamma_i) sum_j l_ij (alpha zhat_ij - zdot_j), gamma_i = sum_j l_ij (Table II, varying-velocity leaders).
+
+    The law needs the neighbours' current velocities, which is an algebraic loop; over a network it becomes an iteration
+    that need not converge, so the velocities' source and a relaxation are choices (`affinet check` gives the radius).
+
+    Parameters
+    ----------
+    alpha
+        Gain, per second.
+    source
+        Where zdot_j comes from: what the neighbour communicated last; one's own velocity less the estimated relative
+        one; or the manoeuvre, known beforehand.
+    relaxation
+        eta in u <- (1 - eta) u_before + eta u_law, in (0, 1].
+    """
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = True
+    by_position: ClassVar[bool] = False
+    alpha: float = 1.0
+    source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
+    relaxation: float = 1.0
+
+    def init(self, brief: Brief, batch: tuple[int, ...]) -> LastHeard:
+        """Neighbours at rest."""
+        return LastHeard(np.zeros((*batch, *brief.relative.shape[-2:])))
+
+    def command(
+        self, brief: Brief, state: LastHeard, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
+    ) -> tuple[LastHeard, Array]:
+        """Move as the neighbours do, and fall toward the formation."""
+        heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
+        theirs = self._neighbours_velocity(brief, tick, own, estimate, heard)
+        law = (weighted(brief.stress, theirs) - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
+        return LastHeard(heard), (1.0 - self.relaxation) * own.input + self.relaxation * law
+
+    def _neighbours_velocity(self, brief: Brief, tick: Reading, own: Own, estimate: Estimate, heard: Array) -> Array:
+        if self.source == "communicated":
+            return heard
+        if self.source == "estimated":
+            if estimate.relative_velocity is None:
+                raise Unsuited("the velocity source 'estimated' needs an estimator that tracks relative velocities")
+            return own.velocity[..., None, :] - estimate.relative_velocity
+        if brief.mission is None:
+            raise Unsuited("the velocity source 'feed-forward' needs the mission in the brief")
+        of_edges = tick if isinstance(tick, int) else tick[..., None]
+        return brief.mission.velocity(of_edges, brief.nominal[..., None, :] - brief.relative, brief.dt)
+
+
+def needs_mission(law: Law[Any]) -> bool:
+    """Whether the law makes followers use the manoeuvre."""
+    return isinstance(law, VaryingVelocity) and law.source == "feed-forward"

@@ -1,0 +1,251 @@
+"""Figures like those of the papers: mean and one standard deviation over the runs, logarithmic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from analysis.metrics.consistency import DRAWN, band
+from analysis.models.arrays import Array
+
+mpl.rcParams.update(
+    {"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False, "text.parse_math": False}
+)
+_LOST, _FAR = 1.0, 100.0  # m²
+_DECADES = 30.0  # labels that reach farther stand on a logarithmic axis
+_LEGEND = 1.4  # inches beside the panels
+_LOWEST = 0.05  # of the mean, for the lower end of a band
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The error of many runs of one case: labels, moments (T,), error (R, T), and what stands for each run over time (R,)."""
+
+    labels: Mapping[str, str]
+    seconds: Array
+    error: Array
+    overall: Array
+
+
+def curves(
+    path: Path,
+    title: str,
+    cases: Sequence[Curve],
+    axes: Sequence[str],
+    quantity: str,
+    bound: tuple[float, str] | None = None,
+) -> None:
+    """A quantity over time: a panel for each label of the first axis and each of the second, a curve for each of the third.
+
+    A bound is a dashed line, with what it says.
+    """
+    across, down, each = axes
+    columns, rows = _labels(cases, across), _labels(cases, down)
+    figure = Figure(figsize=(_LEGEND + 3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
+    panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    colours = _colours(cases, each)
+    for case in cases:
+        panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
+        _draw(panel, case, case.labels[each], colours[case.labels[each]])
+        panel.set_title(f"{case.labels[across]}, {case.labels[down]}")
+    if bound is not None:
+        for panel in panels.ravel():
+            panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
+    _finish(figure, panels, title, "time (s)", quantity, each)
+    figure.savefig(path)
+
+
+def consistency(
+    path: Path, title: str, normalised: Mapping[str, Sequence[Curve]], axes: Sequence[str], dimension: int
+) -> None:
+    """Normalised errors and innovations over time: a row for each, a panel for each pair of labels of the first two axes.
+
+    Their mean over the runs, of filters whose covariances tell the truth, lies in the grey band with 95 %: that of one edge in
+    every run, and the more surely that of the mean over many.
+    """
+    across, down, each = axes
+    first = next(iter(normalised.values()))
+    places = list(dict.fromkeys((case.labels[across], case.labels[down]) for case in first))
+    figure = Figure(figsize=(_LEGEND + 3.4 * len(places), 2.2 * len(normalised)), layout="constrained", dpi=160)
+    colours = _colours(first, each)
+    panels = figure.subplots(len(normalised), len(places), sharex=True, sharey=True, squeeze=False)
+    for row, (what, cases) in zip(panels, normalised.items(), strict=True):
+        for case in cases:
+            panel = row[places.index((case.labels[across], case.labels[down]))]
+            mean = case.error.mean(axis=0)
+            shown, label = np.where(np.isfinite(mean), mean, np.nan), case.labels[each]
+            panel.plot(case.seconds, shown, lw=0.8, label=label, color=colours[label])
+            panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
+        for panel in row:
+            panel.axhspan(*band(DRAWN, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
+    _finish(figure, panels, title, "time (s)", "mean", each)
+    for panel in panels.ravel():
+        panel.set_yscale("linear")
+        panel.set_ylim(0.0, 3.0 * dimension)
+    figure.savefig(path)
+
+
+def evolution(path: Path, title: str, cases: Sequence[tuple[Mapping[str, str], Array, Array]]) -> None:
+    """Where the agents of one run of each case believe they are, over time: a panel each, x in black, y in red, z in blue.
+
+    A case is its labels, moments (T,), and places (T, N, D), in metres.
+    """
+    columns = min(len(cases), 3)
+    rows = -(-len(cases) // columns)
+    figure = Figure(figsize=(3.4 * columns, 2.2 * rows), layout="constrained", dpi=160)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for panel, (labels, seconds, place) in zip(panels.ravel(), cases, strict=False):
+        for axis, colour in zip(range(place.shape[-1]), ("black", "tab:red", "tab:blue"), strict=False):
+            panel.plot(seconds, place[..., axis], color=colour, lw=0.6)
+        panel.set_title(", ".join(labels.values()), fontsize=7)
+    for panel in panels[-1]:
+        panel.set_xlabel("time (s)")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("estimated position (m)")
+    figure.suptitle(title)
+    figure.savefig(path)
+
+
+def rates(path: Path, title: str, found: Array) -> None:
+    """Convergence rates (n, 2) with the weighted centroid and with an anchor, a point for each graph."""
+    figure = Figure(figsize=(3.4, 3.2), layout="constrained", dpi=160)
+    panel = figure.subplots()
+    panel.plot(found[:, 1], found[:, 0], ".", ms=2)
+    panel.plot([found.min(), 1.0], [found.min(), 1.0], color="grey", lw=0.8)
+    panel.set_xlabel("with an anchor")
+    panel.set_ylabel("weighted centroid")
+    figure.suptitle(f"{title}: convergence rates on {len(found)} random graphs", fontsize=7)
+    figure.savefig(path)
+
+
+def said(what: str, unit: str) -> str:
+    """A quantity with its unit, if it has one."""
+    return f"{what} ({unit})" if unit else what
+
+
+def sweep(
+    path: Path,
+    title: str,
+    cases: Sequence[Curve],
+    axes: Sequence[str],
+    along: str,
+    quantity: str,
+    bound: tuple[float, str] | None = None,
+) -> None:
+    """A quantity over one axis: a panel for each label of the first other axis, a curve for each of the second."""
+    across, each = [name for name in axes if name != along]
+    columns = _labels(cases, across)
+    figure = Figure(figsize=(_LEGEND + 3.0 * len(columns), 3.0), layout="constrained", dpi=160)
+    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)
+    colours = _colours(cases, each)
+    for panel, column in zip(panels[0], columns, strict=True):
+        for label in _labels(cases, each):
+            chosen = [one for one in cases if one.labels[across] == column and one.labels[each] == label]
+            where = [float(one.labels[along]) for one in chosen]
+            runs = np.array([_finite(one.overall) for one in chosen])
+            if chosen:
+                mean, spread = runs.mean(axis=1), runs.std(axis=1)
+                low = np.minimum(spread, (1.0 - _LOWEST) * mean)
+                bars = {"yerr": (low, spread), "marker": "o", "ms": 3, "capsize": 2}
+                panel.errorbar(where, mean, label=label, color=colours[label], **bars)
+        panel.set_title(column)
+    labels = [float(label) for label in _labels(cases, along)]
+    for panel in panels[0]:
+        if min(labels) > 0.0 and max(labels) > _DECADES * min(labels):
+            panel.set_xscale("log")
+        if bound is not None:
+            panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
+    _finish(figure, panels, title, along, quantity, each)
+    figure.savefig(path)
+
+
+def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: Array, numbers: Sequence[int]) -> None:
+    """Mean tracking error (R, T), and mean corrected indicators (R, T, F) of the followers with these numbers."""
+    figure = Figure(figsize=(4.6, 3.0), layout="constrained", dpi=160)
+    panel = figure.subplots()
+    for place, number in enumerate(numbers):
+        panel.plot(seconds, _positive(corrected[:, :, place].mean(axis=0)), lw=0.8, label=f"agent {number}")
+    panel.plot(seconds, error.mean(axis=0), color="black", lw=1.2, label="tracking error")
+    _finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
+    figure.savefig(path)
+
+
+def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]) -> None:
+    """Mean error over a grid: a panel for each label of the first axis, rows and columns for those of the second and third.
+
+    A cell has a cross where the formation is lost for good: the mean over the runs is above 1 m² at the end.
+    """
+    across, down, each = axes
+    panels, rows, columns = (_labels(cases, axis) for axis in (across, down, each))
+    size = (1.6 + 0.52 * len(columns) * len(panels), 1.3 + 0.26 * len(rows))
+    figure = Figure(figsize=size, layout="constrained", dpi=160)
+    for panel, label in zip(figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True):
+        grid = np.full((len(rows), len(columns)), np.nan)
+        for case in (one for one in cases if one.labels[across] == label):
+            row, column = rows.index(case.labels[down]), columns.index(case.labels[each])
+            grid[row, column] = _cell(panel, row, column, case)
+        image = panel.imshow(np.log10(grid), cmap="RdYlGn_r", vmin=-3, vmax=2, aspect="auto")
+        panel.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
+        panel.set_yticks(range(len(rows)), rows)
+        panel.set_title(label)
+        panel.grid(visible=False)
+    figure.suptitle(title)
+    figure.colorbar(image, label="mean tracking error (m²), power of ten")
+    figure.savefig(path)
+
+
+def _cell(panel: Axes, row: int, column: int, case: Curve) -> float:
+    """Say the mean error of a case in its place, and how it ended."""
+    mean = float(_finite(case.overall).mean())
+    cross = " ×" if _finite(case.error)[:, -1].mean() > _LOST else ""
+    said, colour = (f"{mean:.2g}{cross}", "black") if mean < _FAR else ("lost", "white")
+    panel.text(column, row, said, ha="center", va="center", fontsize=6, color=colour)
+    return mean
+
+
+def _draw(panel: Axes, case: Curve, label: str, colour: str) -> None:
+    error = _finite(case.error)
+    mean, deviation = error.mean(axis=0), error.std(axis=0)
+    panel.plot(case.seconds, mean, lw=1.0, label=label, color=colour)
+    # A band that reaches zero has no lower end on a logarithmic axis.
+    low = np.maximum(mean - deviation, _LOWEST * mean)
+    panel.fill_between(case.seconds, low, mean + deviation, color=colour, alpha=0.15, lw=0)
+
+
+def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
+    figure.suptitle(title)
+    for panel in panels.ravel():
+        panel.set_yscale("log")
+    for panel in panels[-1]:
+        panel.set_xlabel(x)
+    figure.supylabel(y, fontsize=8)
+    drawn = [panel.get_legend_handles_labels() for panel in panels.ravel()]
+    named = {label: handle for handles, labels in drawn for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(named.values(), named.keys(), title=legend, fontsize=7, loc="outside right center")
+
+
+def _colours(cases: Sequence[Curve], axis: str) -> dict[str, str]:
+    """A colour for each label of an axis, the same in every panel."""
+    return {label: f"C{number}" for number, label in enumerate(_labels(cases, axis))}
+
+
+def _labels(cases: Sequence[Curve], axis: str) -> list[str]:
+    return list(dict.fromkeys(case.labels[axis] for case in cases))
+
+
+def _finite(values: Array) -> Array:
+    """What can be drawn: a run that has diverged leaves at the top."""
+    return np.nan_to_num(np.minimum(values, 1e12), nan=1e12)
+
+
+def _positive(values: Array) -> Array:
+    """What a logarithmic axis can show: nothing below zero."""
+    shown: Array = np.where(values > 0.0, values, np.nan)
+    return shown

@@ -1,0 +1,1 @@
+"""How far off a swarm and its estimates are."""

@@ -1,0 +1,126 @@
+"""Whether an estimator's covariances tell the truth: normalised errors and innovations, and their chi-square bands."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import chdtri
+
+from analysis.models.algebra import sum_over
+from analysis.models.arrays import Array, Integers, Mask
+
+DRAWN = 0.95  # how probable the bands of pictures are
+# A smallest eigenvalue below this is what rounding leaves of nothing (of the trace), and of a difference (of R's).
+_SINGULAR, _CANCELLED = 1e-12, 1e-6
+
+
+class Normalised(NamedTuple):
+    """The mean over the edges of a swarm, shape (...), NaN where there are none, and how many there are, shape (...)."""
+
+    mean: Array
+    number: Integers
+
+
+def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> Normalised:
+    """NEES of the edges of a swarm.
+
+    Parameters
+    ----------
+    estimate, true
+        Relative positions, shape (..., N, n, D), in metres.
+    covariance
+        Upper triangles of the covariances, shape (..., N, n, D (D + 1) / 2), in square metres.
+    known
+        Which edges are estimated, shape (..., N, n).
+    """
+    return _averaged(nees(np.where(known[..., None], estimate - true, 0.0), covariance), known)
+
+
+def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array, seen: Mask) -> Normalised:
+    """NIS of the edges measured, from what is left of their innovations once the filters are corrected.
+
+    A filter with the innovation nu of covariance S leaves y - z = R S^-1 nu, of covariance R - P = R S^-1 R: normalised, one is
+    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates,
+    and those whose filters were so unsure that rounding leaves nothing of it. NaN where a filter has diverged.
+
+    Parameters
+    ----------
+    estimate, measured
+        Relative positions, shape (..., N, n, D), in metres.
+    covariance
+        Upper triangles of the covariances P of the estimates, shape (..., N, n, D (D + 1) / 2), in square metres.
+    R
+        Covariances of the measurements, shape (..., N, n, D, D), in square metres.
+    seen
+        Which edges were measured and are estimated, shape (..., N, n).
+    """
+    left = R - whole(covariance)
+    smallest = _smallest(left)
+    lost = np.isnan(smallest) | ~np.isfinite(estimate).all(axis=-1)
+    filtered = seen & (lost | (smallest > _CANCELLED * _smallest(R)))
+    residual = np.where(filtered[..., None], measured - estimate, 0.0)
+    return _averaged(_normalised(residual, left, smallest), filtered)
+
+
+def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]:
+    """Between which values the mean of independent normalised errors lies with a probability, each of shape (...).
+
+    Parameters
+    ----------
+    level
+        The probability.
+    dimension
+        Degrees of freedom of each.
+    number
+        How many are averaged, shape (...).
+    """
+    averaged = np.asarray(number)
+    low, high = (chdtri(dimension * averaged, tail) / averaged for tail in ((1.0 + level) / 2, (1.0 - level) / 2))
+    return low, high
+
+
+def nees(error: Array, covariance: Array) -> Array:
+    """Normalised estimation errors squared, e^T P^-1 e, shape (...); infinite where P is singular, NaN where it is no number.
+
+    Parameters
+    ----------
+    error
+        Shape (..., D).
+    covariance
+        Upper triangles of their covariances, shape (..., D (D + 1) / 2).
+    """
+    matrix = whole(covariance)
+    return _normalised(error, matrix, _smallest(matrix))
+
+
+def whole(triangles: Array) -> Array:
+    """Symmetric matrices (..., D, D) from their upper triangles, row by row, shape (..., D (D + 1) / 2)."""
+    dimension = int(np.sqrt(2 * triangles.shape[-1]))
+    matrices = np.empty((*triangles.shape[:-1], dimension, dimension))
+    rows, columns = np.triu_indices(dimension)
+    matrices[..., rows, columns] = matrices[..., columns, rows] = triangles
+    return matrices
+
+
+def _normalised(error: Array, covariance: Array, smallest: Array) -> Array:
+    """e^T P^-1 e, shape (...), of covariances with these smallest eigenvalues (...)."""
+    singular = smallest <= _SINGULAR * np.trace(covariance, axis1=-2, axis2=-1)
+    regular = ~(singular | np.isnan(smallest))
+    solvable = np.where(regular[..., None, None], covariance, np.eye(error.shape[-1]))
+    length = (error * np.linalg.solve(solvable, error[..., None])[..., 0]).sum(axis=-1)
+    return np.where(singular, np.inf, np.where(regular, length, np.nan))
+
+
+def _smallest(matrix: Array) -> Array:
+    """The smallest eigenvalues of symmetric matrices, NaN where they are no numbers: LAPACK would raise."""
+    finite = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+    smallest = np.linalg.eigvalsh(np.where(finite[..., None, None], matrix, 0.0))[..., 0]
+    return np.where(finite, smallest, np.nan)
+
+
+def _averaged(normalised: Array, counted: Mask) -> Normalised:
+    number = counted.sum(axis=(-2, -1))
+    total = sum_over(np.where(counted, normalised, 0.0), (-2, -1))
+    return Normalised(np.where(number > 0, total / np.maximum(number, 1), np.nan), number)

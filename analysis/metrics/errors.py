@@ -1,0 +1,88 @@
+"""How well a swarm does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.models.algebra import product, sum_over
+from analysis.models.arrays import Array, Mask
+from analysis.models.elementary import whole_power
+
+
+def tracking_error(position: Array, target: Array, present: Mask) -> Array:
+    """Mean squared distance to the target over the agents present, in square metres (paper 000, eq. 15).
+
+    Parameters
+    ----------
+    position, target
+        Shape (..., N, D), in metres.
+    present
+        Agents that take part, shape (..., N); departed and dead agents leave the mean.
+
+    Returns
+    -------
+    Array
+        Shape (...); NaN where nobody is present.
+    """
+    squared = sum_over(whole_power(position - target, 2), -1)
+    number = present.sum(axis=-1)
+    total = sum_over(np.where(present, squared, 0.0), -1)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def root_mean_square(vectors: Array, present: Mask) -> Array:
+    """Of vectors (..., N, D) over the agents present (..., N), shape (...), in their unit; NaN where nobody is present."""
+    return np.sqrt(tracking_error(vectors, np.zeros_like(vectors), present))
+
+
+def procrustes_error(position: Array, nominal: Array, present: Mask) -> Array:
+    """How far a swarm is from its nominal shape, turned, mirrored and moved at will (paper 004, definition 2.9).
+
+    Parameters
+    ----------
+    position
+        Shape (..., N, D), in metres.
+    nominal
+        Shape (N, D), in metres.
+    present
+        Agents that take part, shape (..., N).
+
+    Returns
+    -------
+    Array
+        min |Z Omega + 1 t^T - P|_F / N over those present, shape (...), in metres; NaN where a position is no number.
+    """
+    number = np.maximum(present.sum(axis=-1), 1)
+    Z, P = _centred(position, present), _centred(np.broadcast_to(nominal, position.shape), present)
+    finite: Mask = np.asarray(np.isfinite(Z).all(axis=(-2, -1)))
+    spread: Array = product(np.swapaxes(np.where(finite[..., None, None], Z, 0.0), -1, -2), P)
+    U, _, Vt = np.linalg.svd(spread)
+    squared = sum_over(whole_power(product(Z, product(U, Vt)) - P, 2), (-2, -1))
+    return np.where(finite, np.sqrt(squared) / number, np.nan)
+
+
+def estimation_error(estimate: Array, true: Array, known: Mask) -> Array:
+    """The length of all errors of the relative positions together (paper 004, eq. 4.34), shape (...), in metres.
+
+    Parameters
+    ----------
+    estimate, true
+        Shape (..., N, n, D), in metres.
+    known
+        Which edges have an estimate, shape (..., N, n).
+    """
+    squared = sum_over(whole_power(estimate - true, 2), -1)
+    return np.sqrt(sum_over(np.where(known, squared, 0.0), (-2, -1)))
+
+
+def covariance_trace(triangles: Array, dimension: int) -> Array:
+    """The trace of the covariances of all edges, from their upper triangles (..., N, n, D (D + 1) / 2), shape (...), in m2."""
+    diagonal = np.cumsum([0, *range(dimension, 1, -1)])
+    return sum_over(triangles[..., diagonal], (-3, -2, -1))
+
+
+def _centred(points: Array, present: Mask) -> Array:
+    taking_part = present[..., None]
+    centre = sum_over(np.where(taking_part, points, 0.0), -2)[..., None, :]
+    centre = centre / np.maximum(present.sum(axis=-1), 1)[..., None, None]
+    return np.where(taking_part, points - centre, 0.0)

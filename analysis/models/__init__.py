@@ -1,0 +1,1 @@
+"""Mathematics of the papers that agents, world and studies share."""

@@ -1,0 +1,44 @@
+"""Affine formations: a nominal shape under a sequence of affine maps (paper 000, section II-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.models.algebra import product
+from analysis.models.arrays import Array, Integers
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """A sequence of affine maps: agent i's target in tick k is theta[k] p_i + offset[k].
+
+    Parameters
+    ----------
+    theta
+        Shape (ticks + 1, D, D).
+    offset
+        Shape (ticks + 1, D), in metres.
+    """
+
+    theta: Array
+    offset: Array
+
+    def target(self, tick: int | Integers, nominal: Array) -> Array:
+        """Target positions of agents at nominal positions (..., D), in metres (paper 000, eq. 3), in a tick each.
+
+        Ticks and agents broadcast against each other; before its first and after its last tick the manoeuvre rests.
+        """
+        reached = np.clip(tick, 0, len(self.theta) - 1)
+        return product(self.theta[reached], nominal[..., None])[..., 0] + self.offset[reached]
+
+    def velocity(self, tick: int | Integers, nominal: Array, dt: float) -> Array:
+        """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
+        travelled: Array = self.target(tick + 1, nominal) - self.target(tick, nominal)
+        return travelled / dt
+
+    def acceleration(self, tick: int | Integers, nominal: Array, dt: float) -> Array:
+        """Second difference of the target about this tick, shape (..., D), in metres per second squared."""
+        gained: Array = self.velocity(tick, nominal, dt) - self.velocity(np.asarray(tick) - 1, nominal, dt)
+        return gained / dt

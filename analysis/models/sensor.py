@@ -1,0 +1,177 @@
+"""What measures relative positions, in axes that all agents share: by coordinates, by range and bearing, or along and across.
+
+A range and a bearing make the error of a position depend on where it is, and correlate its coordinates (paper 004, section
+4.1.1). They also draw it toward the agent, by a factor that is known: the positions here are corrected for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.models.arrays import Array
+from analysis.models.elementary import arctan2, cos, exp, expm1, hypot, sin
+from analysis.models.unsuited import Unsuited
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor of relative positions.
+
+    Parameters
+    ----------
+    reads
+        Coordinates; or range and bearing, in three dimensions range, azimuth and elevation; or a position along and across the
+        line of sight, as wrong as it is far (paper 003, section VII).
+    covariance
+        Of what it reads, shape (D, D): in square metres, of angles in square radians, or as shares of the square of the
+        distance. All but that of coordinates is diagonal, and the same for all directions across.
+    """
+
+    reads: Literal["coordinates", "range-bearing", "line-of-sight"]
+    covariance: Array
+
+    def measured(self, true: Array, noise: Array) -> Array:
+        """What it says of relative positions.
+
+        Parameters
+        ----------
+        true
+            Shape (..., D), in metres.
+        noise
+            With the covariance of the sensor, shape (..., D).
+        """
+        if self.reads == "coordinates":
+            return true + noise
+        if self.reads == "line-of-sight":
+            return true + _turned(true, np.linalg.norm(true, axis=-1, keepdims=True) * noise)
+        return _cartesian(_polar(true) + noise) / _shrinking(self._variances)
+
+    def spread(self, measured: Array) -> Array:
+        """Covariances of measurements (..., D), shape (..., D, D), in m2: of ranges and bearings, that at what they say."""
+        if self.reads == "coordinates":
+            return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
+        if self.reads == "line-of-sight":
+            along, across = self._variances[:2]
+            lines = measured[..., :, None] * measured[..., None, :]
+            squared = (measured * measured).sum(axis=-1)[..., None, None]
+            spread: Array = across * squared * np.eye(measured.shape[-1]) + (along - across) * lines
+            return spread
+        _, covariance = moments(_polar(measured), self._variances)
+        shrinking = _shrinking(self._variances)
+        return covariance / (shrinking[:, None] * shrinking)
+
+    @property
+    def common(self) -> Array:
+        """The covariance of every measurement, shape (D, D), in square metres.
+
+        Raises
+        ------
+        Unsuited
+            When each measurement has its own.
+        """
+        if self.reads != "coordinates":
+            raise Unsuited(
+                "this estimator takes one covariance for all measurements, and this sensor gives each its own; "
+                "choose another, or a sensor of coordinates"
+            )
+        return self.covariance
+
+    @property
+    def _variances(self) -> Array:
+        return np.diagonal(self.covariance)
+
+
+def moments(polar: Array, variances: Array) -> tuple[Array, Array]:
+    """Mean (..., D) and covariance (..., D, D) of positions read as range and bearings (paper 004, (4.3) and (4.4)).
+
+    The covariance is the printed one without its differences of large numbers, of which a sharp sensor would leave nothing.
+
+    Parameters
+    ----------
+    polar
+        Means of range, azimuth and, in three dimensions, elevation, shape (..., D), in metres and radians.
+    variances
+        Theirs, shape (D,), in square metres and square radians.
+    """
+    reach = polar[..., 0]
+    mean, second, covariance = _direction(polar[..., 1:], variances[1:])
+    squared = (reach * reach)[..., None, None]
+    return reach[..., None] * mean, variances[0] * second + squared * covariance
+
+
+def _direction(angles: Array, variances: Array) -> tuple[Array, Array, Array]:
+    """Mean, second moments and covariance of a unit vector at normal angles (..., 1) or (..., 2)."""
+    mean, second, covariance = _circle(angles[..., 0], variances[0])
+    if angles.shape[-1] == 1:
+        return mean, second, covariance
+    up, up_second, up_covariance = _circle(angles[..., 1], variances[1])
+    planar, squared = up[..., :1], up_second[..., :1, :1]
+    across = up_covariance[..., 0, 1, None] * mean
+
+    def joined(level: Array, tilted: Array, upright: Array) -> Array:
+        rows = np.concatenate([level, tilted[..., :, None]], axis=-1)
+        last = np.concatenate([tilted, upright[..., None]], axis=-1)
+        return np.concatenate([rows, last[..., None, :]], axis=-2)
+
+    return (
+        np.concatenate([planar * mean, up[..., 1:]], axis=-1),
+        joined(squared * second, up_second[..., 0, 1, None] * mean, up_second[..., 1, 1]),
+        joined(
+            up_covariance[..., :1, :1] * second + (planar * planar)[..., None] * covariance,
+            across,
+            up_covariance[..., 1, 1],
+        ),
+    )
+
+
+def _circle(angle: Array, variance: float) -> tuple[Array, Array, Array]:
+    """Mean (..., 2), second moments and covariance (..., 2, 2) of cosine and sine of a normal angle."""
+    kept, lost = exp(-variance), -expm1(-variance)
+    cosine, sine = cos(2.0 * angle), sin(2.0 * angle)
+    mean = np.sqrt(kept) * np.stack([cos(angle), sin(angle)], axis=-1)
+    second = 0.5 * _matrix(1.0 + kept * kept * cosine, kept * kept * sine, 1.0 - kept * kept * cosine)
+    covariance = 0.5 * lost * _matrix(1.0 - kept * cosine, -kept * sine, 1.0 + kept * cosine)
+    return mean, second, covariance
+
+
+def _matrix(first: Array, mixed: Array, last: Array) -> Array:
+    return np.stack([np.stack([first, mixed], axis=-1), np.stack([mixed, last], axis=-1)], axis=-2)
+
+
+def _shrinking(variances: Array) -> Array:
+    """By what factors the mean of the coordinates is too small (4.3), shape (D,)."""
+    angles = exp(-variances[1:] / 2)
+    level = angles.prod()
+    return np.array([level, level, *angles[1:]])
+
+
+def _polar(position: Array) -> Array:
+    planar = hypot(position[..., 0], position[..., 1])
+    azimuth = arctan2(position[..., 1], position[..., 0])
+    if position.shape[-1] == 2:
+        return np.stack([planar, azimuth], axis=-1)
+    return np.stack([hypot(planar, position[..., 2]), azimuth, arctan2(position[..., 2], planar)], axis=-1)
+
+
+def _turned(line: Array, offset: Array) -> Array:
+    """Offsets along the first axis and across it (..., D), turned so that the first axis lies along lines (..., D)."""
+    length = np.linalg.norm(line, axis=-1, keepdims=True)
+    first = np.eye(line.shape[-1])[0]
+    direction = np.where(length > 0.0, line, first) / np.where(length > 0.0, length, 1.0)
+    # A reflection that swaps the first axis and the direction: what lies across is spread alike to all sides.
+    mirror = direction - first
+    size = (mirror * mirror).sum(axis=-1, keepdims=True)
+    along_mirror = (offset * mirror).sum(axis=-1, keepdims=True)
+    turned: Array = offset - np.where(size > 0.0, 2.0 * along_mirror / np.where(size > 0.0, size, 1.0), 0.0) * mirror
+    return turned
+
+
+def _cartesian(polar: Array) -> Array:
+    reach, azimuth = polar[..., 0], polar[..., 1]
+    if polar.shape[-1] == 2:
+        return np.stack([reach * cos(azimuth), reach * sin(azimuth)], axis=-1)
+    planar = reach * cos(polar[..., 2])
+    return np.stack([planar * cos(azimuth), planar * sin(azimuth), reach * sin(polar[..., 2])], axis=-1)

@@ -1,0 +1,1 @@
+"""Arrays, draws, links and channels: what the rest of the network is said in."""

@@ -1,0 +1,90 @@
+"""Tables streamed to disk as Arrow, a batch at a time; what a killed run has written can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from analysis.models.arrays import Integers, Mask
+
+Names = Sequence[str] | NDArray[np.str_]
+
+NAMES = pa.dictionary(pa.int8(), pa.string())
+
+
+class TableError(ValueError):
+    """A file that is no such table."""
+
+
+class Stream:
+    """Writes a table.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    schema
+        Of the table.
+    """
+
+    def __init__(self, path: Path, schema: Any) -> None:
+        self._schema = schema
+        self._sink = pa.OSFile(str(path), "wb")
+        options = pa.ipc.IpcWriteOptions(compression="zstd")
+        self._stream = pa.ipc.new_stream(self._sink, schema, options=options)
+
+    def write(self, columns: Mapping[str, Any]) -> None:
+        """More rows, as a column for each name of the schema."""
+        arrays = [
+            column if isinstance(column, pa.Array) else pa.array(column, self._schema.field(name).type)
+            for name, column in columns.items()
+        ]
+        self._stream.write_batch(pa.record_batch(arrays, schema=self._schema))
+
+    def close(self) -> None:
+        """End the file."""
+        self._stream.close()
+        self._sink.close()
+
+
+def named(index: Integers, names: Names, absent: Mask | None = None) -> Any:
+    """A column of names, given by their places."""
+    return pa.DictionaryArray.from_arrays(pa.array(index, pa.int8(), mask=absent), pa.array(list(names)))
+
+
+def places(column: Any, names: Names) -> Integers:
+    """Place of each value of a column among the names, -1 for none of them."""
+    place = {name: n for n, name in enumerate(names)}
+    indices = []
+    for chunk in column.chunks:
+        lookup = np.array([place.get(name, -1) for name in chunk.dictionary.to_pylist()] + [-1], dtype=np.int64)
+        indices.append(lookup[chunk.indices.fill_null(len(lookup) - 1).to_numpy()])
+    return np.concatenate(indices) if indices else np.empty(0, dtype=np.int64)
+
+
+def read(path: Path, schema: Any) -> Any:
+    """The table as far as it was written.
+
+    Raises
+    ------
+    TableError
+        When there is none, or it has other columns.
+    """
+    try:
+        stream = pa.ipc.open_stream(pa.memory_map(str(path)))
+    except (OSError, pa.ArrowInvalid) as error:
+        raise TableError(f"{path}: no such table: {error}") from error
+    if stream.schema.names != schema.names:
+        raise TableError(f"{path}: its columns are {stream.schema.names}, not {schema.names}")
+    batches = []
+    while True:
+        try:
+            batches.append(stream.read_next_batch())
+        except (StopIteration, OSError, pa.ArrowInvalid):  # the end, or where a killed run stopped writing
+            break
+    return pa.Table.from_batches(batches, schema=stream.schema)

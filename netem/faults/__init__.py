@@ -1,0 +1,1 @@
+"""What a timeline imposes on links and agents, tick by tick."""

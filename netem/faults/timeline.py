@@ -1,0 +1,310 @@
+"""Scripted faults in simulated time: what holds in which tick.
+
+A fault is an interval of ticks with a verb and what it takes hold of. Faults never write each other's state: at any tick
+the conditions are the union of all faults then active, so the end of one cannot heal another.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core.links import Links
+from netem.faults import cut
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
+from netem.faults.trigger import Trigger
+
+# What a clock gains is a whole number of ticks again and again, and floats fall a little short of that.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What the timeline imposes in one tick.
+
+    Parameters
+    ----------
+    dead, paused, departed
+        Agents whose processes are dead, or stopped, and agents that have left the formation, shape (N,).
+    drifting, vanished
+        Departed agents whose bodies fly on as they did, or are gone, shape (N,).
+    cut, partitioned
+        Links that carry nothing, shape (L,).
+    cut_drops, partition_drops, pause_drops, holds
+        Links on which messages under way are dropped by a cut, a partition or a paused receiver, or wait, shape (L,).
+    loss, dropout
+        Probabilities of scripted loss, and of a measurement that is not made, shape (L,).
+    delay_s
+        Scripted delay, shape (L,), in seconds.
+    profile
+        Which profile rules each link, 0 its own, shape (L,).
+    frozen
+        Links whose sensor repeats itself, shape (L,).
+    bias, push
+        What is added to measurements, in metres, and to velocities, in metres per second, shape (L, D) and (N, D), or (L, 1)
+        and (N, 1) of zeros.
+    outlier, deviation
+        Probability of an outlier, and its standard deviation in metres, shape (L,).
+    liars
+        Faults by which agents lie.
+    """
+
+    dead: Mask
+    paused: Mask
+    departed: Mask
+    drifting: Mask
+    vanished: Mask
+    cut: Mask
+    partitioned: Mask
+    cut_drops: Mask
+    partition_drops: Mask
+    pause_drops: Mask
+    holds: Mask
+    loss: Array
+    dropout: Array
+    delay_s: Array
+    profile: NDArray[np.uint8]
+    frozen: Mask
+    bias: Array
+    push: Array
+    outlier: Array
+    deviation: Array
+    liars: tuple[Fault, ...]
+
+    @property
+    def absent(self) -> Mask:
+        """Agents that take no part: dead or departed, shape (N,)."""
+        return self.dead | self.departed
+
+    @property
+    def idle(self) -> Mask:
+        """Agents whose processes neither hear nor speak, shape (N,)."""
+        return self.dead | self.paused
+
+    @property
+    def still(self) -> Mask:
+        """Agents whose bodies hold where they are, shape (N,)."""
+        return self.absent & ~self.coasting
+
+    @property
+    def coasting(self) -> Mask:
+        """Agents whose bodies fly on with the input they had, shape (N,)."""
+        return ((self.paused & ~self.departed) | self.drifting) & ~self.dead
+
+
+class Timeline:
+    """All scripted faults of a run over its links.
+
+    Parameters
+    ----------
+    links
+        Of the nominal graph.
+    faults
+        All of them.
+    triggers
+        Those that set some of them off.
+    """
+
+    def __init__(self, links: Links, faults: Sequence[Fault], triggers: Sequence[Trigger] = ()) -> None:
+        """Fails with ValueError where a fault names a link, group or agent that does not exist."""
+        self.links = links
+        self.faults = tuple(faults)
+        self.triggers = tuple(triggers)
+        self._link_masks = [self._links_held(fault) for fault in self.faults]
+        self._agent_masks = [self._agents_held(fault) for fault in self.faults]
+
+    def at(self, tick: int) -> Conditions:
+        """The conditions of a tick; the same object for as long as nothing changes."""
+        return self._segments[bisect_right(self._boundaries, tick) - 1]
+
+    def present(self, ticks: Iterable[int]) -> Mask:
+        """Agents that take part in each of these ticks, shape (T, N)."""
+        return np.array([~self.at(tick).absent for tick in ticks])
+
+    @cached_property
+    def pending(self) -> tuple[int, ...]:
+        """Triggers that have not fired yet and still hold a fault back."""
+        return tuple(sorted({fault.trigger for fault in self.faults if fault.trigger is not None}))
+
+    def due(self, errors: Array) -> list[int]:
+        """Triggers that fire in the tick after these tracking errors, shape (T,), in square metres."""
+        return [number for number in self.pending if self.triggers[number].fires(errors)]
+
+    def fired(self, triggers: Iterable[int], tick: int) -> Timeline:
+        """The timeline once these triggers have fired in this tick."""
+        chosen = set(triggers)
+        return Timeline(
+            self.links,
+            [_placed(fault, tick) if fault.trigger in chosen else fault for fault in self.faults],
+            self.triggers,
+        )
+
+    def facing(self, injected: Iterable[Fault]) -> Timeline:
+        """The timeline with faults on top."""
+        return Timeline(self.links, (*self.faults, *injected), self.triggers)
+
+    def starting(self, tick: int) -> list[Fault]:
+        """Faults whose first tick this is."""
+        return [self.faults[number] for number in self._starts.get(tick, ())]
+
+    def ending(self, tick: int) -> list[Fault]:
+        """Faults that hold no longer from this tick on."""
+        return [self.faults[number] for number in self._ends.get(tick, ())]
+
+    def restarted(self, tick: int) -> list[int]:
+        """Agents whose processes are new in this tick."""
+        ended = {agent for fault in self.ending(tick) if fault.verb is Verb.KILL for agent in fault.agents}
+        return sorted(agent for agent in ended if not self.at(tick).dead[agent - 1])
+
+    def remembering(self, tick: int) -> list[int]:
+        """Those among them that go on from their own last state."""
+        warm = {agent for fault in self.ending(tick) if fault.warm for agent in fault.agents}
+        return [agent for agent in self.restarted(tick) if agent in warm]
+
+    def killed(self, tick: int) -> list[int]:
+        """Agents whose processes die at this tick."""
+        starting = {agent for fault in self.starting(tick) if fault.verb is Verb.KILL for agent in fault.agents}
+        return sorted(agent for agent in starting if tick == 0 or not self.at(tick - 1).dead[agent - 1])
+
+    def paused(self, tick: int) -> list[int]:
+        """Agents whose processes are to be stopped at this tick."""
+        now = self.at(tick).paused.copy()
+        if tick:
+            now &= ~self.at(tick - 1).paused
+        return (np.flatnonzero(now) + 1).tolist()
+
+    def resumed(self, tick: int) -> list[int]:
+        """Agents whose processes go on at this tick."""
+        if not tick:
+            return []
+        return (np.flatnonzero(self.at(tick - 1).paused & ~self.at(tick).idle) + 1).tolist()
+
+    def clock(self, tick: int) -> Integers:
+        """What each agent's clock says in this tick, in ticks, shape (N,)."""
+        reading = np.full(self.links.agents, tick)
+        for number in self._in_force[bisect_right(self._boundaries, tick) - 1]:
+            if (fault := self.faults[number]).verb is Verb.CLOCK:
+                reading += self._agent_masks[number] * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
+        return np.maximum(reading, 0)
+
+    def held(self, fault: int) -> Mask:
+        """Links on which fault number `fault` acts, shape (L,)."""
+        return self._link_masks[fault] | self.links.touching(self._agent_masks[fault])
+
+    @property
+    def warm(self) -> frozenset[int]:
+        """Agents that at some time go on from their own last state."""
+        return frozenset(agent for fault in self.faults if fault.warm for agent in fault.agents)
+
+    @cached_property
+    def _starts(self) -> dict[int, list[int]]:
+        """Numbers of the faults that begin in a tick."""
+        return _by_tick((number, fault.start) for number, fault in enumerate(self.faults) if fault.trigger is None)
+
+    @cached_property
+    def _ends(self) -> dict[int, list[int]]:
+        """Numbers of the faults that hold no longer from a tick on."""
+        placed = ((number, fault) for number, fault in enumerate(self.faults) if fault.trigger is None)
+        return _by_tick((number, fault.end) for number, fault in placed if fault.end is not None)
+
+    @cached_property
+    def _boundaries(self) -> list[int]:
+        return sorted({0, *self._starts, *self._ends})
+
+    @cached_property
+    def _in_force(self) -> list[list[int]]:
+        """Numbers of the faults that hold from each boundary to the next."""
+        segments, now = [], set[int]()
+        for tick in self._boundaries:
+            now = (now | set(self._starts.get(tick, ()))) - set(self._ends.get(tick, ()))
+            segments.append(sorted(number for number in now if self.faults[number].active(tick)))
+        return segments
+
+    @cached_property
+    def _segments(self) -> list[Conditions]:
+        return [self._conditions(numbers) for numbers in self._in_force]
+
+    def _conditions(self, in_force: Sequence[int]) -> Conditions:
+        size, agents = len(self.links), self.links.agents
+
+        def under(verb: Verb, masks: Sequence[Mask]) -> list[tuple[Fault, Mask]]:
+            return [(self.faults[number], masks[number]) for number in in_force if self.faults[number].verb is verb]
+
+        def links(*verbs: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
+            acting = [pair for verb in verbs for pair in under(verb, self._link_masks)]
+            return np.logical_or.reduce([np.zeros(size, dtype=bool), *(m for f, m in acting if which(f))])
+
+        def whom(verb: Verb, which: Callable[[Fault], bool] = lambda _: True) -> Mask:
+            acting = under(verb, self._agent_masks)
+            return np.logical_or.reduce([np.zeros(agents, dtype=bool), *(m for f, m in acting if which(f))])
+
+        def chance(verb: Verb) -> Array:
+            passing = np.ones(size)
+            for fault, mask in under(verb, self._link_masks):
+                passing = passing * np.where(mask, 1.0 - fault.probability, 1.0)
+            return 1.0 - passing
+
+        def sums(verb: Verb, masks: Sequence[Mask], rows: int) -> Array:
+            acting = under(verb, masks)
+            return sum((mask[:, None] * np.array(fault.vector) for fault, mask in acting), start=np.zeros((rows, 1)))
+
+        def largest(verb: Verb, value: Callable[[Fault], float]) -> Array:
+            acting = under(verb, self._link_masks)
+            return np.max([np.zeros(size), *(mask * value(fault) for fault, mask in acting)], axis=0)
+
+        dead, receiver = whom(Verb.KILL), self.links.dst - 1
+        drops, holds = (
+            (lambda fault, policy=policy: fault.under_way is policy) for policy in UnderWay if policy != "deliver"
+        )
+        delays = [mask * fault.seconds for fault, mask in under(Verb.DELAY, self._link_masks)]
+        return Conditions(
+            dead=dead,
+            paused=whom(Verb.PAUSE) & ~dead,
+            departed=whom(Verb.DEPART),
+            drifting=whom(Verb.DEPART, lambda fault: fault.body is DepartedBody.DRIFT),
+            vanished=whom(Verb.DEPART, lambda fault: fault.body is DepartedBody.VANISH),
+            cut=links(Verb.CUT),
+            partitioned=links(Verb.PARTITION),
+            cut_drops=links(Verb.CUT, which=drops),
+            partition_drops=links(Verb.PARTITION, which=drops),
+            pause_drops=whom(Verb.PAUSE, drops)[receiver],
+            holds=links(Verb.CUT, Verb.PARTITION, which=holds) | whom(Verb.PAUSE, holds)[receiver],
+            loss=chance(Verb.LOSE),
+            dropout=chance(Verb.DROPOUT),
+            delay_s=np.sum([np.zeros(size), *delays], axis=0),
+            profile=largest(Verb.DEGRADE, lambda fault: fault.profile).astype(np.uint8),
+            frozen=links(Verb.FREEZE),
+            bias=sums(Verb.BIAS, self._link_masks, size),
+            push=sums(Verb.GUST, self._agent_masks, agents),
+            outlier=chance(Verb.OUTLIER),
+            deviation=largest(Verb.OUTLIER, lambda fault: fault.deviation),
+            liars=tuple(fault for fault, _ in under(Verb.LIE, self._agent_masks)),
+        )
+
+    def _links_held(self, fault: Fault) -> Mask:
+        return cut.severed(self.links, fault.pairs) | cut.separated(self.links, fault.groups)
+
+    def _agents_held(self, fault: Fault) -> Mask:
+        mask = np.zeros(self.links.agents, dtype=bool)
+        for agent in fault.agents:
+            if not 1 <= agent <= self.links.agents:
+                raise ValueError(f"agent {agent} does not exist: agents are 1 to {self.links.agents}")
+            mask[agent - 1] = True
+        return mask
+
+
+def _by_tick(numbered: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
+    ticks: dict[int, list[int]] = {}
+    for number, tick in numbered:
+        ticks.setdefault(tick, []).append(number)
+    return ticks
+
+
+def _placed(fault: Fault, tick: int) -> Fault:
+    return replace(fault, trigger=None, start=tick + fault.start, end=None if fault.end is None else tick + fault.end)

@@ -1,0 +1,1 @@
+"""What a profile does to messages: one model a file."""

@@ -1,0 +1,1 @@
+"""Messages offered in a tick, and what becomes of each."""

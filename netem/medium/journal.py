@@ -1,0 +1,299 @@
+"""The journal: every verdict a row, streamed to disk as Arrow; and an earlier run's journal as the judge of another.
+
+The file is an Arrow stream, so what a killed run has written can be read. Rows are in the order of ticks. A message has one row
+with its verdict when it is offered, a row `copied` if it is doubled, and a row more if it is dropped or released under way.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core import arrow
+from netem.core.arrow import NAMES, Stream, named, places
+from netem.core.channels import SENSE
+from netem.core.links import Links
+from netem.core.plain import from_plain, plainly
+from netem.faults.fault import Fault
+from netem.impairments.corrupt import Mark
+from netem.medium.in_flight import Entry, Verdicts
+from netem.medium.verdict import Fate
+
+FILE = "journal.arrows"
+VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")
+_DELIVERED, _DELAYED, _DROPPED, _COPIED, _RELEASED = range(5)
+_REASON = np.array([fate.label for fate in Fate])
+_MARK = np.array([mark.label for mark in Mark])
+
+SCHEMA = pa.schema(
+    [
+        ("tick", pa.int32()),
+        ("src", pa.int32()),
+        ("dst", pa.int32()),
+        ("channel", NAMES),
+        ("seq", pa.int32()),
+        ("verdict", NAMES),
+        ("reason", NAMES),
+        ("deliver_tick", pa.int32()),
+        ("mark", NAMES),
+        ("event", pa.string()),
+    ]
+)
+
+
+class JournalError(ValueError):
+    """What is wrong with a journal."""
+
+
+class Writer:
+    """Writes the journal of a run.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    links, channels
+        What the rows of the verdicts stand for.
+    """
+
+    def __init__(self, path: Path, links: Links, channels: Sequence[str]) -> None:
+        self._links = links
+        self._channels = list(channels)
+        self._offered = np.zeros((len(channels), len(links)), dtype=np.int64)
+        self._stream = Stream(path, SCHEMA)
+
+    def __enter__(self) -> Writer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def write(self, first: int, entries: Sequence[Entry]) -> None:
+        """Write down consecutive ticks."""
+        parts = [rows for n, entry in enumerate(entries) for rows in self._of_tick(first + n, entry)]
+        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        events = {
+            first + n: json.dumps(entry.injected, default=plainly)
+            for n, entry in enumerate(entries)
+            if entry.injected is not None
+        }
+        self._stream.write(self._table(_Rows(*columns), events))
+
+    def close(self) -> None:
+        """End the file."""
+        self._stream.close()
+
+    def _of_tick(self, tick: int, entry: Entry) -> list[_Rows]:
+        due, mark, copy_due = _dense(tick, entry.fates.shape, entry.odd)
+        channel, link = np.nonzero(entry.fates != Fate.SILENT)
+        fate = entry.fates[channel, link].astype(np.int64)
+        seq = self._offered[channel, link]
+        passed = fate <= Fate.DELAYED
+        verdict = np.where(passed, fate - Fate.DELIVERED + _DELIVERED, _DROPPED)
+        arrives = np.where(passed, due[channel, link], -1)
+        offered = _Rows(np.full_like(link, tick), channel, link, seq, verdict, fate, arrives, mark[channel, link])
+        doubled, on = np.nonzero(copy_due >= 0)
+        copies = _rows(tick, doubled, on, self._offered[doubled, on], _COPIED, Fate.DELAYED, copy_due[doubled, on])
+        _, ch, li, number, why = entry.dropped.reshape(-1, 5).T
+        lost = _rows(tick, ch, li, number, _DROPPED, why, np.full_like(ch, -1))
+        _, ch, li, number = entry.released.reshape(-1, 4).T
+        freed = _rows(tick, ch, li, number, _RELEASED, Fate.DELAYED, np.full_like(ch, tick))
+        self._offered += entry.fates != Fate.SILENT
+        return [offered, copies, lost, freed]
+
+    def _table(self, rows: _Rows, events: dict[int, str]) -> dict[str, Any]:
+        event = np.full(len(rows.tick), None, dtype=object)
+        event[np.searchsorted(rows.tick, list(events))] = list(events.values())
+        return {
+            "tick": rows.tick,
+            "src": self._links.src[rows.link],
+            "dst": self._links.dst[rows.link],
+            "channel": named(rows.channel, self._channels),
+            "seq": rows.seq,
+            "verdict": named(rows.verdict, VERDICTS),
+            "reason": named(rows.fate, _REASON, rows.fate < Fate.DEAD),
+            "deliver_tick": pa.array(rows.deliver_tick, pa.int32(), mask=rows.deliver_tick < 0),
+            "mark": named(rows.mark, _MARK, rows.mark == Mark.NONE),
+            "event": event,
+        }
+
+
+class _Rows(NamedTuple):
+    tick: Integers
+    channel: Integers
+    link: Integers
+    seq: Integers
+    verdict: Integers
+    fate: Integers
+    deliver_tick: Integers
+    mark: Integers
+
+
+def _rows(tick: int, channel: Integers, link: Integers, seq: Integers, verdict: int, fate: Any, due: Integers) -> _Rows:
+    def every(value: Any) -> Integers:
+        return np.broadcast_to(np.asarray(value, dtype=np.int64), link.shape)
+
+    return _Rows(every(tick), channel, link, seq, every(verdict), every(fate), due, every(Mark.NONE))
+
+
+def _dense(tick: int, shape: tuple[int, ...], odd: Integers) -> tuple[Integers, Integers, Integers]:
+    due, mark, copy_due = np.full(shape, tick), np.zeros(shape, dtype=np.int64), np.full(shape, -1)
+    channel, link, *details = odd.reshape(-1, 5).T
+    for field, values in zip((due, mark, copy_due), details, strict=True):
+        field[channel, link] = values
+    return due, mark, copy_due
+
+
+def read(path: Path) -> Any:
+    """The journal as a pyarrow table, as far as it was written.
+
+    Raises
+    ------
+    JournalError
+        When it is no journal.
+    """
+    try:
+        return arrow.read(path, SCHEMA)
+    except arrow.TableError as error:
+        raise JournalError(str(error)) from error
+
+
+def injected(table: Any) -> tuple[Fault, ...]:
+    """The faults that were injected into a run while it flew."""
+    events = table["event"].drop_null()
+    if not len(events):
+        return ()
+    return tuple(from_plain(Fault, fault) for fault in json.loads(events[-1].as_py()))
+
+
+def check(table: Any, channels: Sequence[str], ticks: int) -> None:
+    """Whether a journal can judge a run of these channels and so many ticks.
+
+    Raises
+    ------
+    JournalError
+        When it cannot.
+    """
+    last = int(table["tick"].to_numpy().max(initial=-1))
+    if last + 1 < ticks:
+        raise JournalError(f"the journal ends after {last + 1} ticks, the run has {ticks}; shorten time.duration")
+    if missing := [name for name in channels if name not in table["channel"].unique().to_pylist()]:
+        raise JournalError(f"the journal has no verdicts on {', '.join(missing)}: it is of a run without such agents")
+
+
+class Carried(NamedTuple):
+    """What the air carried in an earlier run.
+
+    Parameters
+    ----------
+    share
+        Of the channels' messages, shape (T, L): 0 where the air lost them. Scripted faults, and agents that were silent, are
+        not the air: there it is 1.
+    known
+        Links of which the journal says anything, shape (L,).
+    untold
+        Ticks and links where nothing was offered, or a fault held all of it, shape (T, L).
+    """
+
+    share: Array
+    known: Mask
+    untold: Mask
+
+
+def carried(table: Any, links: Links, *, sensing: bool) -> Carried:
+    """What the air carried.
+
+    Parameters
+    ----------
+    table
+        The journal of a run.
+    links
+        Of the run that will meet this air.
+    sensing
+        Whether to take the verdicts on measurements, or on all that was communicated.
+
+    Raises
+    ------
+    JournalError
+        When it has none of them.
+    """
+    names = [name for name in table["channel"].unique().to_pylist() if (name == SENSE) is sensing]
+    if not names:
+        raise JournalError(f"the journal has no verdicts on {'sensing' if sensing else 'communication'}")
+    fate = Recorded(table, links, names).fate
+    offered, lost = fate != Fate.SILENT, fate >= Fate.CLOSED
+    by_air = lost | (fate == Fate.DELIVERED) | (fate == Fate.DELAYED)
+    share = 1.0 - lost.sum(axis=1) / np.maximum(offered.sum(axis=1), 1)
+    return Carried(share, offered.any(axis=(0, 1)), ~by_air.any(axis=1))
+
+
+class Recorded:
+    """The verdicts of an earlier run, whatever was their cause.
+
+    Parameters
+    ----------
+    table
+        Its journal.
+    links, channels
+        Of the run that is to be judged.
+    """
+
+    def __init__(self, table: Any, links: Links, channels: Sequence[str]) -> None:
+        tick, src, dst, due = (table[name].fill_null(-1).to_numpy() for name in ("tick", "src", "dst", "deliver_tick"))
+        verdict = places(table["verdict"], VERDICTS)
+        fate = np.maximum(places(table["reason"], _REASON), 0)
+        channel = places(table["channel"], channels)
+        seq = table["seq"].to_numpy()
+        size = links.agents + 1
+        row_of = np.full((size, size), -1)
+        row_of[links.src, links.dst] = np.arange(len(links))
+        here = (src < size) & (dst < size)
+        link = np.where(here, row_of[np.where(here, src, 0), np.where(here, dst, 0)], -1)
+        shape = (int(tick.max(initial=-1)) + 1, len(channels), len(links))
+        self.fate = np.zeros(shape, dtype=np.uint8)
+        self.due = np.broadcast_to(np.arange(shape[0])[:, None, None], shape).copy()
+        self.mark = np.zeros(shape, dtype=np.uint8)
+        self.copy_due = np.full(shape, -1)
+        known = (channel >= 0) & (link >= 0)
+        # A row of a message under way is not the first of its number.
+        first = known & _first_of_message(channel, link, seq, len(links), verdict)
+        at = tick[first], channel[first], link[first]
+        passed = np.where(verdict == _DELAYED, Fate.DELAYED, Fate.DELIVERED)
+        self.fate[at] = np.where(verdict == _DROPPED, fate, passed)[first]
+        self.due[at] = np.where(due < 0, tick, due)[first]
+        self.mark[at] = np.maximum(places(table["mark"], _MARK), 0)[first]
+        doubled = known & (verdict == _COPIED)
+        self.copy_due[tick[doubled], channel[doubled], link[doubled]] = due[doubled]
+
+    def verdicts(self, tick: int, offered: Mask) -> Verdicts:
+        """What was decided of the messages of a tick.
+
+        Raises
+        ------
+        JournalError
+            When a message is offered of which the journal says nothing.
+        """
+        if tick >= len(self.fate):
+            raise JournalError(f"the journal ends before tick {tick}")
+        fate = np.where(offered, self.fate[tick], np.uint8(Fate.SILENT))
+        if (offered & (fate == Fate.SILENT)).any():
+            raise JournalError(f"the journal has no verdict on some messages of tick {tick}: were other agents flown?")
+        return Verdicts(fate, self.due[tick], self.mark[tick], np.where(offered, self.copy_due[tick], -1))
+
+
+def _first_of_message(channel: Integers, link: Integers, seq: Integers, links: int, verdict: Integers) -> Mask:
+    offer = (verdict != _COPIED) & (verdict != _RELEASED)
+    identity = (channel * links + link) * (int(seq.max(initial=0)) + 1) + seq
+    first = np.zeros(len(seq), dtype=bool)
+    rows = np.flatnonzero(offer)
+    first[rows[np.unique(identity[rows], return_index=True)[1]]] = True
+    return first

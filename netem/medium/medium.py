@@ -1,0 +1,222 @@
+"""The medium: messages offered in a tick -> messages delivered in a tick, each with a verdict.
+
+A loss is decided in `Medium.judge`, and nowhere else; `Ledger` counts it and `journal.py` writes it down. What the timeline
+imposes is decided here, what a profile does in `climate.py`; a message passes when neither holds it.
+
+Nothing here knows what a message says: the medium works on who offered what, over (channels, links).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core.channels import SENSE
+from netem.core.draws import DrawnAhead, Purpose, Seed
+from netem.core.links import Links
+from netem.faults.timeline import Conditions, Timeline
+from netem.impairments.profile import Profile
+from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
+from netem.medium.link_model import LinkModel, Memory
+from netem.medium.verdict import PASSED, Fate, Fates, doom, standing
+
+# Looking up the members of an enumeration costs as much as an operation on a small array.
+_DELIVERED, _DELAYED, _PAUSED, _SCRIPTED, _DROPOUT = (
+    np.uint8(fate) for fate in (Fate.DELIVERED, Fate.DELAYED, Fate.PAUSED, Fate.SCRIPTED, Fate.DROPOUT)
+)
+
+
+class Verdicted(Protocol):
+    """A source of verdicts that were decided before: `journal.Recorded`."""
+
+    def verdicts(self, tick: int, offered: Mask) -> Verdicts:
+        """On the messages of a tick."""
+
+
+def recorded(path: Path | None, links: Links, channels: Sequence[str]) -> Verdicted | None:
+    """The verdicts in a journal, if there is one, for a run over these links and channels."""
+    if path is None:
+        return None
+    from netem.medium import journal  # pyarrow takes a while to import, and only a replay reads journals
+
+    return journal.Recorded(journal.read(path), links, channels)
+
+
+class _Under(NamedTuple):
+    """What conditions make of messages.
+
+    Parameters
+    ----------
+    standing, doom
+        Of those offered and those under way: a reason, or PASSED, shape (C, L) or (L,), and (L,).
+    holds
+        Where those under way wait, shape (L,).
+    stalls
+        Messages that pass, but wait for a paused receiver, shape (C, L), if any do.
+    loses, drops_out, delays, degrades
+        Whether some are lost by chance, not measured by chance, delayed, or ruled by another profile.
+    """
+
+    standing: Fates
+    doom: Fates
+    holds: Mask
+    stalls: Mask | None
+    loses: bool
+    drops_out: bool
+    delays: bool
+    degrades: bool
+
+
+class Medium:
+    """The air of one run: its profiles, a timeline, and a seed.
+
+    Parameters
+    ----------
+    seed
+        Of the run, or of every agent's run.
+    channels
+        Names, sensing first; the rows of every (C, L) array.
+    profiles
+        What impairs the links: the first is their own, the others those to which faults degrade them.
+    timeline
+        What is scripted.
+    recorded
+        The verdicts of an earlier run, which then stand in place of all models.
+    """
+
+    def __init__(
+        self,
+        seed: Seed,
+        channels: Sequence[str],
+        profiles: Sequence[Profile],
+        timeline: Timeline,
+        recorded: Verdicted | None = None,
+    ) -> None:
+        self.timeline = timeline
+        self._recorded = recorded
+        self._links = timeline.links
+        self._shape = (len(channels), len(self._links))
+        self._sensing = np.array([name == SENSE for name in channels])[:, None]
+        self._climates = [LinkModel(seed, self._links, channels, profile) for profile in profiles]
+        self._keeps_order = any(climate.keeps_order for climate in self._climates)
+        self._scripted = DrawnAhead(lambda ticks: self._climates[0].draw(Purpose.SCRIPTED_LOSS, ticks))
+        self._dropouts = DrawnAhead(lambda ticks: self._climates[0].draw(Purpose.DROPOUT, ticks))
+        self._conditions: Conditions | None = None
+        self._cached: _Under
+
+    def begin(self) -> MediumState:
+        """The air before the first tick."""
+        return MediumState.empty(self._shape, tuple(climate.begin() for climate in self._climates))
+
+    def judge(self, air: MediumState, tick: int, offered: Mask, position: Array | None) -> tuple[MediumState, Verdicts]:
+        """The verdict on every message offered in a tick.
+
+        Parameters
+        ----------
+        air
+            As the tick before left it.
+        tick
+            Of the offer.
+        offered
+            True where a message was offered on (channel, link), shape (C, L).
+        position
+            The agents', shape (N, D), in metres; only a spatial profile needs them.
+        """
+        if self._recorded:
+            return air._replace(offered=air.offered + offered), self._recorded.verdicts(tick, offered)
+        now = self.timeline.at(tick)
+        under = self._under(now)
+        memories, verdicts = self._by_profile(air, tick, offered, position, now, under)
+        if under.stalls is not None:
+            np.copyto(verdicts.fate, _DELAYED, where=under.stalls & (verdicts.fate == _DELIVERED))
+        last_due = air.last_due
+        if self._keeps_order:
+            passed = (verdicts.fate == _DELIVERED) | (verdicts.fate == _DELAYED)
+            last_due = np.where(passed, np.maximum(verdicts.due, verdicts.copy_due), last_due)
+        return MediumState(air.under_way, air.offered + offered, offered, last_due, memories), verdicts
+
+    def deliver(self, air: MediumState, tick: int, verdicts: Verdicts) -> tuple[MediumState, Delivery]:
+        """What arrives in this tick: the messages just passed, and those under way that are due."""
+        under = self._under(self.timeline.at(tick))
+        return deliver(air, tick, verdicts, under.doom, under.holds)
+
+    @property
+    def ahead(self) -> bool:
+        """Whether a tick can be judged before it is known where the agents are."""
+        if self.timeline.pending or self._recorded:  # a journal ends with its run: nothing is known of the tick after
+            return False
+        return not any(climate.profile.spatial for climate in self._climates)
+
+    def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
+        """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
+        return self._climates[0].bit_draws(content, channel, link)
+
+    def bias(self, content: Integers, link: Integers) -> Array:
+        """What a bias adds to the numbers of messages that speak of ticks `content` (m,), on links (m,), shape (m,)."""
+        ruling = [self.timeline.at(int(tick)).profile[row] for tick, row in zip(content, link, strict=True)]
+        return np.array([self._climates[n].profile.bias[row] for n, row in zip(ruling, link, strict=True)])
+
+    def _by_profile(
+        self, air: MediumState, tick: int, offered: Mask, position: Array | None, now: Conditions, under: _Under
+    ) -> tuple[tuple[Memory, ...], Verdicts]:
+        imposed, delay_s = self._imposed(tick, now, under), now.delay_s if under.delays else None
+        own, *others = self._climates
+        if not under.degrades:
+            memory, verdicts = own.judge(air, air.memories[0], tick, offered, position, imposed, delay_s)
+            rested = (climate.rest(memory) for climate, memory in zip(others, air.memories[1:], strict=True))
+            return (memory, *rested), verdicts
+        judged = [
+            climate.judge(air, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
+            for number, (climate, memory) in enumerate(zip(self._climates, air.memories, strict=True))
+        ]
+        whole = judged[0][1]
+        for number, (_, verdicts) in enumerate(judged[1:], start=1):
+            ruled = now.profile == number
+            whole = _merged(ruled, verdicts, whole)
+        return tuple(memory for memory, _ in judged), whole
+
+    def _imposed(self, tick: int, now: Conditions, under: _Under) -> Fates:
+        """What the timeline makes of messages: a reason, or PASSED, shape (C, L) or (L,)."""
+        reason = under.standing
+        if under.drops_out:
+            unmade = self._sensing & (self._dropouts.at(tick) < now.dropout)
+            reason = np.minimum(reason, np.where(unmade, _DROPOUT, PASSED))
+        if under.loses:
+            reason = np.minimum(reason, np.where(self._scripted.at(tick) < now.loss, _SCRIPTED, PASSED))
+        return reason
+
+    def _under(self, now: Conditions) -> _Under:
+        """What these conditions mean for the links; they stay the same for many ticks."""
+        if now is not self._conditions:
+            self._conditions, self._cached = now, self._conditioned(now)
+        return self._cached
+
+    def _conditioned(self, now: Conditions) -> _Under:
+        links, held = self._links, standing(self._links, now)
+        deaf = now.paused[links.dst - 1]
+        if deaf.any():  # a paused agent measures nothing; what is sent to it is dropped, or waits
+            unheard = deaf & (self._sensing | now.pause_drops)
+            held = np.minimum(held, np.where(unheard, _PAUSED, PASSED))
+        return _Under(
+            standing=held,
+            doom=doom(links, now),
+            holds=now.holds,
+            stalls=deaf & ~self._sensing if deaf.any() else None,
+            loses=bool(now.loss.any()),
+            drops_out=bool(now.dropout.any()),
+            delays=bool(now.delay_s.any()),
+            degrades=bool(now.profile.any()),
+        )
+
+
+def _merged(ruled: Mask, one: Verdicts, other: Verdicts) -> Verdicts:
+    return Verdicts(
+        fate=np.where(ruled, one.fate, other.fate),
+        due=np.where(ruled, one.due, other.due),
+        mark=np.where(ruled, one.mark, other.mark),
+        copy_due=np.where(ruled, one.copy_due, other.copy_due),
+    )

@@ -1,0 +1,70 @@
+"""What agents broadcast, read from the wire: checked against the tick and the key it came in; a wrong one names its agent."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Sequence
+
+from analysis.models.arrays import Array
+from netem.wire import messages
+from netem.wire.keys import Keys
+from netem.wire.sequence import Sequences
+
+
+class Broadcasts:
+    """Reads the broadcasts of a run.
+
+    Parameters
+    ----------
+    keys
+        Of the run.
+    agents, channels
+        Who broadcasts, and on which channels.
+    """
+
+    def __init__(self, keys: Keys, agents: Iterable[int], channels: Sequence[str]) -> None:
+        self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in channels}
+        self._channels = list(channels)
+        self._streams = Sequences("agent")
+
+    def restart(self, agent: int) -> None:
+        """Expect the broadcasts of a new process."""
+        for name in self._channels:
+            self._streams.restart(f"{agent} {name}")
+
+    def read(self, key: str, data: bytes, tick: int, awaited: Container[tuple[int, str]]) -> messages.Broadcast:
+        """The broadcast that came on a key, which access control leaves to one agent.
+
+        Raises
+        ------
+        WireError
+            When it is none, or not one of this tick, or none that is `awaited`.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        _, agent, _, channel = key.rsplit("/", 3)
+        whose = f"agent {agent} on {channel!r}"
+        try:
+            said = messages.unpack_relayed(data)
+        except messages.WireError as error:
+            raise messages.WireError(f"{whose}: {error}") from error
+        if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
+            raise messages.WireError(
+                f"{whose} in tick {tick}: it speaks as agent {said.src}, on {messages.shown(said.channel)}, of tick {said.k}; "
+                f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
+            )
+        self._streams.check(f"{said.src} {said.channel}", said.seq)
+        if (said.src, said.channel) not in awaited:
+            raise messages.WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
+        return said
+
+
+def fields(said: messages.Broadcast) -> dict[str, Array]:
+    """The named fields of a broadcast as arrays, for who has to change them.
+
+    Raises
+    ------
+    WireError
+        When one is no nested list of numbers or truths.
+    """
+    whose = f"agent {said.src} on {said.channel!r}"
+    return {name: messages.numbers(field, f"{whose}: {name!r}", None, "iufb") for name, field in said.payload.items()}

@@ -1,0 +1,193 @@
+"""Zenoh configuration of a run: a hermetic star on loopback, with a name and a password for each process.
+
+The medium is the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's
+messages to any other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from netem.core.channels import INPUT, MEASUREMENT
+from netem.wire.keys import Keys
+
+HUB = "netem"
+WORLD = "world"
+CONTROL = "control"
+CENTRE = "centre"
+
+# One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
+_RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
+ENVIRONMENT = {"ZENOH_RUNTIME": f"({_RUNTIME}, app: (worker_threads: 1))", "OPENBLAS_NUM_THREADS": "1"}
+
+_PRIORITIES = (
+    "control",
+    "real_time",
+    "interactive_high",
+    "interactive_low",
+    "data_high",
+    "data",
+    "data_low",
+    "background",
+)
+_LONGEST_QUEUE = 16
+_PENDING = 10_000
+# A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
+# that log in at once on two cores.
+_LEASE_MS = 3_600_000
+
+
+_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
+_PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
+_LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
+
+
+def socket_folder() -> str:
+    """A temporary folder in which the path of a socket is short enough for the system and plain enough for an endpoint.
+
+    Raises
+    ------
+    OSError
+        When there is none.
+    """
+    own = tempfile.gettempdir()
+    for folder in (own, *_PLACES):
+        fits = len(folder) + len(_SOCKET) <= _LONGEST_SOCKET and _PLAIN_PATH.fullmatch(folder)
+        if fits and os.access(folder, os.W_OK | os.X_OK):
+            return folder
+    raise OSError(
+        f"{own!r} is too long or too odd a path for the run's socket, and {', '.join(_PLACES)} cannot be written to; "
+        f"set TMPDIR to a plain path of at most {_LONGEST_SOCKET - len(_SOCKET)} characters"
+    )
+
+
+def agent_name(agent: int) -> str:
+    """The name under which an agent logs in."""
+    return f"agent-{agent}"
+
+
+@dataclass(frozen=True)
+class Login:
+    """Where a process connects, and as whom."""
+
+    endpoint: str
+    name: str
+    password: str
+
+
+def client(login: Login, patience_s: float | None = None) -> zenoh.Config:
+    """Configuration of an agent or the world: connects to the hub, and to nobody else.
+
+    It tries for as long as `patience_s`; None for ever, where a launcher watches.
+    """
+    return _config(
+        {
+            "mode": "client",
+            "connect": {
+                "endpoints": [login.endpoint],
+                "timeout_ms": -1 if patience_s is None else round(1000 * patience_s),
+                "exit_on_failure": True,
+                "retry": {"period_init_ms": 10, "period_max_ms": 50, "period_increase_factor": 1.5},
+            },
+        },
+        login,
+    )
+
+
+def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> zenoh.Config:
+    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do."""
+    return _config(
+        {
+            "mode": "router",
+            "listen": {"endpoints": [login.endpoint]},
+            "access_control": _access(keys, agents),
+        },
+        login,
+        dictionary_file=dictionary_file,
+    )
+
+
+def await_subscribers(publishers: Iterable[zenoh.Publisher]) -> None:
+    """Wait until each publisher has somebody to hear it: what it sends from then on is not lost at the start."""
+    for publisher in publishers:
+        changes = publisher.declare_matching_listener(zenoh.handlers.FifoChannel(4))
+        matching: Any = publisher.matching_status
+        while not matching.matching:
+            matching = changes.recv()
+        changes.undeclare()  # type: ignore[no-untyped-call]
+
+
+def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
+    return zenoh.Config.from_json5(
+        json.dumps(
+            base
+            | {
+                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+                "transport": {
+                    "shared_memory": {"enabled": False},
+                    "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
+                    "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
+                    "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
+                },
+            }
+        )
+    )
+
+
+def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
+    rights = [
+        _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+        *(
+            _rights(
+                agent_name(agent),
+                says=[keys.broadcast(agent, "*"), keys.act(agent)],
+                hears=[keys.inbox(agent), keys.told(agent)],
+                learns=[keys.broadcast("*", "*"), keys.act("*")],
+            )
+            for agent in agents
+        ),
+        _rights(
+            CENTRE,
+            says=[keys.told("*")],
+            hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
+            learns=[keys.told("*")],
+        ),
+        _controls(keys),
+    ]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": [rule for _, rules in rights for rule in rules],
+        "subjects": [{"id": name, "usernames": [name]} for name, _ in rights],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
+    }
+
+
+def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:
+    return name, [
+        _allow(f"{name}-says", "put", "ingress", says),
+        _allow(f"{name}-hears", "put", "egress", hears),
+        _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
+        # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
+        _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
+    ]
+
+
+def _controls(keys: Keys) -> tuple[str, list[dict[str, Any]]]:
+    return CONTROL, [
+        _allow("control-asks", "query", "ingress", [keys.control]),
+        _allow("control-hears", "reply", "egress", [keys.control]),
+        _allow("control-learns", "declare_queryable", "egress", [keys.control]),
+    ]
+
+
+def _allow(name: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": keys}

@@ -1,0 +1,327 @@
+"""Everything that happened in a run, as arrays, and the digest that two equal runs share."""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
+
+from analysis.metrics.errors import tracking_error
+from analysis.models.arrays import Array, Integers, Mask
+from netem.faults.timeline import Timeline
+from netem.impairments.corrupt import Mark
+from netem.medium.in_flight import Entry, newest_of
+from netem.medium.verdict import Fate, Fates
+from netem.processes import system_errors
+from world.physics.world import Scene, World
+
+Arrays = dict[str, NDArray[Any]]
+
+FILE = "arrays.npz"  # in a run directory
+
+# Of each array by tick the kind of its numbers, and how many axes it has.
+_BY_TICK = {
+    "position": ("f", 3),
+    "measured": ("f", 3),
+    "input": ("f", 3),
+    "estimate": ("f", 4),
+    "known": ("b", 3),
+    "covariance": ("f", 4),
+    "psi": ("f", 2),
+    "feasible": ("i", 2),
+    "fates": ("u", 3),
+    "newest": ("i", 3),
+    "copies": ("i", 1),
+    "late": ("i", 1),
+    "dropped": ("i", 2),
+    "target": ("f", 3),
+    "error": ("f", 1),
+}
+TAKEN = frozenset(_BY_TICK)  # names that no report can have
+UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
+_MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
+
+
+class Moment(NamedTuple):
+    """What happened in one tick, as arrays or as the nested lists that came over the wire.
+
+    Parameters
+    ----------
+    position, target, input
+        Where the agents are and should be, and what they fly, shape (N, D), in metres, and metres per second or per second
+        squared.
+    measured
+        What the sensors said of every directed link, heard or not, shape (L, D), in metres.
+    estimate, known, covariance
+        Estimated relative positions, shape (N, n, D), in metres, where there are any, shape (N, n), and the upper triangles of
+        their covariances, shape (N, n, D (D + 1) / 2), in square metres.
+    psi
+        Convergence indicators, shape (N,), NaN where undefined.
+    feasible
+        Whether what an agent sees determines a local map, 1 or 0, or `UNTOLD`, shape (N,).
+    reports
+        What else the agents' estimators said, by name, shape (N, *), NaN of those who did not.
+    fates
+        Verdicts, shape (C, L).
+    odd
+        Messages that passed late, twice or corrupted, rows of `air.out_of_the_ordinary`.
+    apart, late, dropped, released
+        What became of messages under way, as in `air.Delivery`.
+    injected
+        All faults injected so far, in plain form, when one was injected or healed.
+    """
+
+    position: Any
+    target: Any
+    measured: Any
+    input: Any
+    estimate: Any
+    known: Any
+    covariance: Any
+    psi: Any
+    feasible: Any
+    reports: Mapping[str, Any]
+    fates: Any
+    odd: Any
+    apart: Any
+    late: int
+    dropped: Any
+    released: Any
+    injected: list[Any] | None
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Consecutive ticks; every array begins with them. Messages that arrived late, or were dropped under way, are counted.
+
+    Parameters
+    ----------
+    first
+        The first tick.
+    target
+        Where the manoeuvre wants the agents, shape (T, N, D), in metres.
+    error
+        Tracking error (15), shape (T,), in square metres.
+    newest
+        The tick of which the newest arriving content speaks, -1 where nothing arrives, shape (T, C, L).
+    copies, late
+        How many messages were doubled, and how many arrived late, shape (T,).
+    dropped
+        How many were dropped under way, by fate, shape (T, fates).
+    entries
+        What the journal is told.
+    """
+
+    first: int
+    position: Array
+    measured: Array
+    input: Array
+    estimate: Array
+    known: Mask
+    covariance: Array
+    psi: Array
+    feasible: NDArray[np.int8]
+    reports: Mapping[str, Array]
+    fates: Fates
+    newest: NDArray[np.int32]
+    copies: Integers
+    late: Integers
+    dropped: Integers
+    target: Array
+    error: Array
+    entries: list[Entry]
+
+    @property
+    def ticks(self) -> Integers:
+        """Their numbers, shape (T,)."""
+        return np.arange(self.first, self.first + len(self.error))
+
+
+def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments:
+    """Consecutive moments as arrays, with what they are measured against."""
+    ticks = np.arange(first, first + len(moments))
+    where, target = (np.array([getattr(moment, name) for moment in moments]) for name in ("position", "target"))
+    fates = np.array([moment.fates for moment in moments], dtype=np.uint8)
+    entries = [
+        Entry(each, _rows(moment.odd), _rows(moment.dropped), _rows(moment.released), moment.injected)
+        for each, moment in zip(fates, moments, strict=True)
+    ]
+    return Moments(
+        first=first,
+        position=where,
+        measured=np.array([moment.measured for moment in moments]),
+        input=np.array([moment.input for moment in moments]),
+        estimate=np.array([moment.estimate for moment in moments]),
+        known=np.array([moment.known for moment in moments], dtype=bool),
+        covariance=np.array([moment.covariance for moment in moments]),
+        psi=np.array([moment.psi for moment in moments]),
+        feasible=np.array([moment.feasible for moment in moments], dtype=np.int8),
+        reports={name: np.array([moment.reports[name] for moment in moments]) for name in moments[0].reports},
+        fates=fates,
+        newest=_newest(ticks, fates, entries, moments),
+        copies=np.array([np.count_nonzero(entry.odd[:, _COPY_DUE] >= 0) for entry in entries]),
+        late=np.array([moment.late for moment in moments]),
+        dropped=np.array([np.bincount(entry.dropped[:, _FATE], minlength=len(Fate)) for entry in entries]),
+        target=target,
+        error=tracking_error(where, target, timeline.present(ticks.tolist())),
+        entries=entries,
+    )
+
+
+def _rows(given: Any) -> Integers:
+    """Rows that came over the wire, or are arrays already; none have the width of the widest."""
+    rows = np.asarray(given, dtype=np.int64)
+    return rows if rows.ndim == 2 else np.empty((0, 5), dtype=np.int64)
+
+
+def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry], moments: Sequence[Moment]) -> NDArray[np.int32]:
+    newest = np.where(fates == Fate.DELIVERED, ticks[:, None, None], -1)
+    for row, (entry, moment) in enumerate(zip(entries, moments, strict=True)):
+        marked = entry.odd[entry.odd[:, _MARK] != Mark.NONE]
+        newest[row, marked[:, 0], marked[:, 1]] = -1
+        if len(moment.apart):
+            newest[row] = newest_of(newest[row], _rows(moment.apart))
+    return newest.astype(np.int32)
+
+
+class ErrorMonitor:
+    """Follows the tracking error tick by tick, where a fault waits for it."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._errors = np.full(world.ticks, np.nan)
+        self._seen = 0
+
+    @property
+    def errors(self) -> Array:
+        """Of the ticks seen so far, shape (T,), in square metres."""
+        return self._errors[: self._seen]
+
+    def see(self, tick: int, scene: Scene, timeline: Timeline) -> None:
+        """Take in a tick, if anything waits for it."""
+        if timeline.pending:
+            goal = self._world.goal(tick, scene)
+            self._errors[tick] = tracking_error(scene.position, goal, ~timeline.at(tick).absent)
+            self._seen = tick + 1
+
+
+class History:
+    """The moments of a run, gathered; arrays begin with the ticks."""
+
+    def __init__(self, world: World, channels: int, reports: Mapping[str, tuple[int, ...]]) -> None:
+        links, ticks = world.links, world.ticks
+        agents, width, dimension = links.agents, links.slots.shape[1], world.formation.dimension
+        self.ticks = 0
+        self.position = np.zeros((ticks + 1, agents, dimension))
+        self.measured = np.zeros((ticks, len(links), dimension))
+        self.target = np.zeros((ticks, agents, dimension))
+        self.error = np.full(ticks, np.nan)
+        self.input = np.zeros((ticks, agents, dimension))
+        self.estimate = np.zeros((ticks, agents, width, dimension))
+        self.known = np.zeros((ticks, agents, width), dtype=bool)
+        self.covariance = np.zeros((ticks, agents, width, dimension * (dimension + 1) // 2))
+        self.psi = np.full((ticks, agents), np.nan)
+        self.feasible = np.full((ticks, agents), UNTOLD, dtype=np.int8)
+        self.reports = {name: np.full((ticks, agents, *shape), np.nan) for name, shape in reports.items()}
+        self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
+        self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)
+        self.copies = np.zeros(ticks, dtype=np.int64)
+        self.late = np.zeros(ticks, dtype=np.int64)
+        self.dropped = np.zeros((ticks, len(Fate)), dtype=np.int64)
+
+    def extend(self, moments: Moments, next_position: Array) -> None:
+        """Take in the next ticks, and where they led."""
+        span = slice(self.ticks, self.ticks + len(moments.error))
+        for name in _BY_TICK:
+            getattr(self, name)[span] = getattr(moments, name)
+        for name, values in moments.reports.items():
+            self.reports[name][span] = values
+        self.position[span.stop] = next_position
+        self.ticks = span.stop
+
+    def arrays(self) -> Arrays:
+        """All arrays by name, up to the last tick."""
+        by_tick = {name: getattr(self, name)[: self.ticks] for name in _BY_TICK}
+        said = {name: values[: self.ticks] for name, values in self.reports.items()}
+        return by_tick | said | {"position": self.position[: self.ticks + 1]}
+
+    def save(self, path: Path) -> None:
+        """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes.
+
+        Raises
+        ------
+        OSError
+            When they cannot be written.
+        """
+        unfinished = path.with_suffix(".unfinished.npz")
+        with system_errors.about(path):
+            try:
+                np.savez(unfinished, allow_pickle=False, **self.arrays())
+                unfinished.replace(path)
+            finally:
+                unfinished.unlink(missing_ok=True)
+
+
+class Damaged(ValueError):
+    """The arrays of a run are not what it wrote."""
+
+
+def load(path: Path) -> Arrays:
+    """The arrays of a run, by name.
+
+    Raises
+    ------
+    FileNotFoundError
+        When the run never wrote them.
+    Damaged
+        When they are not whole, or not those of a run any more.
+    """
+    try:
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, NpzFile):
+                raise ValueError("it is one array, not an archive of them")
+            arrays = dict(archive)
+        _refuse_other_forms(arrays)
+    except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
+        why = " ".join(str(error).split())
+        raise Damaged(f"{path}: not what a run wrote there: {why}; fly the run again, or restore the file") from error
+    return arrays
+
+
+def _refuse_other_forms(arrays: Arrays) -> None:
+    if missing := [name for name in _BY_TICK if name not in arrays]:
+        raise ValueError(f"it has no {', '.join(missing)}")
+    ticks = len(arrays["error"]) if arrays["error"].ndim else 0
+    for name, array in arrays.items():
+        kind, axes = _BY_TICK.get(name, ("f", max(2, array.ndim)))
+        rows = ticks + (name == "position")
+        if (array.dtype.kind, array.ndim, array.shape[:1]) != (kind, axes, (rows,)):
+            raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, in a run of {ticks} ticks")
+
+
+def digest(arrays: Arrays) -> str:
+    """SHA-256 over positions, inputs, estimates, indicators and verdicts, bit for bit.
+
+    It is the same in either runtime. Between CPUs it is as far as OpenBLAS takes the same kernels for products and inverses:
+    set OPENBLAS_CORETYPE alike to compare (docs/decisions/0001).
+    """
+    total = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        total.update(f"{name}{array.dtype.str}{array.shape}".encode())
+        total.update(one_nan(array).tobytes())
+    return total.hexdigest()
+
+
+def one_nan(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, contiguous, with one NaN for all: of what sign the others are is up to the CPU."""
+    contiguous = np.ascontiguousarray(array)
+    return np.where(np.isnan(contiguous), np.nan, contiguous) if contiguous.dtype.kind == "f" else contiguous

@@ -1,0 +1,74 @@
+"""What a swarm at rest could know of where it is: the first measurement of every link.
+
+An agent that restarts and knows nothing measures anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analysis.metrics import localization
+from analysis.models.arrays import Array, Mask
+from analysis.models.sensor import Sensor
+from netem.core.links import Links
+from netem.faults.timeline import Timeline
+from netem.medium.verdict import Fate, Fates
+from world.physics.world import World
+
+
+@dataclass
+class FirstMeasurements:
+    """The first measurement of every link that reached its agent, of one run or of many.
+
+    Parameters
+    ----------
+    links, sensor
+        Of one run.
+    batch
+        Shape of the runs: () for one.
+    """
+
+    links: Links
+    sensor: Sensor
+    batch: tuple[int, ...]
+    measured: Array = field(init=False)
+    seen: Mask = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Nothing is measured yet."""
+        dimension = len(self.sensor.covariance)
+        self.measured = np.zeros((*self.batch, len(self.links), dimension))
+        self.seen = np.zeros((*self.batch, len(self.links)), dtype=bool)
+
+    @classmethod
+    def of(cls, world: World, timeline: Timeline, measured: Array, fates: Fates) -> FirstMeasurements:
+        """Those of a whole run: measurements (T, L, D) in every tick, and their verdicts (T, L)."""
+        first = cls(world.links, world.sensor, ())
+        for tick in range(len(measured)):
+            first.tick(timeline, tick, measured[tick], fates[tick])
+        return first
+
+    def tick(self, timeline: Timeline, tick: int, measured: Array, fates: Fates) -> None:
+        """Take in a tick of the runs, each as in the timeline: measurements (..., L, D), and their verdicts (..., L)."""
+        if fresh := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
+            self.seen = self.seen & ~np.isin(self.links.dst, [*fresh])
+        self.take(measured, fates == Fate.DELIVERED)
+
+    def take(self, measured: Array, delivered: Mask) -> None:
+        """Keep what is new of a tick: measurements (..., L, D), and which arrived (..., L)."""
+        new = delivered & ~self.seen
+        self.measured = np.where(new[..., None], measured, self.measured)
+        self.seen = self.seen | delivered
+
+    def edges(self) -> localization.EdgeInformation:
+        """Each edge, as both its ends know it."""
+        agents, (rows, columns) = self.links.agents, (self.links.dst - 1, self.links.src - 1)
+        dimension = self.measured.shape[-1]
+        relative = np.zeros((*self.batch, agents, agents, dimension))
+        relative[..., rows, columns, :] = self.measured
+        spread = np.where(self.seen[..., None, None], self.sensor.spread(self.measured), np.eye(dimension))
+        information = np.zeros((*self.batch, agents, agents, dimension, dimension))
+        information[..., rows, columns, :, :] = np.where(self.seen[..., None, None], np.linalg.inv(spread), 0.0)
+        return localization.together(relative, information)

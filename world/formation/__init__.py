@@ -1,0 +1,1 @@
+"""Where agents should be: nominal formations, their stress, manoeuvres."""

@@ -1,0 +1,1 @@
+"""Where agents are: bodies, sensors, disturbances, a target."""

@@ -1,0 +1,97 @@
+"""A target that the agents pursue, and their detectors: what is found of it, and when (paper 002, section 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.models.algebra import product
+from analysis.models.arrays import Array, Integers
+from analysis.models.pursuit import Sighting, Target, diffusion, transition
+from netem.core.draws import Purpose, Seed, uniform
+from world.physics.noise import normal
+
+
+class PursuitState(NamedTuple):
+    """The target, and every agent's detector at work.
+
+    Parameters
+    ----------
+    target
+        Position and derivatives of each swarm's target, shape (S, m, D), in metres, metres per second ...
+    method
+        Which each agent's detector uses, shape (N,).
+    due
+        The tick in which it will be done, shape (N,).
+    found
+        What it will then say of the target at the tick in which it began, shape (N, D), in metres.
+    """
+
+    target: Array
+    method: Integers
+    due: Integers
+    found: Array
+
+
+@dataclass(frozen=True)
+class MovingTarget:
+    """How targets move and detectors find them.
+
+    Parameters
+    ----------
+    target
+        What it is.
+    dt
+        Tick, in seconds.
+    start
+        Its position and derivatives in tick 0, shape (m, D).
+    """
+
+    target: Target
+    dt: float
+    start: Array
+
+    def begin(self, swarms: int, agents: int) -> PursuitState:
+        """Targets at the start; every detector is about to begin."""
+        targets = np.broadcast_to(self.start, (swarms, *self.start.shape)).copy()
+        nothing = np.zeros(agents, dtype=np.int64)
+        return PursuitState(targets, nothing, nothing, np.zeros((agents, self.start.shape[-1])))
+
+    def sighting(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> Sighting:
+        """What detectors say; `numbers` are those of the agents in their swarms, shape (N,)."""
+        over = chase.due == tick
+        method = np.where(over, self._chosen(tick, seed, numbers), chase.method)
+        return Sighting(chase.found, over & (tick > 0), chase.method, method)
+
+    def step(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> PursuitState:
+        """The next tick: detectors that are done begin again, and targets move on."""
+        over, method = chase.due == tick, self.sighting(tick, seed, numbers, chase).method
+        swarms, order, axes = chase.target.shape
+        here = np.repeat(chase.target[:, 0], len(numbers) // swarms, axis=0)
+        deviation = np.sqrt(self.target.variances[method])[:, None]
+        seen = here + deviation * normal(seed, Purpose.DETECTION, tick=tick, src=numbers, axes=axes)
+        firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
+        white = normal(firsts, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
+        drift, root = self._motion
+        moved = product(drift, chase.target) + product(root, white.reshape(swarms, order, axes))
+        return PursuitState(
+            target=moved,
+            method=method,
+            due=np.where(over, tick + self.target.latencies[method], chase.due),
+            found=np.where(over[:, None], seen, chase.found),
+        )
+
+    def _chosen(self, tick: int, seed: Seed, numbers: Integers) -> Integers:
+        methods = len(self.target.latencies)
+        draw = uniform(seed, Purpose.LATENCY, tick=tick, src=numbers)[..., 0]
+        return (draw * methods).astype(np.int64)
+
+    @cached_property
+    def _motion(self) -> tuple[Array, Array]:
+        seconds, order = np.array(self.dt), self.target.order
+        spread = diffusion(order, seconds, self.target.intensity)
+        root = np.linalg.cholesky(spread) if self.target.intensity > 0.0 else np.zeros_like(spread)
+        return transition(order, seconds), np.asarray(root, dtype=np.float64)

@@ -1,0 +1,199 @@
+"""The world's state and its step: what is sensed in a tick, and where the agents are in the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from analysis.models.affine import Manoeuvre
+from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.pursuit import Sighting
+from analysis.models.sensor import Sensor
+from netem.core.draws import DrawnAhead, Purpose, Seed, uniform
+from netem.core.links import Links
+from netem.faults.timeline import Conditions
+from world.formation.nominal import Formation
+from world.physics import bodies, sensors
+from world.physics.disturbance import Disturbance
+from world.physics.noise import normal
+from world.physics.target import MovingTarget, PursuitState
+
+
+class Scene(NamedTuple):
+    """What the world remembers from tick to tick.
+
+    Parameters
+    ----------
+    position
+        Of the agents, shape (N, D), in metres.
+    motion
+        Their velocities and higher derivatives, as far as the bodies integrate them, shape (N, order - 1, D), in metres per
+        second, per second squared ...: of single integrators, the input they flew in the tick before, shape (N, 1, D).
+    measured
+        What was measured in the tick before, shape (L, D), in metres.
+    disturbance
+        What displaced them from the tick before, shape (N, D), in metres.
+    chase
+        The target, and the detectors that are after it, if there is one.
+    """
+
+    position: Array
+    motion: Array
+    measured: Array
+    disturbance: Array
+    chase: PursuitState | None
+
+    @property
+    def velocity(self) -> Array:
+        """Shape (N, D), in metres per second."""
+        return self.motion[:, 0]
+
+
+@dataclass(frozen=True)
+class World:
+    """The physics of a run. The scene is state, and is handed in.
+
+    Parameters
+    ----------
+    seed
+        Of the run, or of every agent's run, shape (N,).
+    dt
+        Tick, in seconds.
+    ticks
+        How many there are.
+    order
+        Of the bodies: how often they integrate their input to a position; 1 for single integrators.
+    formation, links, manoeuvre
+        Who flies, who is linked to whom, and what the leaders fly.
+    sensor
+        What measures relative positions.
+    disturbance
+        What displaces the agents in every tick.
+    pursuit
+        How a target moves and is found, if there is one.
+    start
+        Where they begin: leaders on their targets and followers scattered about theirs, or all about the origin.
+    spread
+        Standard deviation of that scatter, per axis, in metres.
+    swarms
+        How many swarms fly side by side, each with its own disturbances.
+    """
+
+    seed: Seed
+    dt: float
+    ticks: int
+    order: int
+    formation: Formation
+    links: Links
+    manoeuvre: Manoeuvre
+    sensor: Sensor
+    disturbance: Disturbance
+    pursuit: MovingTarget | None
+    start: Literal["targets", "origin"]
+    spread: float
+    swarms: int
+
+    def begin(self) -> Scene:
+        """The scene in tick 0: everybody where the scatter puts it, at rest."""
+        offset = self.spread * normal(
+            self.seed, Purpose.INITIAL_POSITION, src=self._numbers, axes=self.formation.dimension
+        )
+        position = offset
+        if self.start == "targets":
+            position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
+        still = np.zeros_like(position)
+        rest = np.repeat(still[:, None], max(1, self.order - 1), axis=1)
+        chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
+        return Scene(position, rest, sensors.relative(position, self.links), still, chase)
+
+    def target(self, tick: int | Integers) -> Array:
+        """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
+        return self.manoeuvre.target(np.asarray(tick)[..., None], self.formation.nominal)
+
+    def goal(self, tick: int, scene: Scene) -> Array:
+        """Where every agent should be, shape (N, D): where the manoeuvre wants it, or at its place about the target."""
+        if scene.chase is None:
+            return self.target(tick)
+        size = self.formation.agents // self.swarms
+        return np.repeat(scene.chase.target[:, 0], size, axis=0) + self.formation.nominal
+
+    def sighting(self, tick: int, scene: Scene) -> Sighting | None:
+        """What the agents' detectors say of the target, if there is one."""
+        if self.pursuit is None or scene.chase is None:
+            return None
+        return self.pursuit.sighting(tick, self.seed, self._numbers, scene.chase)
+
+    def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
+        """y_ij of every directed link, shape (L, D), in metres."""
+        measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
+        if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
+            return measured
+        size = self._normal(Purpose.OUTLIER_SIZE, tick)
+        return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
+
+    def outliers(self, tick: int, now: Conditions) -> Mask:
+        """Which measurements of a tick are outliers, shape (L,)."""
+        src, dst = self.links.ends.values()
+        draw = uniform(self.links.seeds(self.seed), Purpose.OUTLIER, tick=tick, src=src, dst=dst)[..., 0]
+        return sensors.stray(draw, now)
+
+    def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
+        """The inputs that the bodies fly when their agents command these, shape (N, D)."""
+        coasting = scene.velocity if self.order == 1 else np.zeros_like(scene.velocity)
+        return bodies.flown(commanded, coasting, now)
+
+    def odometry(self, scene: Scene) -> Array | None:
+        """The motion that agents are told, as in `Scene`, shape (N, order - 1, D); single integrators know their input."""
+        return None if self.order == 1 else scene.motion
+
+    def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
+        """The scene of the next tick, after what was measured and flown in this one."""
+        noise, still = self._disturb(tick, scene), now.still[:, None]
+        kept = [] if self.order == 1 else [*np.moveaxis(scene.motion, 1, 0)]
+        driven = [*kept, flown]
+        moved = bodies.carried([scene.position, driven[0] + now.push, *driven[1:]], self.dt) + noise
+        led = [bodies.carried(driven[order:], self.dt) for order in range(len(kept))]
+        motion = np.stack([np.where(still, 0.0, each) for each in led] if led else [flown], axis=1)
+        chase = scene.chase
+        if self.pursuit is not None and chase is not None:
+            chase = self.pursuit.step(tick, self.seed, self._numbers, chase)
+        return Scene(np.where(still, scene.position, moved), motion, measured, noise, chase)
+
+    @cached_property
+    def _sensor_noise(self) -> DrawnAhead:
+        return DrawnAhead(
+            lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.sensor.covariance)
+        )
+
+    def _normal(self, purpose: Purpose, tick: int | Integers) -> Array:
+        """Standard normal draws for every measurement of a tick, shape (..., L, D)."""
+        src, dst = self.links.ends.values()
+        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=self.formation.dimension)
+
+    @property
+    def _numbers(self) -> Integers:
+        return self.links.own_number(np.arange(1, self.formation.agents + 1))
+
+    def _disturb(self, tick: int, scene: Scene) -> Array:
+        size = self.formation.agents // self.swarms
+
+        def by_swarm(of_agents: Array) -> Array:
+            return of_agents.reshape(self.swarms, size, -1)
+
+        pushed = self.disturbance.next(
+            by_swarm(scene.disturbance) if tick else None,
+            by_swarm(self._pushes.at(tick)),
+            by_swarm(scene.position),
+            self.formation.nominal[:size],
+        )
+        return pushed.reshape(scene.position.shape)
+
+    @cached_property
+    def _pushes(self) -> DrawnAhead:
+        axes = self.formation.dimension
+        return DrawnAhead(
+            lambda ticks: normal(self.seed, Purpose.PROCESS_NOISE, tick=ticks[:, None], src=self._numbers, axes=axes)
+        )

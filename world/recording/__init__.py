@@ -1,0 +1,1 @@
+"""What happened, as a recording and tables on disk."""

@@ -1,0 +1,98 @@
+"""What a run leaves behind while it flies: journal, realised graph and recording, a batch of ticks at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+import pyarrow as pa
+
+from netem.core.arrow import NAMES, Stream, named
+from netem.faults.timeline import Timeline
+from netem.medium.journal import FILE, Writer
+from netem.processes import system_errors
+from world.books.history import Moments
+from world.books.realised import GraphWatch, columns
+from world.brief import RecordOptions
+from world.physics.world import World
+from world.recording.recorder import Recorder
+
+RECORDING, GRAPH = "run.rrd", "graph.arrows"
+GRAPH_SCHEMA = pa.schema(
+    [
+        ("tick", pa.int32()),
+        ("channel", NAMES),
+        ("links", pa.int32()),
+        ("connectivity", pa.float64()),
+        ("joint_connectivity", pa.float64()),
+        ("stress_dimension", pa.int32()),
+        ("mean_age_s", pa.float64()),
+        ("feasible", pa.int32()),
+    ]
+)
+
+
+class RunWriter:
+    """Writes the journal, and the recording if one is wanted.
+
+    Parameters
+    ----------
+    out, run
+        The run directory, and a name that no other run has.
+    world, channels
+        What is flown.
+    books
+        How to write it down.
+
+    Raises
+    ------
+    OSError
+        When something cannot be written, from the first byte to the last: which file, and why.
+    """
+
+    def __init__(self, out: Path, run: str, world: World, channels: Sequence[str], books: RecordOptions) -> None:
+        self._every = books.every
+        self._channels = list(channels)
+        self._out = out
+        self._journal = Writer(out / FILE, world.links, channels)
+        self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
+        self._watch = GraphWatch(world.formation, world.links, world.dt, books.window)
+        self._recorder = None
+        if books.record:
+            self._recorder = Recorder(
+                out / RECORDING,
+                run=run,
+                name=out.absolute().name,
+                world=world,
+                localizes=books.localizes,
+                pursues=books.pursues,
+                every=books.every,
+                viewer=books.viewer,
+            )
+
+    def __enter__(self) -> RunWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        def close_tables() -> None:
+            with system_errors.about(self._out), system_errors.afterwards(self._graph.close):
+                self._journal.close()
+
+        closing = [close_tables, *([self._recorder.close] if self._recorder else [])]
+        with system_errors.afterwards(*closing):
+            if error is not None:
+                raise error
+
+    def write(self, moments: Moments, timeline: Timeline) -> None:
+        """Write down consecutive ticks, flown under this timeline."""
+        with system_errors.about(self._out / FILE):
+            self._journal.write(moments.first, moments.entries)
+        realised = self._watch.follow(moments.first, moments.newest, timeline, self._every)
+        table = columns(realised, self._channels)
+        with system_errors.about(self._out / GRAPH):
+            self._graph.write({**table, "channel": named(table["channel"], self._channels)})
+        if self._recorder:
+            self._recorder.record(moments, timeline, realised)

@@ -1,0 +1,344 @@
+"""A run as a Rerun recording: trajectories, graphs, target, indicators, verdicts and events on simulated time.
+
+Many ticks are logged at once, as columns: that is several times cheaper than tick by tick.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from analysis.metrics import consistency
+from analysis.metrics.errors import procrustes_error
+from analysis.models.arrays import Array
+from netem.faults.timeline import Conditions, Timeline
+from netem.medium.verdict import REASONS, Fate, Fates
+from netem.processes import system_errors
+from world.books.edges import of_swarms
+from world.books.history import Moments
+from world.books.realised import Realised
+from world.formation.nominal import Formation
+from world.physics.world import World
+from world.recording.file import NotRecorded, make_room, writing, wrong_with
+from world.recording.places import Places
+from world.recording.stage import TIMELINE, origin, scalars, spatial
+from world.recording.target import Pursued
+
+_LEADER, _FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
+_DEAD, _PAUSED, _DEPARTED, _VANISHED = 0x7A1F1FFF, 0xB388FFFF, 0x6E6E6EFF, 0x00000000
+_LINK_COLOURS = {
+    Fate.SILENT: 0x00000000,
+    Fate.DELIVERED: 0x3DDC84FF,
+    Fate.DELAYED: 0x9AD0FFFF,
+    Fate.DEAD: 0x7A1F1FFF,
+    Fate.PAUSED: 0xB388FFFF,
+    Fate.DEPARTED: 0x6E6E6EFF,
+    Fate.CUT: 0xFF3B30FF,
+    Fate.PARTITION: 0xC86BFFFF,
+    Fate.SCRIPTED: 0xFF6B6BFF,
+    Fate.DROPOUT: 0xFF80ABFF,
+    Fate.CLOSED: 0x4A4A4AFF,
+    Fate.RANGE: 0x8D6E63FF,
+    Fate.JAMMED: 0xFFEB3BFF,
+    Fate.LISTED: 0xFFCC80FF,
+    Fate.LOST: 0xFF9F1CFF,
+    Fate.OVERFLOW: 0x26C6DAFF,
+}
+_FLUSH_S = 20.0
+_COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
+
+
+class Recorder:
+    """Writes `run.rrd`, and streams to a viewer when one listens.
+
+    Parameters
+    ----------
+    path
+        Of the recording.
+    run
+        What tells it from all others: a viewer takes recordings that share it for one.
+    name
+        What people call it.
+    world
+        What is flown.
+    localizes, pursues
+        Whether agents report where they believe they are, and where a target is.
+    every
+        Ticks from one recorded moment to the next; messages are counted over all of them.
+    viewer
+        URL of a viewer that is listening already.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; when it is closed at the latest.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        run: str,
+        name: str,
+        world: World,
+        localizes: bool,
+        pursues: bool,
+        every: int,
+        viewer: str | None = None,
+    ) -> None:
+        self._world = world
+        self._formation = world.formation
+        self._links = world.links
+        self._dt = world.dt
+        self._every = every
+        self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
+        self._path = path
+        self._stream = rr.RecordingStream("affinet", recording_id=run)
+        if not rr.is_enabled(self._stream):
+            raise NotRecorded(
+                f"{path} cannot be written: RERUN={os.environ.get('RERUN')} in the environment turns the recording off; "
+                "unset it, or set record.enabled=false"
+            )
+        make_room(path)
+        sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
+        with writing(path):
+            self._stream.set_sinks(
+                *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
+            )
+        self._stream.send_recording_name(name)
+        self._origin = origin(world)
+        self._log_static()
+        kinds = ((Places, localizes), (Pursued, pursues))
+        self._layers = [layer(self._stream, world, self._origin) for layer, wanted in kinds if wanted]
+        self._flush()  # what a killed run leaves can be read from the first tick on
+
+    def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
+        """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
+        for tick in moments.ticks.tolist():
+            self._log_events(tick, timeline)
+        kept = slice(None, None, self._every)
+        time = [rr.TimeColumn(TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
+        position, target = moments.position[kept] - self._origin, moments.target[kept] - self._origin
+        self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], position)
+        self._log_graph(time, position, target, moments.fates[kept, 0])
+        self._scalars("metrics/tracking_error", time, moments.error[kept, None])
+        present = timeline.present(moments.ticks[kept].tolist())
+        shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
+        self._scalars("metrics/procrustes", time, shape[:, None])
+        self._scalars("metrics/psi", time, moments.psi[kept])
+        self._log_consistency(time, moments, kept)
+        numbers = np.arange(1.0, self._formation.agents + 1.0)
+        self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
+        self._scalars("metrics/messages", time, self._messages_per_tick(moments))
+        self._log_realised(time, realised)
+        for layer in self._layers:
+            layer.log(time, moments, kept, timeline)
+
+    def close(self) -> None:
+        """End the file.
+
+        Raises
+        ------
+        OSError
+            When it is not whole.
+        """
+        with system_errors.afterwards(self._stream.disconnect):
+            self._flush()
+        if wrong := wrong_with(self._path):
+            raise NotRecorded(wrong)
+
+    def _flush(self) -> None:
+        with writing(self._path):
+            self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
+
+    def _log_static(self) -> None:
+        numbers = [str(agent) for agent in range(1, self._formation.agents + 1)]
+        reach = float(np.ptp(self._formation.nominal, axis=0).max())
+        here = f"({', '.join(f'{axis:.0f}' for axis in self._origin)})"
+        static = [
+            ("origin", rr.TextDocument(f"positions are relative to {here} m")),
+            ("swarm/agents", rr.Points3D.from_fields(radii=0.03 * reach, labels=numbers)),
+            ("swarm/trail", rr.Points3D.from_fields(radii=rr.Radius.ui_points(1.0))),
+            ("swarm/target", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.7), colors=0x8888AA60)),
+            (
+                "swarm/graph/nominal",
+                rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.5), colors=0x55555580),
+            ),
+            ("swarm/graph/functional", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.8))),
+            ("metrics/tracking_error", rr.SeriesLines(names="tracking error (m²)", colors=0xFFFFFFFF)),
+            ("metrics/procrustes", rr.SeriesLines(names="Procrustes error (m)", colors=0xFFFFFFFF)),
+            ("metrics/psi", rr.SeriesLines(names=[f"psi {number}" for number in numbers])),
+            ("metrics/infeasible", rr.SeriesPoints(names=[f"agent {number}" for number in numbers], marker_sizes=2.0)),
+            (
+                "metrics/consistency",
+                rr.SeriesLines(
+                    names=["NEES", "NIS", *(f"{consistency.DRAWN:.0%} {end}" for end in ("from", "to"))],
+                    colors=np.array([0x3DDC84FF, 0x3FA7F5FF, 0xAAAAAAFF, 0xAAAAAAFF], dtype=np.uint32),
+                ),
+            ),
+            (
+                "graph/connectivity",
+                rr.SeriesLines(
+                    names=["sensing", "comms", "sensing, joint", "comms, joint"],
+                    colors=np.array([0x3DDC8480, 0x3FA7F580, 0x3DDC84FF, 0x3FA7F5FF], dtype=np.uint32),
+                ),
+            ),
+            (
+                "graph/age",
+                rr.SeriesLines(
+                    names=["sensing (s)", "comms (s)"], colors=np.array([0x3DDC84FF, 0x3FA7F5FF], dtype=np.uint32)
+                ),
+            ),
+            (
+                "graph/rigidity",
+                rr.SeriesLines(
+                    names=["feasible agents", "stress dimension, joint"],
+                    colors=np.array([0xF2B705FF, 0xC86BFFFF], dtype=np.uint32),
+                ),
+            ),
+            (
+                "metrics/messages",
+                rr.SeriesLines(
+                    names=[fate.label for fate in _COUNTED], colors=[_LINK_COLOURS[fate] for fate in _COUNTED]
+                ),
+            ),
+        ]
+        for path, what in static:
+            self._stream.log(path, what, static=True)
+
+    def _log_events(self, tick: int, timeline: Timeline) -> None:
+        started = [fault.describe() for fault in timeline.starting(tick)]
+        ended = [fault.describe_end() for fault in timeline.ending(tick)]
+        if started or ended:
+            self._stream.set_time(TIMELINE, duration=tick * self._dt)
+            for text in started:
+                self._stream.log("events", rr.TextLog(text, level="WARN"))
+            for text in ended:
+                self._stream.log("events", rr.TextLog(text, level="INFO"))
+
+    def _log_realised(self, time: list[rr.TimeColumn], realised: Realised) -> None:
+        # Sensing and the last channel stand for their classes: channels that share their verdicts are alike.
+        classes = [0, -1]
+        age = realised.age_s[:, classes]
+        known = ~np.isnan(age)
+        mean_age = np.where(known, age, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
+        both = np.concatenate([realised.connectivity[:, classes], realised.joint_connectivity[:, classes]], axis=-1)
+        self._scalars("graph/connectivity", time, both)
+        self._scalars("graph/age", time, mean_age)
+        counts = np.stack([realised.feasible.sum(axis=-1), realised.stress_dimension[:, 0]], axis=-1)
+        self._scalars("graph/rigidity", time, counts.astype(np.float64))
+
+    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+        edges = of_swarms(
+            self._world,
+            position=moments.position[kept],
+            measured=moments.measured[kept],
+            fates=moments.fates[kept, 0],
+            estimate=moments.estimate[kept],
+            covariance=moments.covariance[kept],
+            known=moments.known[kept],
+        )
+        errors = consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known)
+        innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+        number = np.maximum(errors.number, 1)
+        bands = consistency.band(consistency.DRAWN, self._formation.dimension, number)
+        self._scalars("metrics/consistency", time, np.concatenate([errors.mean, innovations.mean, *bands], axis=-1))
+
+    def _messages_per_tick(self, moments: Moments) -> Array:
+        starts = np.arange(0, len(moments.ticks), self._every)
+        counts = np.stack([(moments.fates == fate).sum(axis=(1, 2)) for fate in _COUNTED], axis=-1)
+        lengths = np.diff(np.append(starts, len(moments.ticks)))
+        means: Array = np.add.reduceat(counts, starts, axis=0) / lengths[:, None]
+        return means
+
+    def _log_agents(self, time: list[rr.TimeColumn], conditions: Sequence[Conditions], position: Array) -> None:
+        agents = self._formation.agents
+        colours = np.array([self._agent_colours(now) for now in conditions]).ravel()
+        columns = rr.Points3D.columns(positions=spatial(position).reshape(-1, 3), colors=colours)
+        for path in ("swarm/agents", "swarm/trail"):
+            self._stream.send_columns(path, time, columns.partition([agents] * len(conditions)))
+
+    def _agent_colours(self, now: Conditions) -> NDArray[np.uint32]:
+        flying = np.where(self._formation.is_leader, _LEADER, _FOLLOWER)
+        states = [now.vanished, now.dead, now.departed, now.paused]
+        return np.select(states, [_VANISHED, _DEAD, _DEPARTED, _PAUSED], flying).astype(np.uint32)
+
+    def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
+        position, target = spatial(flown), spatial(wanted)
+        links = self._links
+        receiver, sender = position[:, links.dst - 1], position[:, links.src - 1]
+        # Half an edge for each direction: the half at an agent shows whether that agent hears and sees the other.
+        halves = np.stack([(receiver + sender) / 2, receiver], axis=-2)
+        palette = np.array([_LINK_COLOURS[fate] for fate in Fate], dtype=np.uint32)
+        self._segments("swarm/graph/functional", time, halves, palette[fates])
+        self._segments("swarm/graph/nominal", time, position[:, self._edges])
+        self._segments("swarm/target", time, target[:, self._edges])
+
+    def _segments(
+        self, path: str, time: list[rr.TimeColumn], ends: Array, colours: NDArray[np.uint32] | None = None
+    ) -> None:
+        moments, number = ends.shape[:2]
+        strips = ends.reshape(-1, 2, 3)
+        columns = (
+            rr.LineStrips3D.columns(strips=strips)
+            if colours is None
+            else rr.LineStrips3D.columns(strips=strips, colors=colours.ravel())
+        )
+        self._stream.send_columns(path, time, columns.partition([number] * moments))
+
+    def _scalars(self, path: str, time: list[rr.TimeColumn], values: Array) -> None:
+        scalars(self._stream, path, time, values)
+
+
+def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.Blueprint:
+    reach = float(np.ptp(formation.nominal, axis=0).max())
+    trail = rrb.VisibleTimeRange(
+        TIMELINE,
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-8.0),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    flat = formation.dimension == 2
+    swarm = rrb.Spatial3DView(
+        origin="swarm",
+        name="swarm",
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=(0.0, -0.01 * reach, 2.6 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
+            look_target=(0.0, 0.0, 0.0),
+            eye_up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0),
+            tracking_entity="swarm/agents",
+        ),
+        overrides={"swarm/trail": rrb.VisibleTimeRanges([trail])},
+    )
+    local_maps = rrb.Tabs(
+        rrb.TimeSeriesView(origin="metrics/psi", name="psi, by agent"),
+        rrb.TimeSeriesView(origin="metrics/infeasible", name="agents whose neighbours determine no local map"),
+    )
+    plots = rrb.Vertical(
+        rrb.Tabs(
+            *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if localizes else []),
+            *([rrb.TimeSeriesView(origin="metrics/target", name="error of the target")] if pursues else []),
+            rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
+            rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
+            rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),
+        ),
+        *([] if localizes or pursues else [local_maps]),
+        rrb.TimeSeriesView(origin="metrics/messages", name="messages per tick, by verdict"),
+        rrb.Tabs(
+            rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),
+            rrb.TimeSeriesView(origin="graph/age", name="age of information"),
+            rrb.TimeSeriesView(origin="graph/rigidity", name="rigidity"),
+        ),
+        rrb.TextLogView(origin="events", name="events"),
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(swarm, plots, column_shares=[3, 2]),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
