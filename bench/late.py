@@ -70,8 +70,8 @@ def _delay(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     law, against = _law(links, case), Against(f"delay, {case.law}", case.parameters)
     air = flown.medium(seed, links, delays=(law,))
-    forecast = ImpairmentsByTick(seed, links, flown.profile(links, delays=(law,)), np.array([0]), np.array([False]))
-    seconds = np.stack([forecast.at(tick).delay_s[0] for tick in range(ticks)])
+    by_tick = ImpairmentsByTick(seed, links, flown.profile(links, delays=(law,)), np.array([0]), np.array([False]))
+    seconds = np.stack([by_tick.at(tick).delay_s[0] for tick in range(ticks)])
     wait = flown.fly(air, ticks).due[:, 0] - np.arange(ticks)[:, None]
     early, late = wait < seconds / flown.DT - 1e-6, wait >= seconds / flown.DT + 1.0
     yield against.exactly("arrive before they are due, or a tick late", 0.0, float((early | late).sum()))

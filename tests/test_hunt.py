@@ -53,8 +53,8 @@ def test_a_hunt_shrinks_writes_and_confirms_the_smallest_fault(den, capsys):
 
 
 def test_the_smallest_is_named_after_its_scenario_where_no_file_is_named(den, monkeypatch):
-    quarry = hunt.Counterexample(CORRIDOR, CheckResult("bounded(5)", "fail", 3, "x"), "digest")
-    monkeypatch.setattr(hunt, "hunt", lambda *_, **__: (quarry, hunt.Coverage()))
+    smallest = hunt.Counterexample(CORRIDOR, CheckResult("bounded(5)", "fail", 3, "x"), "digest")
+    monkeypatch.setattr(hunt, "hunt", lambda *_, **__: (smallest, hunt.Coverage()))
     monkeypatch.setattr(commands, "_confirm", lambda *_: 1)
     assert commands.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
     assert said(loading.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
@@ -123,30 +123,30 @@ def test_the_same_seed_hunts_the_same_and_another_does_not():
     chases = []
     for seed in (1, 1, 2):
         seen = []
-        quarry, coverage = hunted(
+        smallest, coverage = hunted(
             touched("freeze", "all", "min-cut"),
             verbs=["freeze"],
             seed=seed,
             watch=lambda coverage, broke, seen=seen: seen.append((coverage.schedules, broke)),
         )
-        chases.append((seen, quarry and (entries_of(quarry.scenario), quarry.digest), coverage))
+        chases.append((seen, smallest and (entries_of(smallest.scenario), smallest.digest), coverage))
     assert chases[0] == chases[1]
     assert chases[0] != chases[2]
 
 
 def test_no_fault_that_is_found_can_be_left_out():
     given_to = loading.load("corridor", ("time.dt=0.05", "time.duration=2", 'agents.estimator="rkf"'))
-    quarry, _ = hunt.hunt(
+    smallest, _ = hunt.hunt(
         given_to, checkers.bounded(5), budget=20, verbs=["cut", "dropout"], seed=1, watch=lambda *_: None
     )
-    assert len(quarry.scenario.timeline) == 1
+    assert len(smallest.scenario.timeline) == 1
 
 
 def test_what_is_found_breaks_the_invariant_and_is_permanent_from_the_start():
-    quarry, _ = hunted(touched("dropout", "all", "1", "min-cut"), verbs=["dropout"])
-    assert quarry.finding.verdict == "fail"
-    assert all(entry["at"] == 0.0 and "lasts" not in entry for entry in entries_of(quarry.scenario))
-    assert said(quarry.scenario) | {"timeline": []} == said(INSTANT)
+    smallest, _ = hunted(touched("dropout", "all", "1", "min-cut"), verbs=["dropout"])
+    assert smallest.finding.verdict == "fail"
+    assert all(entry["at"] == 0.0 and "lasts" not in entry for entry in entries_of(smallest.scenario))
+    assert said(smallest.scenario) | {"timeline": []} == said(INSTANT)
 
 
 def test_coverage_counts_verbs_and_kinds_of_selectors():
@@ -169,16 +169,16 @@ def test_every_schedule_flown_is_seen_and_counted():
 
 def test_a_fault_that_touches_nothing_breaks_nothing():
     mute = loading.load("corridor", ("time.dt=0.05", "time.duration=0.2", 'agents.estimator="rkf"'))
-    quarry, coverage = hunt.hunt(
+    smallest, coverage = hunt.hunt(
         mute, touched("lie", 1, "leaders", "followers"), budget=10, verbs=["lie"], seed=1, watch=lambda *_: None
     )
-    assert quarry is None
+    assert smallest is None
     assert coverage.vacuous == coverage.schedules > 0
 
 
 def test_an_invariant_that_is_never_put_to_the_test_is_not_broken():
-    quarry, coverage = hunted(checkers.converged(1e-9, by=1.0), verbs=["cut"], budget=10)
-    assert quarry is None
+    smallest, coverage = hunted(checkers.converged(1e-9, by=1.0), verbs=["cut"], budget=10)
+    assert smallest is None
     assert coverage.vacuous == coverage.schedules
 
 

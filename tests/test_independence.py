@@ -302,7 +302,7 @@ def test_a_link_that_steps_with_messages_leaves_those_that_step_with_time():
 # ---- any order of ticks
 
 
-def forecast(coupled):
+def by_tick(coupled):
     links = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1), (1, 3)])
     profile = mixture(3, frozenset(IMPAIRMENTS), links, CHANNELS, coupled=coupled)
     names = np.array([channel_names.code(name) for name in CHANNELS])
@@ -315,15 +315,15 @@ LAST = 150  # more than two spans that are computed at once
 
 @pytest.fixture(scope="module", params=[True, False], ids=["coupled", "uncoupled"])
 def in_sequence(request):
-    flying = forecast(request.param)
+    flying = by_tick(request.param)
     return request.param, [flying.at(tick) for tick in range(LAST)]
 
 
 @settings(max_examples=8, deadline=None)
 @given(ticks=st.lists(st.integers(0, LAST - 1), min_size=1, max_size=4))
-def test_the_weather_is_the_same_in_whatever_order_the_ticks_are_asked_for(in_sequence, ticks):
+def test_the_impairments_are_the_same_in_whatever_order_the_ticks_are_asked_for(in_sequence, ticks):
     coupled, expected = in_sequence
-    flying = forecast(coupled)
+    flying = by_tick(coupled)
     for tick in ticks:
         for field, other in zip(flying.at(tick), expected[tick], strict=True):
             np.testing.assert_array_equal(field, other)

@@ -50,7 +50,7 @@ class WorldNode:
         self._flown: list[tuple[Moment, Scene]] = []  # with where each tick led
         self._batch = brief.books.batch
         self._nobody = messages.Act(0, 0, 0, np.zeros(dimension), [], [], [], np.nan, None, {}, 0)
-        self._vigil = ErrorMonitor(brief.world)
+        self._monitor = ErrorMonitor(brief.world)
         self.uninstructed = 0
         self._unsaid = {name: np.full(shape, np.nan).tolist() for name, shape in brief.reports.items()}
         self.history = History(brief.world, len(brief.channels), brief.reports)
@@ -81,12 +81,12 @@ class WorldNode:
             self._hear_of_faults(journal)
             now = self._timeline.at(tick)
             moment = self._moment(scene, measured, journal, acts, now)
-            self._vigil.see(tick, scene, self._timeline)
+            self._monitor.see(tick, scene, self._timeline)
             scene = self._world.step(tick, scene, measured, moment.input, now)
             self._flown.append((moment, scene))  # both at once: a signal may come between any two lines
 
     def _fire(self, tick: int) -> list[int]:
-        fired = self._timeline.due(self._vigil.errors)
+        fired = self._timeline.due(self._monitor.errors)
         if fired:
             self._scripted, self._timeline = (each.fired(fired, tick) for each in (self._scripted, self._timeline))
             self._supervisor.tell("fired", triggers=fired, k=tick)
@@ -199,17 +199,17 @@ def main() -> None:
 
     out = Path(brief.out)
     with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
-        theatre = WorldNode(session, supervisor, brief)
+        node = WorldNode(session, supervisor, brief)
         last: list[Callable[[], None]] = []
         with (
             system_errors.afterwards(lambda: [step() for step in last]),
             RunWriter(out, brief.run, brief.world, brief.channels, brief.books) as logbook,
         ):
-            theatre.await_everybody()
+            node.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")
             # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
-            last.append(partial(theatre.history.save, out / ARRAYS))
+            last.append(partial(node.history.save, out / ARRAYS))
             with supervisor.confessing():
-                theatre.run(logbook)
-        supervisor.tell("done", uninstructed=theatre.uninstructed)
+                node.run(logbook)
+        supervisor.tell("done", uninstructed=node.uninstructed)

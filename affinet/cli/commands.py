@@ -258,28 +258,30 @@ def _hunt(parsed: argparse.Namespace) -> int:
             raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
     file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
     with directories.unless_empty(file), show.HuntProgress(parsed.budget) as chase:
-        quarry, coverage = hunt.hunt(
+        counterexample, coverage = hunt.hunt(
             given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
         )
-        if quarry is not None:
+        if counterexample is not None:
             with about(file):
-                file.write_text(loading.to_toml(quarry.scenario), encoding="utf-8")
-    show.hunted(quarry, coverage)
-    status = PASS if quarry is None else _confirm(quarry, invariant, file)
+                file.write_text(loading.to_toml(counterexample.scenario), encoding="utf-8")
+    show.hunted(counterexample, coverage)
+    status = PASS if counterexample is None else _confirm(counterexample, invariant, file)
     if parsed.json:
         found = (
-            None if quarry is None else {"scenario": str(file), "finding": str(quarry.finding), "digest": quarry.digest}
+            None
+            if counterexample is None
+            else {"scenario": str(file), "finding": str(counterexample.finding), "digest": counterexample.digest}
         )
         print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
     return status
 
 
-def _confirm(quarry: Counterexample, invariant: Checker, file: Path) -> int:
+def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> int:
     plan = planning.make(loading.load(str(file)))
     out = directories.for_run(file.stem)
     with show.Progress(plan, file.stem, out) as watch:
         flown = fly(plan, "processes", out, watch.see)
-    same = "the same bits" if flown.digest == quarry.digest else "OTHER BITS"
+    same = "the same bits" if flown.digest == counterexample.digest else "OTHER BITS"
     landed = evidence(plan, flown)
     found = invariant(landed) if landed else "; ".join(flown.reasons)
     print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201

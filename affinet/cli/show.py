@@ -112,14 +112,14 @@ def claims(study: Study, verdicts: Sequence[ClaimVerdict], out: Path) -> None:
     console.print(_plain(f"data and figure in {out}"))
 
 
-def hunted(quarry: Counterexample | None, coverage: Coverage) -> None:
+def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
     """What a hunt has found, and what it tried."""
     console = Console()
-    if quarry is None:
+    if counterexample is None:
         console.print("nothing found that breaks it", highlight=False)
     else:
-        console.print(_plain(f"{quarry.finding}"))
-        for entry in quarry.scenario.timeline:
+        console.print(_plain(f"{counterexample.finding}"))
+        for entry in counterexample.scenario.timeline:
             said = entry.model_dump(mode="json", exclude_none=True)
             console.print(_plain(f"  {said.pop('verb')} {said}"))
     table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")

@@ -49,7 +49,7 @@ class Child:
     is_ready, is_done
         Whether it has told so.
     doing, beat_s
-        What it does, and when it told so, by the clock of its crew; None before its first beat.
+        What it does, and when it told so, by the clock of its group; None before its first beat.
     looks
         What the system says of it, since it was first looked at because nothing moved.
     """

@@ -122,10 +122,10 @@ class InProcessSwarm:
         world = self._plan.world
         agents = np.arange(1, self._links.agents + 1)
         fresh = self._agents.init(agents.shape)
-        vigil = ErrorMonitor(world)
+        monitor = ErrorMonitor(world)
         scene, state = world.begin(), fresh
         for tick in range(world.ticks):
-            self._fire(tick, vigil)
+            self._fire(tick, monitor)
             timeline = self.timeline
             if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
                 state = renew(state, fresh, np.isin(agents, [*cold]))
@@ -137,13 +137,13 @@ class InProcessSwarm:
                 error.tick = tick
                 raise
             flown = world.flown(scene, np.where(now.idle[:, None], 0.0, action.input), now)
-            vigil.see(tick, scene, timeline)
+            monitor.see(tick, scene, timeline)
             following = world.step(tick, scene, measured, flown, now)
             yield FlownTick(tick, scene, following, measured, flown, action, verdicts, delivery)
             scene = following
 
-    def _fire(self, tick: int, vigil: ErrorMonitor) -> None:
-        if triggers := self.timeline.due(vigil.errors):
+    def _fire(self, tick: int, monitor: ErrorMonitor) -> None:
+        if triggers := self.timeline.due(monitor.errors):
             self.timeline = self._medium.timeline = self.timeline.fired(triggers, tick)
 
     def _tick(

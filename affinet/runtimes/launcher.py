@@ -97,7 +97,7 @@ class Launcher:
     def fly(self) -> LaunchRecord:
         """Run to the end, to the first thing that goes wrong, or until the run is asked to end."""
         try:
-            self._fly_with_a_crew()
+            self._launch()
         except (RunFailed, Interrupted) as failure:
             self.flight.failure = str(failure)
             self.flight.user_code = isinstance(failure, UserCodeFailed)
@@ -105,35 +105,35 @@ class Launcher:
             self.flight.failure = f"the swarm could not be launched: {said(error)}"
         return self.flight
 
-    def _fly_with_a_crew(self) -> None:
+    def _launch(self) -> None:
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
-        crew = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption)
+        group = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption)
         launched = time.perf_counter()
         with (
-            afterwards(partial(self._note, crew), partial(_remove_unwritten, self._out)),
+            afterwards(partial(self._note, group), partial(_remove_unwritten, self._out)),
             tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private,
-            crew,
+            group,
         ):
             self._private = Path(private)
-            self._start(crew)
+            self._start(group)
             with Access(self._run, self._logins[CONTROL]).granted(self._out):
-                self._fly(crew, launched)
+                self._fly(group, launched)
 
-    def _note(self, crew: ProcessGroup) -> None:
-        self.flight.processes = [child.report() for child in crew.children]
+    def _note(self, group: ProcessGroup) -> None:
+        self.flight.processes = [child.report() for child in group.children]
 
-    def _start(self, crew: ProcessGroup) -> None:
+    def _start(self, group: ProcessGroup) -> None:
         private = self._private
         self._logins = self._make_logins(private)
-        crew.start("world", module("world"), self._world_brief(self._logins[WORLD]))
-        crew.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
+        group.start("world", module("world"), self._world_brief(self._logins[WORLD]))
+        group.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
         if self._plan.centre:
             login = self._logins[CENTRE]
-            crew.start("centre", module("agents.centre.process"), self._centre_brief(self._plan.centre, login))
+            group.start("centre", module("agents.centre.process"), self._centre_brief(self._plan.centre, login))
         for number in range(1, self._plan.world.links.agents + 1):
-            self._start_agent(crew, number)
-        crew.await_ready(crew.children)
+            self._start_agent(group, number)
+        group.await_ready(group.children)
         (private / "users").unlink()  # the medium knows them now, and nobody else has to
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
@@ -151,27 +151,27 @@ class Launcher:
         users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
         return logins
 
-    def _fly(self, crew: ProcessGroup, launched: float) -> None:
-        world, medium = crew.children[0], crew.children[1]
+    def _fly(self, group: ProcessGroup, launched: float) -> None:
+        world, medium = group.children[0], group.children[1]
         world.order("go")
         first_tick = time.perf_counter()
         self.flight.start_s = first_tick - launched
         while awaited := [child for child in (world, medium) if not child.is_done]:
-            for child, event in crew.listen():
-                self._heed(crew, child, event)
+            for child, event in group.listen():
+                self._heed(group, child, event)
                 self.flight.wall_s = time.perf_counter() - first_tick
-            crew.blame_the_silent(awaited)
-        crew.release()
+            group.blame_the_silent(awaited)
+        group.release()
         medium.order("leave")
-        crew.await_all_gone()
+        group.await_all_gone()
 
-    def _heed(self, crew: ProcessGroup, child: Child, event: Event) -> None:
+    def _heed(self, group: ProcessGroup, child: Child, event: Event) -> None:
         match event["event"]:
             case "tick":
                 self._watch(event["k"], event["error"])
-                crew.children[event["k"] % len(crew.children)].measure()
+                group.children[event["k"] % len(group.children)].measure()
             case "kill" | "restart" | "pause" | "resume" as order:
-                self._move(crew, order, event)
+                self._move(group, order, event)
                 child.order(order)
             case "fired":
                 self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
@@ -180,14 +180,16 @@ class Launcher:
             case "done" if child.role == HUB:
                 self.flight.in_flight = event["in_flight"]
 
-    def _move(self, crew: ProcessGroup, order: str, event: Event) -> None:
+    def _move(self, group: ProcessGroup, order: str, event: Event) -> None:
         match order:
             case "kill":
                 for number in event["agents"]:
-                    crew.kill(self._agents[number])
+                    group.kill(self._agents[number])
             case "restart":
                 remembering = event["remembering"]
-                crew.await_ready([self._start_agent(crew, number, number in remembering) for number in event["agents"]])
+                group.await_ready(
+                    [self._start_agent(group, number, number in remembering) for number in event["agents"]]
+                )
             case "pause":
                 for number in event["agents"]:
                     self._agents[number].pause()
@@ -195,10 +197,10 @@ class Launcher:
                 for number in event["agents"]:
                     self._agents[number].resume()
 
-    def _start_agent(self, crew: ProcessGroup, number: int, remembers: bool = False) -> Child:
+    def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         program = self._programs.get(number) or module("agents")
-        self._agents[number] = crew.start("agent", program, self._agent_brief(number, login, remembers), number)
+        self._agents[number] = group.start("agent", program, self._agent_brief(number, login, remembers), number)
         return self._agents[number]
 
     def _world_brief(self, login: Login) -> WorldBrief:

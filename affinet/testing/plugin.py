@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
 _RUNTIMES = ("inprocess", "processes")
 _MOST = 2**64  # seeds are below
-_HANGAR: pytest.StashKey[SwarmRuns] = pytest.StashKey()
+_RUNS: pytest.StashKey[SwarmRuns] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -80,11 +80,11 @@ def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     mark = request.node.get_closest_marker(_RUNTIME)
     runtime = mark.args[0] if mark else request.config.getoption("--affinet-runtime")
     seed = getattr(request, "param", None)
-    hangar = SwarmRuns(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"), request.path.parent)
-    request.node.stash[_HANGAR] = hangar
-    yield hangar
-    if not hangar.failed:
-        hangar.clear()
+    runs = SwarmRuns(runtime, seed, lambda: tmp_path_factory.mktemp("affinet"), request.path.parent)
+    request.node.stash[_RUNS] = runs
+    yield runs
+    if not runs.failed:
+        runs.clear()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -93,21 +93,21 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Keep the runs of a test that failed, and say where they are and how to fly them again."""
     report = yield
-    hangar = item.stash.get(_HANGAR, None)
-    if report.when == "call" and report.failed and hangar is not None:
-        hangar.failed = True
-        report.sections += [("affinet run", says) for says in _kept(hangar)]
+    runs = item.stash.get(_RUNS, None)
+    if report.when == "call" and report.failed and runs is not None:
+        runs.failed = True
+        report.sections += [("affinet run", says) for says in _kept(runs)]
     return report
 
 
-def _kept(hangar: SwarmRuns) -> list[str]:
+def _kept(runs: SwarmRuns) -> list[str]:
     from affinet.runtimes.directories import on_a_command_line
 
     try:
         return [
-            f"seed {plan.scenario.seed}, {hangar.runtime}\nrecording: {out / 'run.rrd'}\n"
-            f"repeat: affinet replay {on_a_command_line(out)} --runtime {hangar.runtime}"
-            for plan, out in hangar.keep()
+            f"seed {plan.scenario.seed}, {runs.runtime}\nrecording: {out / 'run.rrd'}\n"
+            f"repeat: affinet replay {on_a_command_line(out)} --runtime {runs.runtime}"
+            for plan, out in runs.keep()
         ]
     except Exception as error:  # noqa: BLE001 - whatever goes wrong here, the test's own failure is what counts
         return [f"the run could not be recorded: {error!r}"]

@@ -1,4 +1,4 @@
-"""What time alone decides of the air: losses of chains, traces and schedules, delays, duplicates and marks.
+"""What time alone decides of messages: losses of chains, traces and schedules, delays, duplicates and marks.
 
 It depends on nothing that is offered, and so it is computed for many ticks at once. The chains and the correlated delays go
 from tick to tick whether or not a message is sent.
@@ -54,7 +54,7 @@ class TickImpairments(NamedTuple):
 
 
 class ImpairmentsByTick:
-    """The weather of a run, tick by tick.
+    """The impairments of a run, tick by tick.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class ImpairmentsByTick:
         self._rewind()
 
     def at(self, tick: int) -> TickImpairments:
-        """The weather of a tick; cheap when ticks are asked for in order."""
+        """The impairments of a tick; cheap when ticks are asked for in order."""
         block, row = divmod(tick, _SPAN)
         if block < self._block:
             self._rewind()

@@ -1,8 +1,8 @@
 """What one profile makes of the messages of a tick: which it loses, and how the others arrive.
 
 The layers are independent: each says what it holds, a message passes when none holds it, and it is booked under the strongest
-that does, in the order of `Fate`. To add an impairment, write its pure file beside `loss.py`. If time alone decides it, add it
-to `weather.py`; if it loses messages, give it a `Fate` and name it in `_layers`.
+that does, in the order of `Fate`. To add an impairment, write its pure file beside `impairments/loss.py`. If time alone decides
+it, add it to `by_tick.py`; if it loses messages, give it a `Fate` and name it in `_layers`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _STALE = np.uint8(Mark.STALE)
 
 
 class Memory(NamedTuple):
-    """What a climate remembers from tick to tick.
+    """what it remembers from tick to tick.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class LinkModel:
         self._comms = ~self._sensing[:, None]
         self._names = np.array([channel_names.code(name) for name in channels], dtype=np.int64)
         self._codes = np.array([_SHARED_DRAW]) if profile.coupled else self._names
-        self._forecast = ImpairmentsByTick(seed, links, profile, self._codes, self._sensing)
+        self._by_tick = ImpairmentsByTick(seed, links, profile, self._codes, self._sensing)
         self._packet_layers = [n for n, layer in enumerate(profile.chains) if layer.by_packet.any()]
         self._packet_lanes = 1 + max((profile.chains[n].lane for n in self._packet_layers), default=-1)
         orderly = [law.rows for law in profile.delays if law.ordered]
@@ -91,7 +91,7 @@ class LinkModel:
     def begin(self) -> Memory:
         """What it remembers before the first tick."""
         layers = [self.profile.chains[n] for n in self._packet_layers]
-        draws = self._forecast.draw(Purpose.CHAIN_START, np.zeros(1, dtype=np.int64), self._packet_lanes)[0]
+        draws = self._by_tick.draw(Purpose.CHAIN_START, np.zeros(1, dtype=np.int64), self._packet_lanes)[0]
         states = tuple(layer.begin(draws[..., layer.lane]) for layer in layers)
         return Memory(self.profile.rate.begin() if self.profile.rate else np.zeros(self._shape[1]), states)
 
@@ -121,24 +121,24 @@ class LinkModel:
         delay_s
             By which the timeline delays communication, shape (L,), in seconds, if it does.
         """
-        weather = self._forecast.at(tick)
+        impairments = self._by_tick.at(tick)
         packets = self._packet_chains(memory, tick, offered)
         reason = np.full(self._shape, PASSED)
-        for fate, held in self._layers(air, weather, packets, position):
+        for fate, held in self._layers(air, impairments, packets, position):
             np.copyto(reason, fate, where=held)
         reason = np.minimum(reason, imposed)
         passed = offered & (reason == PASSED)
         extra_s = packets.extra_s if delay_s is None else packets.extra_s + delay_s
         by_message = delay_s is not None or bool(self._packet_layers)
-        debt, overflow, due, waited_s = self._due(air, memory.debt, tick, weather, extra_s, passed, by_message)
+        debt, overflow, due, waited_s = self._due(air, memory.debt, tick, impairments, extra_s, passed, by_message)
         if overflow is not None:
             np.copyto(reason, _OVERFLOW, where=overflow)
             passed &= ~overflow
         np.copyto(reason, _DELIVERED, where=passed)
         np.copyto(reason, _DELAYED, where=passed & (due > tick))
         np.copyto(reason, _SILENT, where=~offered)
-        copy_due = self._copies(tick, weather, passed, due, waited_s)
-        verdicts = Verdicts(reason, due, self._marks(air, weather, passed), copy_due)
+        copy_due = self._copies(tick, impairments, passed, due, waited_s)
+        verdicts = Verdicts(reason, due, self._marks(air, impairments, passed), copy_due)
         return Memory(debt, packets.states), verdicts
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
@@ -149,13 +149,13 @@ class LinkModel:
 
     def draw(self, purpose: Purpose, ticks: Integers) -> Array:
         """Uniform draws for every message of ticks (T,), shape (T, C', L); C' is 1 where channels share them."""
-        return self._forecast.draw(purpose, ticks, 1)[..., 0]
+        return self._by_tick.draw(purpose, ticks, 1)[..., 0]
 
     def _layers(
-        self, air: MediumState, weather: TickImpairments, packets: _Packets, position: Array | None
+        self, air: MediumState, impairments: TickImpairments, packets: _Packets, position: Array | None
     ) -> Iterator[tuple[np.uint8, Mask]]:
         """The layers that change from tick to tick, and what each holds: the weakest first."""
-        yield _LOST, weather.lost
+        yield _LOST, impairments.lost
         if packets.states:
             yield _LOST, packets.lost
         if len(self.profile.listed):
@@ -163,13 +163,13 @@ class LinkModel:
         if self.profile.spatial:
             if position is None:
                 raise ValueError("loss by distance and jammed zones need the positions of the tick")
-            for zone, on in zip(self.profile.zones, weather.jams.tolist(), strict=True):
+            for zone, on in zip(self.profile.zones, impairments.jams.tolist(), strict=True):
                 if on:
-                    yield _JAMMED, zone.jammed(self._receiver, position) & self._forecast.on(zone.sensing, zone.comms)
+                    yield _JAMMED, zone.jammed(self._receiver, position) & self._by_tick.on(zone.sensing, zone.comms)
             if self.profile.reaches:
-                yield _RANGE, squared_distances(self._sender, self._receiver, position) > weather.squared_limit
+                yield _RANGE, squared_distances(self._sender, self._receiver, position) > impairments.squared_limit
         if self.profile.schedules:
-            yield _CLOSED, weather.closed
+            yield _CLOSED, impairments.closed
 
     def _listed(self, offered: Integers) -> Mask:
         link, listed, sensing, comms = self.profile.listed.T
@@ -186,13 +186,13 @@ class LinkModel:
         if not self._packet_layers:
             return _Packets((), lost, extra)
         moves = offered.any(axis=0, keepdims=True) if self.profile.coupled else offered
-        draws = self._forecast.draw(Purpose.PACKET_CHAIN, np.array([tick]), 2 * self._packet_lanes)[0]
+        draws = self._by_tick.draw(Purpose.PACKET_CHAIN, np.array([tick]), 2 * self._packet_lanes)[0]
         states = []
         for n, state in zip(self._packet_layers, memory.chains, strict=True):
             layer = self.profile.chains[n]
-            on = self._forecast.on(layer.sensing, layer.comms)
+            on = self._by_tick.on(layer.sensing, layer.comms)
             lost |= layer.lost(state, draws[..., 2 * layer.lane]) & layer.by_packet & on
-            extra += layer.adds(state) * (layer.by_packet & self._forecast.acts(layer))
+            extra += layer.adds(state) * (layer.by_packet & self._by_tick.acts(layer))
             _, following = layer.walk(state, draws[None, ..., 2 * layer.lane + 1])
             states.append(np.where(moves, following, state))
         return _Packets(tuple(states), lost, extra)
@@ -202,34 +202,36 @@ class LinkModel:
         air: MediumState,
         debt: Array,
         tick: int,
-        weather: TickImpairments,
+        impairments: TickImpairments,
         extra_s: Array,
         passed: Mask,
         by_message: bool,
     ) -> tuple[Array, Mask | None, Integers, Array]:
-        """The queues' debt, what they refuse, when the others arrive, and what else than the weather lets them wait."""
-        rate, overflow, wait = self.profile.rate, None, weather.delay_ticks
+        """The queues' debt, what they refuse, when the others arrive, and what else than the impairments lets them wait."""
+        rate, overflow, wait = self.profile.rate, None, impairments.delay_ticks
         if by_message or rate:
             if rate:
                 debt, overflow, queued = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passed)
                 extra_s = extra_s + queued
-            wait = delay.ticks(weather.delay_s + extra_s, self.profile.dt)
+            wait = delay.ticks(impairments.delay_s + extra_s, self.profile.dt)
             wait = np.where(self._comms, np.maximum(wait, self.profile.least_delay), 0)
         due = tick + wait
         if self.keeps_order:
             due = np.where(self._ordered, np.maximum(due, air.last_due), due)
         return debt, overflow, due, extra_s
 
-    def _marks(self, air: MediumState, weather: TickImpairments, passed: Mask) -> Marks:
+    def _marks(self, air: MediumState, impairments: TickImpairments, passed: Mask) -> Marks:
         if not self._corrupts:
             return self._unmarked
-        return weather.mark * (passed & ((weather.mark != _STALE) | air.spoke))
+        return impairments.mark * (passed & ((impairments.mark != _STALE) | air.spoke))
 
-    def _copies(self, tick: int, weather: TickImpairments, passed: Mask, due: Integers, waited_s: Array) -> Integers:
+    def _copies(
+        self, tick: int, impairments: TickImpairments, passed: Mask, due: Integers, waited_s: Array
+    ) -> Integers:
         if not self._doubles:
             return self._single
-        wait = delay.ticks(weather.copy_delay_s + waited_s, self.profile.dt)
+        wait = delay.ticks(impairments.copy_delay_s + waited_s, self.profile.dt)
         arrival = tick + np.maximum(wait, self.profile.least_delay)
         if self.keeps_order:
             arrival = np.where(self._ordered, np.maximum(arrival, due), arrival)
-        return np.where(passed & weather.copied, arrival, -1)
+        return np.where(passed & impairments.copied, arrival, -1)

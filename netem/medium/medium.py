@@ -1,7 +1,7 @@
 """The medium: messages offered in a tick -> messages delivered in a tick, each with a verdict.
 
 A loss is decided in `Medium.judge`, and nowhere else; `Ledger` counts it and `journal.py` writes it down. What the timeline
-imposes is decided here, what a profile does in `climate.py`; a message passes when neither holds it.
+imposes is decided here, what a profile does in `link_model.py`; a message passes when neither holds it.
 
 Nothing here knows what a message says: the medium works on who offered what, over (channels, links).
 """
@@ -101,16 +101,16 @@ class Medium:
         self._links = timeline.links
         self._shape = (len(channels), len(self._links))
         self._sensing = np.array([name == SENSE for name in channels])[:, None]
-        self._climates = [LinkModel(seed, self._links, channels, profile) for profile in profiles]
-        self._keeps_order = any(climate.keeps_order for climate in self._climates)
-        self._scripted = DrawnAhead(lambda ticks: self._climates[0].draw(Purpose.SCRIPTED_LOSS, ticks))
-        self._dropouts = DrawnAhead(lambda ticks: self._climates[0].draw(Purpose.DROPOUT, ticks))
+        self._link_models = [LinkModel(seed, self._links, channels, profile) for profile in profiles]
+        self._keeps_order = any(model.keeps_order for model in self._link_models)
+        self._scripted = DrawnAhead(lambda ticks: self._link_models[0].draw(Purpose.SCRIPTED_LOSS, ticks))
+        self._dropouts = DrawnAhead(lambda ticks: self._link_models[0].draw(Purpose.DROPOUT, ticks))
         self._conditions: Conditions | None = None
         self._cached: _Under
 
     def begin(self) -> MediumState:
         """The air before the first tick."""
-        return MediumState.empty(self._shape, tuple(climate.begin() for climate in self._climates))
+        return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
 
     def judge(self, air: MediumState, tick: int, offered: Mask, position: Array | None) -> tuple[MediumState, Verdicts]:
         """The verdict on every message offered in a tick.
@@ -149,29 +149,29 @@ class Medium:
         """Whether a tick can be judged before it is known where the agents are."""
         if self.timeline.pending or self._recorded:  # a journal ends with its run: nothing is known of the tick after
             return False
-        return not any(climate.profile.spatial for climate in self._climates)
+        return not any(model.profile.spatial for model in self._link_models)
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
-        return self._climates[0].bit_draws(content, channel, link)
+        return self._link_models[0].bit_draws(content, channel, link)
 
     def bias(self, content: Integers, link: Integers) -> Array:
         """What a bias adds to the numbers of messages that speak of ticks `content` (m,), on links (m,), shape (m,)."""
         ruling = [self.timeline.at(int(tick)).profile[row] for tick, row in zip(content, link, strict=True)]
-        return np.array([self._climates[n].profile.bias[row] for n, row in zip(ruling, link, strict=True)])
+        return np.array([self._link_models[n].profile.bias[row] for n, row in zip(ruling, link, strict=True)])
 
     def _by_profile(
         self, air: MediumState, tick: int, offered: Mask, position: Array | None, now: Conditions, under: _Under
     ) -> tuple[tuple[Memory, ...], Verdicts]:
         imposed, delay_s = self._imposed(tick, now, under), now.delay_s if under.delays else None
-        own, *others = self._climates
+        own, *others = self._link_models
         if not under.degrades:
             memory, verdicts = own.judge(air, air.memories[0], tick, offered, position, imposed, delay_s)
-            rested = (climate.rest(memory) for climate, memory in zip(others, air.memories[1:], strict=True))
+            rested = (model.rest(memory) for model, memory in zip(others, air.memories[1:], strict=True))
             return (memory, *rested), verdicts
         judged = [
-            climate.judge(air, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
-            for number, (climate, memory) in enumerate(zip(self._climates, air.memories, strict=True))
+            model.judge(air, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
+            for number, (model, memory) in enumerate(zip(self._link_models, air.memories, strict=True))
         ]
         whole = judged[0][1]
         for number, (_, verdicts) in enumerate(judged[1:], start=1):
