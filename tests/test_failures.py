@@ -169,7 +169,7 @@ def test_a_killed_launcher_leaves_no_orphan_and_a_readable_recording(out):
 def pausing(tmp_path):
     path = tmp_path / "pausing.toml"
     pause = '[[timeline]]\nverb = "pause"\nat = 0.1\nuntil = 59.0\nagents = [3, 4, 5]\n'
-    path.write_text((resources.files("affinet") / "scenarios" / "corridor.toml").read_text() + pause)
+    path.write_text((resources.files("affinet.shipped") / "scenarios" / "corridor.toml").read_text() + pause)
     return path
 
 

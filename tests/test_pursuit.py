@@ -36,6 +36,7 @@ from netem.core.channels import INPUT, TARGET
 from netem.medium.verdict import Fate
 from world.books.history import History
 from world.books.localized import FirstMeasurements
+from world.physics.target import MovingTarget
 from world.recording.target import _over_agents
 
 ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -174,7 +175,7 @@ class Tick(NamedTuple):
 def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2, prior=(1.0, 1.0)):
     """Agents, each after a target of its own, whose start is drawn as the prior says."""
     rng = np.random.default_rng(seed)
-    chase_of = target.Pursuit(target, dt, np.zeros((target.order, dimension)))
+    chase_of = MovingTarget(target, dt, np.zeros((target.order, dimension)))
     seeds, first = np.arange(1, runs + 1, dtype=np.uint64) + np.uint64(1000 * seed), np.ones(runs, dtype=np.int64)
     deviations = np.array([prior[0]] + [prior[1]] * (target.order - 1))[:, None]
     start = deviations * rng.normal(size=(runs, target.order, dimension))
@@ -618,7 +619,7 @@ def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
     """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
     target = target_of(order, latencies)
     estimator = TargetEstimator(theta=10.0, **parameters)
-    chase_of, who = target.Pursuit(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
+    chase_of, who = MovingTarget(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
     chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
     agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
     state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
@@ -1011,7 +1012,7 @@ def test_agents_say_how_they_move_up_to_their_input_and_steer_by_it(order):
 
 def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3):
     start = np.zeros((target.order, 2)) if start is None else start
-    chase_of = target.Pursuit(target, dt, start)
+    chase_of = MovingTarget(target, dt, start)
     seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
     return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
 
@@ -1062,7 +1063,7 @@ class Detection(NamedTuple):
 @cache
 def detections(agents=60, ticks=400):
     target = target_of(2, (7, 3), (0.04, 0.25))
-    chase_of, who = target.Pursuit(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
+    chase_of, who = MovingTarget(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
     chase, made = chase_of.begin(1, agents), []
     began, method, where = np.zeros(agents, dtype=int), None, []
     for tick in range(ticks):
