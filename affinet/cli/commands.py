@@ -239,10 +239,7 @@ def _fit(parsed: argparse.Namespace) -> int:
 
 
 def _hunt(parsed: argparse.Namespace) -> int:
-    from affinet.testing import (
-        hunt,  # hypothesis takes a while to import
-        strategies,
-    )
+    from affinet.testing import hunt, strategies  # hypothesis takes a while to import
     from affinet.verdicts import invariants
 
     given = _scenario(parsed)
