@@ -142,7 +142,7 @@ class MediumNode:
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
-        sentence = self._judge(0, None) if self._medium.ahead else None
+        decided = self._judge(0, None) if self._medium.ahead else None
         tick = 0
         while True:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
@@ -155,18 +155,18 @@ class MediumNode:
             if sense.fired:
                 self._scripted = self._scripted.fired(sense.fired, sense.k)
                 self._change()
-            if sentence is None:
-                sentence = self._judge(sense.k, np.array(sense.position, dtype=np.float64))
+            if decided is None:
+                decided = self._judge(sense.k, np.array(sense.position, dtype=np.float64))
             self._welcome_back(sense.k)
-            self._hand_out_measurements(sense, sentence)
-            self._journal.put(sentence.journal)
-            self._collect(sentence)
-            self._hand_out_broadcasts(sentence)
+            self._hand_out_measurements(sense, decided)
+            self._journal.put(decided.journal)
+            self._collect(decided)
+            self._hand_out_broadcasts(decided)
             # The agents now work on what they heard: time to decide the next tick, where that needs no positions.
             self._air = self._ahead
             self._forget(sense.k)
             tick = sense.k + 1
-            sentence = self._judge(tick, None) if self._medium.ahead else None
+            decided = self._judge(tick, None) if self._medium.ahead else None
 
     def _judge(self, tick: int, position: Array | None) -> TickVerdicts:
         changed = self._take_orders(tick) or (tick == 0 and len(self._injected) > 0)
@@ -244,10 +244,10 @@ class MediumNode:
             self._numbers.restart(f"inbox {agent}")
             self._reader.restart(agent)
 
-    def _hand_out_measurements(self, sense: messages.Sense, sentence: TickVerdicts) -> None:
+    def _hand_out_measurements(self, sense: messages.Sense, decided: TickVerdicts) -> None:
         clock = self._timeline.clock(sense.k).tolist()
-        for agent in sentence.awake:
-            neighbours, links = sentence.seen[agent]
+        for agent in decided.awake:
+            neighbours, links = decided.seen[agent]
             inbox = messages.SenseInbox(
                 k=sense.k,
                 src=HUB,
@@ -262,25 +262,25 @@ class MediumNode:
             )
             self._inboxes[agent].put(messages.pack(inbox))
 
-    def _collect(self, sentence: TickVerdicts) -> None:
-        self._awaited = {(agent, name) for agent in sentence.awake for name in self._spoken}
-        self._supervisor.waits(sentence.tick, "what it broadcasts", self._silent)
+    def _collect(self, decided: TickVerdicts) -> None:
+        self._awaited = {(agent, name) for agent in decided.awake for name in self._spoken}
+        self._supervisor.waits(decided.tick, "what it broadcasts", self._silent)
         while self._awaited:
             sample = self._broadcasts.recv()
             data = sample.payload.to_bytes()
-            said = self._reader.read(str(sample.key_expr), data, sentence.tick, self._awaited)
+            said = self._reader.read(str(sample.key_expr), data, decided.tick, self._awaited)
             self._said[said.k, said.src, said.channel] = self._as_told(said, data)
             self._awaited.remove((said.src, said.channel))
-        self._supervisor.works(sentence.tick)
+        self._supervisor.works(decided.tick)
 
     def _silent(self) -> list[str]:
         return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
 
-    def _hand_out_broadcasts(self, sentence: TickVerdicts) -> None:
-        for agent in sentence.awake:
-            arriving = [self._as_it_arrives(said) for said in sentence.heard[agent]]
+    def _hand_out_broadcasts(self, decided: TickVerdicts) -> None:
+        for agent in decided.awake:
+            arriving = [self._as_it_arrives(said) for said in decided.heard[agent]]
             seq = self._numbers.next(f"inbox {agent}")
-            self._inboxes[agent].put(messages.pack_exchange(sentence.tick, seq, arriving))
+            self._inboxes[agent].put(messages.pack_exchange(decided.tick, seq, arriving))
 
     def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
         for liar in self._timeline.at(said.k).liars:
@@ -321,9 +321,9 @@ def main() -> None:
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
     with supervisor.confessing(), zenoh.open(config) as session:
-        relay = MediumNode(session, supervisor, brief)
-        relay.await_everybody()
+        node = MediumNode(session, supervisor, brief)
+        node.await_everybody()
         supervisor.tell("ready")
-        relay.run()
-        supervisor.tell("done", in_flight=relay.in_flight)
+        node.run()
+        supervisor.tell("done", in_flight=node.in_flight)
         supervisor.await_order("leave")

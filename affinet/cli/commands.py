@@ -298,7 +298,7 @@ def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
 
 
 def _inject(parsed: argparse.Namespace) -> int:
-    wish = InjectRequest(
+    request = InjectRequest(
         parsed.verb,
         links=tuple(getattr(parsed, "links", ())),
         groups=getattr(parsed, "groups", ()),
@@ -308,7 +308,7 @@ def _inject(parsed: argparse.Namespace) -> int:
     )
     flown = loading.resolved(parsed.directory)
     try:
-        order = wish.order(flown)
+        order = request.order(flown)
     except ValueError as error:
         raise ScenarioError(f"{parsed.verb}: {error}") from error
     answer = Access.to(parsed.directory).ask(order)

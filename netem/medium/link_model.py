@@ -34,7 +34,7 @@ _STALE = np.uint8(Mark.STALE)
 
 
 class Memory(NamedTuple):
-    """what it remembers from tick to tick.
+    """What a link model remembers from tick to tick.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class LinkModel:
         passed: Mask,
         by_message: bool,
     ) -> tuple[Array, Mask | None, Integers, Array]:
-        """The queues' debt, what they refuse, when the others arrive, and what else than the impairments lets them wait."""
+        """The queues' debt, what they refuse, when the others arrive, and what else makes them wait."""
         rate, overflow, wait = self.profile.rate, None, impairments.delay_ticks
         if by_message or rate:
             if rate:
