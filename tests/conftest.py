@@ -1,5 +1,7 @@
 """Fixtures of all tests."""
 
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,3 +11,13 @@ import pytest
 def out(tmp_path: Path) -> Path:
     """A run directory to be made."""
     return tmp_path / "run"
+
+
+@pytest.fixture(autouse=True, scope="session")
+def signals_as_at_a_terminal() -> Iterator[None]:
+    """Undo what nohup, or a shell in the background, has the tests and every process they start ignore."""
+    wanted = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in wanted.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)

@@ -29,8 +29,6 @@ class Running:
         self.scenario = scenario
 
     def __enter__(self):
-        # A shell that runs the tests in the background has them ignore SIGINT, and a child inherits that.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         self.launcher = subprocess.Popen(
             [
                 sys.executable,

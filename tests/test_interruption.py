@@ -39,7 +39,6 @@ def private(tmp_path):
 
 def interrupted(number, runtime, out, private, monkeypatch, again=False):
     monkeypatch.setenv("TMPDIR", str(private))
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has its children ignore it
     command = [
         sys.executable,
         "-m",
