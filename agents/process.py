@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Literal, NoReturn
 
 import numpy as np
-import zenoh
 
 from agents import checkpoint
 from agents.agent import Agent, AgentState
@@ -24,9 +23,10 @@ from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
+from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
-from netem.wire.session import CENTRE, HUB, Login, await_subscribers, client
+from netem.wire.session import CENTRE, HUB, Login, client
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ _KINDS = {"f": "iuf", "i": "i", "u": "iu", "b": "b"}
 class AgentNode:
     """One agent on the network."""
 
-    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: AgentBrief) -> None:
+    def __init__(self, session: Session, supervisor: Supervisor, brief: AgentBrief) -> None:
         self._supervisor = supervisor
         self._number = brief.agent
         self._neighbours = brief.neighbours
@@ -126,23 +126,22 @@ class AgentNode:
         self._numbers = Numbering()
         self._inboxes = Sequences("the medium's")
         keys = Keys(brief.run)
-        self._inbox = session.declare_subscriber(keys.inbox(self._number), zenoh.handlers.FifoChannel(64))
+        self._inbox = session.hears(keys.inbox(self._number), 64)
         self._channels = self._agent.channels()
         self._silence = {
             channel: {name: np.zeros(field.shape, dtype=field.dtype).tolist() for name, field in fields.items()}
             for channel, fields in self._channels.items()
         }
         spoken = sorted([channels.MEASUREMENT, *self._channels])
-        self._broadcasts = {name: session.declare_publisher(keys.broadcast(self._number, name)) for name in spoken}
-        self._act = session.declare_publisher(keys.act(self._number))
+        self._broadcasts = {name: session.says(keys.broadcast(self._number, name)) for name in spoken}
+        self._act = session.says(keys.act(self._number))
         centralized = isinstance(self._agent.estimator, CentralizedFilter)
-        ears: Any = zenoh.handlers.FifoChannel(64)
-        self._told = session.declare_subscriber(keys.told(self._number), ears) if centralized else None
+        self._told = session.hears(keys.told(self._number), 64) if centralized else None
         self._tellings = Sequences("the centre's")
 
     def await_everybody(self) -> None:
         """Wait until the medium and the world listen."""
-        await_subscribers([*self._broadcasts.values(), self._act])
+        await_heard([*self._broadcasts.values(), self._act])
 
     def run(self) -> None:
         """Sense, broadcast, hear and act until the medium says that the run is over."""
@@ -150,7 +149,7 @@ class AgentNode:
         tick = 0
         while True:
             self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
-            inbox = messages.unpack_inbox(self._inbox.recv().payload.to_bytes())
+            inbox = messages.unpack_inbox(self._inbox.next().data)
             self._inboxes.check("inbox", inbox.seq)
             tick = inbox.k
             self._supervisor.works(tick)
@@ -175,7 +174,7 @@ class AgentNode:
         self._state, said = self._agent.sense(self._state, measured, seen, _numbers(inbox.motion))
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
-            self._broadcasts[name].put(
+            self._broadcasts[name].say(
                 messages.pack(messages.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
             )
 
@@ -201,13 +200,13 @@ class AgentNode:
             reports=dict(estimate.reports),
             heard=self._heard,
         )
-        self._act.put(messages.pack(act))
+        self._act.say(messages.pack(act))
 
     def _from_the_centre(self, tick: int) -> Mapping[str, Heard]:
         if self._told is None:
             return {}
         self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
-        told = messages.unpack(messages.Told, self._told.recv().payload.to_bytes())
+        told = messages.unpack(messages.Told, self._told.next().data)
         self._supervisor.works(tick)
         self._tellings.check("told", told.seq)
         if told.k != tick:
@@ -266,7 +265,7 @@ def main() -> NoReturn:
 def _fly() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
-    with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
+    with supervisor.confessing(), Session(client(brief.login)) as session:
         node = AgentNode(session, supervisor, brief)
         node.await_everybody()
         supervisor.tell("ready")

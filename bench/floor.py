@@ -8,8 +8,9 @@ import time
 
 import zenoh
 
+from netem.wire.carrier import Voice
 from netem.wire.keys import Keys
-from netem.wire.session import HUB, WORLD, Login, await_subscribers, client, hub
+from netem.wire.session import HUB, WORLD, Login, client, hub
 
 CHANNELS = ("input", "measurement", "theta")
 FIFO = zenoh.handlers.FifoChannel
@@ -67,7 +68,8 @@ def be_agent(session: zenoh.Session, keys: Keys, agent: int, ticks: int, size: d
 
 def ready(publishers: list[zenoh.Publisher]) -> None:
     """Say so, and wait for the word to begin."""
-    await_subscribers(publishers)
+    for publisher in publishers:
+        Voice(publisher).await_heard()
     print("ready", flush=True)
     sys.stdin.readline()
 
@@ -78,7 +80,7 @@ def main() -> None:
     role, agents, ticks, size = told["role"], told["agents"], told["ticks"], told["size"]
     keys, login = Keys("floor"), Login(*told["login"])
     config = hub(login, told["users"], keys, range(1, agents + 1)) if role == HUB else client(login)
-    with zenoh.open(config) as session:
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
         if role == HUB:
             be_hub(session, keys, agents, ticks, size)
         elif role == WORLD:

@@ -30,6 +30,7 @@ import psutil
 from rerun.chunk import RrdReader
 
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 from world.recording.logbook import RECORDING
 
 _ROLES = ("launcher", "world", "netem", "agents")
@@ -194,7 +195,7 @@ def _wrong_end(run: Run, role: str, pid: int) -> list[str]:
 
 
 def _read(run: Run, done: Kill) -> None:
-    book, recording, summary = run.out / journal.FILE, run.out / RECORDING, run.out / "summary.json"
+    book, recording, summary = run.out / JOURNAL, run.out / RECORDING, run.out / "summary.json"
     flown = summary.exists() and json.loads(summary.read_text())["wall_s"] > 0.0
     try:
         done.ticks = int(journal.read(book)["tick"].to_numpy().max(initial=-1)) + 1 if book.exists() else 0

@@ -13,11 +13,11 @@ from flying import PROCESSES, TRIANGLE, plan_of
 from affinet.cli import commands
 from affinet.runtimes import launcher
 from affinet.runtimes.inject import Access
-from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.run import fly, rehearse
-from affinet.verdicts import accounts, outcome
+from affinet.verdicts import outcome
+from affinet.verdicts.outcome import accounts_of
 from netem.medium import journal
-from netem.medium.verdict import Ledger
+from netem.medium.medium import JOURNAL
 from netem.wire.session import Login
 
 PROGRAMS = Path(__file__).parent / "programs"
@@ -32,7 +32,7 @@ WILD = (
 )
 
 
-# ---- from the journal, where that is all there is
+# ---- booked by the medium, with its journal
 
 
 @pytest.mark.parametrize(
@@ -44,36 +44,44 @@ WILD = (
 )
 def test_the_journal_has_the_accounts_of_the_run(overrides, out):
     plan = plan_of("corridor", *overrides)
-    fly(plan, "inprocess", out, lambda *_: None)
+    flown = fly(plan, "inprocess", out, lambda *_: None)
     done = rehearse(plan)
-    ledger = Ledger.of(*(done.arrays[name] for name in ("fates", "copies", "late", "dropped")))
-    told = accounts.of_journal(plan, plan.timeline, out / journal.FILE)
-    assert told == accounts.Accounts(plan.world.ticks, ledger, done.outcome.messages["in_flight"])
-    assert told.in_flight == ledger.outstanding > 0
+    booked = journal.accounts(out / JOURNAL)
+    assert booked == accounts_of(done.arrays, booked.in_flight)
+    assert booked.close
+    assert booked.in_flight == done.outcome.messages["in_flight"] == flown.messages["in_flight"] > 0
 
 
-def test_the_journal_has_the_accounts_of_what_was_injected_too(out):
-    """Without arrays, the outcome of a failed run is counted from the journal."""
-    plan = plan_of("corridor", "time.dt=0.05", "time.duration=3", "network.availability=0.6")
-    done = fly(plan, "inprocess", out, lambda *_: None)
-    told = accounts.of_journal(plan, plan.timeline, out / journal.FILE)
-    failed = judged(plan, None, failure="the world was killed", accounts=told)
-    assert failed.verdict == "fail"
+@PROCESSES
+def test_the_journal_and_its_accounts_outlive_the_world(out, monkeypatch):
+    """Before: the world wrote the journal, and what it had not written when it was killed was lost."""
+    plan = plan_of("corridor", "time.dt=0.05", "time.duration=90", "network.availability=0.6")
+    batch = plan.books(None).batch
+
+    def kill_the_world(group, _awaited):
+        world = group.children[0]
+        if batch < world.doing.tick and batch // 5 < world.doing.tick % batch < batch // 2:
+            world.process.kill()
+
+    monkeypatch.setattr(launcher.ProcessGroup, "blame_the_silent", kill_the_world)
+    out.mkdir()
+    flight = launcher.Launcher(plan, out, watch=lambda *_: None).fly()
+    assert flight.failure.startswith("world (pid ")
+    assert not (out / "arrays.npz").exists()
+    booked, table = journal.accounts(out / JOURNAL), journal.read(out / JOURNAL)
+    assert booked.close
+    assert booked.ticks == table["tick"].to_numpy().max() + 1
+    assert booked.ticks % batch  # what was not a whole batch yet is there too
+    failed = judged(plan, None, failure="the world was killed", accounts=booked, uninstructed=None)
     assert failed.reasons == ("the world was killed",)
-    assert failed.messages == {**done.messages, "uninstructed": None}
-    assert failed.ticks == 60
+    assert failed.messages["offered"] == booked.ledger.offered > 0
+    assert failed.ticks == booked.ticks
     assert failed.digest is None
 
 
-def judged(plan, arrays, *, failure=None, accounts=None, in_flight=None, uninstructed=None):
+def judged(plan, arrays, *, accounts, failure=None, uninstructed=0):
     nothing = {"wall_s": 1.0, "processes": [], "out": Path()}
-    facts = {
-        "in_flight": in_flight,
-        "uninstructed": uninstructed,
-        "failure": failure,
-        "accounts": accounts,
-        "user_code": False,
-    }
+    facts = {"uninstructed": uninstructed, "failure": failure, "accounts": accounts, "user_code": False}
     return outcome.judge(plan, plan.timeline, arrays, **facts, **nothing)
 
 
@@ -82,38 +90,47 @@ def judged(plan, arrays, *, failure=None, accounts=None, in_flight=None, uninstr
 
 def flown(*overrides):
     plan = plan_of("corridor", "time.dt=0.05", "time.duration=1", "network.delay_ticks=2", *overrides)
-    swarm, done = InProcessSwarm(plan), rehearse(plan)
-    return plan, done.arrays, done.outcome.messages["in_flight"], swarm
+    done = rehearse(plan)
+    return plan, done.arrays, accounts_of(done.arrays, done.outcome.messages["in_flight"])
 
 
 @pytest.mark.parametrize(
-    ("name", "by", "booked"),
+    ("field", "by", "booked"),
     [
-        pytest.param("late", 1, 1921, id="one more arrived than was under way"),
-        pytest.param("late", -1, 1919, id="one is gone"),
+        pytest.param("delivered", 1, 1921, id="one more arrived than was under way"),
+        pytest.param("delivered", -1, 1919, id="one is gone"),
         pytest.param("copies", 1, 1920, id="a copy that nobody made"),
     ],
 )
-def test_accounts_that_do_not_close_fail_the_run_and_say_so(name, by, booked):
-    plan, arrays, in_flight, _ = flown()
-    wrong = arrays[name].copy()
-    wrong[5] += by
-    done = judged(plan, {**arrays, name: wrong}, in_flight=in_flight, uninstructed=0)
-    doubled = int(name == "copies")
+def test_accounts_that_do_not_close_fail_the_run_and_say_so(field, by, booked):
+    plan, arrays, accounts = flown()
+    ledger = dataclasses.replace(accounts.ledger, **{field: getattr(accounts.ledger, field) + by})
+    done = judged(plan, arrays, accounts=dataclasses.replace(accounts, ledger=ledger))
+    doubled = int(field == "copies")
     assert done.verdict == "fail"
     assert done.reasons == (
         f"the accounts do not close: 1920 messages offered and {doubled} doubled, {booked} accounted for",
+        "what the medium has booked and what the world was told do not agree",
     )
 
 
+@pytest.mark.parametrize("name", ["late", "copies"])
+def test_a_world_that_was_told_otherwise_than_the_medium_has_booked_fails_the_run(name):
+    plan, arrays, accounts = flown()
+    wrong = arrays[name].copy()
+    wrong[5] += 1
+    done = judged(plan, {**arrays, name: wrong}, accounts=accounts)
+    assert done.reasons == ("what the medium has booked and what the world was told do not agree",)
+
+
 def test_accounts_that_close_pass():
-    plan, arrays, in_flight, _ = flown()
-    assert judged(plan, arrays, in_flight=in_flight, uninstructed=0).verdict == "pass"
+    plan, arrays, accounts = flown()
+    assert judged(plan, arrays, accounts=accounts).verdict == "pass"
 
 
 def test_what_was_lost_by_nobodys_order_fails_the_run_and_is_counted():
-    plan, arrays, in_flight, _ = flown()
-    done = judged(plan, arrays, in_flight=in_flight, uninstructed=3)
+    plan, arrays, accounts = flown()
+    done = judged(plan, arrays, accounts=accounts, uninstructed=3)
     assert done.verdict == "fail"
     assert done.reasons == ("3 messages were lost that nobody ordered",)
     assert dataclasses.asdict(done)["messages"]["uninstructed"] == 3

@@ -30,8 +30,9 @@ from netem.impairments.delay import DelayLaw, MessageDelay
 from netem.impairments.loss import gilbert_elliott
 from netem.impairments.rate import Rate
 from netem.medium.in_flight import Verdicts, newest_of, out_of_the_ordinary
+from netem.medium.ledger import Accounts, Ledger
 from netem.medium.medium import Medium
-from netem.medium.verdict import FATE_OF, REASONS, Fate, Ledger
+from netem.medium.verdict import FATE_OF, REASONS, Fate
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 SIZE = len(LINKS)
@@ -505,7 +506,8 @@ def test_offered_and_copies_are_delivered_dropped_or_in_flight(case):
     assert ledger.delivered == (fates == Fate.DELIVERED).sum() + late.sum()
     assert sum(ledger.dropped.values()) == (fates >= Fate.DEAD).sum() + dropped.sum()
     assert ledger.offered + ledger.copies == ledger.delivered + sum(ledger.dropped.values()) + in_flight
-    assert ledger.outstanding == in_flight
+    assert Accounts(len(flown), ledger, in_flight).close
+    assert not Accounts(len(flown), ledger, in_flight + 1).close
 
 
 def len_released(delivery):

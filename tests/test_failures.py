@@ -14,6 +14,7 @@ from flying import PROCESSES
 from rerun.chunk import RrdReader
 
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 
 pytestmark = PROCESSES
 
@@ -49,7 +50,7 @@ class Running:
         self.children = []
         try:
             # Room for the recording is tried at the start, so its size alone says nothing.
-            await_true(lambda: min(self.written("run.rrd"), 10 * self.written(journal.FILE)) > 100_000, "it never flew")
+            await_true(lambda: min(self.written("run.rrd"), 10 * self.written(JOURNAL)) > 100_000, "it never flew")
         except BaseException:  # a test that ran out of time too
             self.__exit__()
             raise
@@ -105,7 +106,7 @@ def test_a_death_ends_the_run_with_its_reason(package, out):
     assert f"(pid {victim.pid}) was killed by SIGKILL" in summary["reasons"][0]
     assert moments(out / "run.rrd") > 10
     # Whoever died, the accounts say what became of everything up to the last tick that was written down.
-    table = journal.read(out / journal.FILE)
+    table = journal.read(out / JOURNAL)
     counts = dict(zip(*np.unique(table["verdict"].to_numpy(), return_counts=True), strict=True))
     messages = summary["messages"]
     assert summary["ticks"] == table["tick"].to_numpy().max() + 1 >= 50

@@ -12,6 +12,7 @@ from affinet.planning import plan as planning
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 from world.books import history
 
 pytestmark = PROCESSES
@@ -111,15 +112,15 @@ def check(number, tmp_path):
     plan = written(tmp_path / "told", number)
     one, many = (flown(plan, runtime, tmp_path / runtime) for runtime in ("inprocess", "processes"))
     assert one.digest == many.digest
-    books = [journal.read(tmp_path / runtime / journal.FILE) for runtime in ("inprocess", "processes")]
+    books = [journal.read(tmp_path / runtime / JOURNAL) for runtime in ("inprocess", "processes")]
     assert books[0].equals(books[1])
     reseeded = replace(plan, scenario=plan.scenario.model_copy(update={"seed": 99}))
-    again = replace(reseeded, journal=tmp_path / "processes" / journal.FILE)
+    again = replace(reseeded, journal=tmp_path / "processes" / JOURNAL)
     flown(again, "inprocess", tmp_path / "again")
     arrays, repeated = (history.load(tmp_path / run / "arrays.npz") for run in ("processes", "again"))
     for name in ("fates", "newest", "copies", "late", "dropped"):
         assert np.array_equal(arrays[name], repeated[name]), name
-    assert journal.read(tmp_path / "again" / journal.FILE).equals(books[0])
+    assert journal.read(tmp_path / "again" / JOURNAL).equals(books[0])
 
 
 def test_the_fast_combinations_hold_every_impairment():
@@ -146,5 +147,5 @@ def test_poisoned_messages_arrive_alike(kind, tmp_path):
     plan = planning.make(loading.load("corridor", overrides))
     one, many = (fly(plan, runtime, tmp_path / runtime, lambda *_: None) for runtime in ("inprocess", "processes"))
     assert one.digest == many.digest
-    marks = journal.read(tmp_path / "processes" / journal.FILE)["mark"].drop_null().to_pylist()
+    marks = journal.read(tmp_path / "processes" / JOURNAL)["mark"].drop_null().to_pylist()
     assert set(marks) == {kind}

@@ -12,7 +12,9 @@ from affinet.runtimes.run import fly
 from netem.core.links import Links
 from netem.faults.control import Order, OrderAction, obey
 from netem.faults.fault import Fault, Verb
+from netem.faults.timeline import Timeline
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 
 pytestmark = PROCESSES
 
@@ -62,14 +64,14 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
     assert {name: fault["at"] for name, fault in faults.items()} == pytest.approx(
         {"cut": cut.k * 0.01, "lose": lose.k * 0.01}
     )
-    recorded = journal.injected(journal.read(out / journal.FILE))
+    recorded = journal.injected(journal.read(out / JOURNAL))
     assert [(fault.verb, fault.start) for fault in recorded] == [(Verb.CUT, cut.k), (Verb.LOSE, lose.k)]
     assert recorded[1].end == healed.k
 
     for name, verdicts in (("models", False), ("journal", True)):
         again = fly(planning.again(out, (), verdicts=verdicts), "inprocess", tmp_path / name, lambda *_: None)
         assert again.digest == flight.outcome.digest
-        tables = [journal.read(run / journal.FILE) for run in (out, tmp_path / name)]
+        tables = [journal.read(run / JOURNAL) for run in (out, tmp_path / name)]
         assert tables[0].drop_columns("event").equals(tables[1].drop_columns("event"))
         assert journal.injected(tables[1]) == recorded
 
@@ -108,17 +110,18 @@ def order(verb, **what):
 
 
 def test_healing_leaves_what_is_scripted():
-    injected = obey(order(Verb.LOSE, pairs=((2, 3),), probability=0.4), 5, SCRIPTED, (), LINKS).injected
-    done = obey(Order(OrderAction.HEAL, None), 9, SCRIPTED, injected, LINKS)
-    assert done.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), probability=0.4),)
-    assert done.answer.holds == ("cut 1->2",)
+    before, _ = obey(order(Verb.LOSE, pairs=((2, 3),), probability=0.4), 5, Timeline(LINKS, SCRIPTED))
+    after, answer = obey(Order(OrderAction.HEAL, None), 9, before)
+    assert after.scripted == tuple(SCRIPTED)
+    assert after.injected == (Fault(Verb.LOSE, 5, 9, pairs=((2, 3),), probability=0.4),)
+    assert answer.holds == ("cut 1->2",)
 
 
 def test_healing_leaves_what_was_over_before():
-    over = obey(order(Verb.CUT, pairs=((1, 2),), end=2), 5, SCRIPTED, (), LINKS).injected
-    lasting = obey(order(Verb.CUT, pairs=((2, 3),)), 6, SCRIPTED, over, LINKS).injected
-    healed = obey(Order(OrderAction.HEAL, None), 9, SCRIPTED, lasting, LINKS).injected
-    assert [(fault.start, fault.end) for fault in healed] == [(5, 7), (6, 9)]
+    over, _ = obey(order(Verb.CUT, pairs=((1, 2),), end=2), 5, Timeline(LINKS, SCRIPTED))
+    lasting, _ = obey(order(Verb.CUT, pairs=((2, 3),)), 6, over)
+    healed, _ = obey(Order(OrderAction.HEAL, None), 9, lasting)
+    assert [(fault.start, fault.end) for fault in healed.injected] == [(5, 7), (6, 9)]
 
 
 @pytest.mark.parametrize(
@@ -134,6 +137,7 @@ def test_healing_leaves_what_was_over_before():
     ],
 )
 def test_what_cannot_be_is_refused_and_changes_nothing(asked, why):
-    done = obey(asked, 3, SCRIPTED, (), LINKS)
-    assert why in done.answer.refused
-    assert done.injected == ()
+    before = Timeline(LINKS, SCRIPTED)
+    after, answer = obey(asked, 3, before)
+    assert why in answer.refused
+    assert after is before

@@ -4,7 +4,6 @@ import json
 import sys
 from pathlib import Path
 
-import zenoh
 from flying import PROCESSES, digest_of, plan_of
 
 from affinet.runtimes.launcher import Launcher
@@ -39,6 +38,7 @@ def test_a_rogue_gets_nothing_through(out, tmp_path):
 
 
 def test_a_wrong_password_is_refused(out):
+    from netem.wire.carrier import NotCarried, Session
     from netem.wire.session import Login, client
 
     plan = plan_of("corridor", "time.duration=2")
@@ -53,9 +53,10 @@ def test_a_wrong_password_is_refused(out):
     def intrude(_tick, _error):
         if not refused:
             try:
-                zenoh.open(client(Login(launcher.endpoint, "agent-1", "guess"), patience_s=2.0)).close()
+                with Session(client(Login(launcher.endpoint, "agent-1", "guess"), patience_s=2.0)):
+                    pass
                 refused.append(False)
-            except zenoh.ZError:
+            except NotCarried:
                 refused.append(True)
 
     out.mkdir()

@@ -16,8 +16,9 @@ from netem.impairments.rate import Rate
 from netem.impairments.reach import Reach, ReachLaw
 from netem.impairments.schedule import Schedule
 from netem.impairments.trace import Trace
+from netem.medium.ledger import Accounts, Ledger
 from netem.medium.medium import Medium
-from netem.medium.verdict import REASONS, Fate, Ledger
+from netem.medium.verdict import REASONS, Fate
 
 LINKS = Links.both_ways(5, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (1, 3)])
 CHANNELS = ("sense", "input", "theta")
@@ -591,7 +592,7 @@ def test_the_ledger_names_each_reason_that_occurred():
     dropped[0, Fate.DEAD] = 1
     ledger = Ledger.of(fates, copies=np.array([0]), late=np.array([0]), dropped=dropped)
     assert ledger == Ledger(offered=5, copies=0, delivered=1, dropped={"dead": 1, "cut": 1, "lost": 1})
-    assert ledger.outstanding == 1
+    assert Accounts(1, ledger, in_flight=1).close
 
 
 def test_the_ledger_counts_a_copy_as_a_message_of_its_own():
@@ -599,4 +600,4 @@ def test_the_ledger_counts_a_copy_as_a_message_of_its_own():
     nothing = np.zeros((2, len(Fate)), dtype=np.int64)
     ledger = Ledger.of(fates, copies=np.array([2, 0]), late=np.array([1, 1]), dropped=nothing)
     assert ledger == Ledger(offered=2, copies=2, delivered=3, dropped={})
-    assert ledger.outstanding == 1
+    assert Accounts(1, ledger, in_flight=1).close

@@ -11,6 +11,7 @@ from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
 from netem.core.links import Links
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 from netem.medium.verdict import Fate
 from world.books import history
 
@@ -92,13 +93,13 @@ def test_a_run_that_ended_before_is_refused_whatever_its_ticks(before):
 
 def test_a_run_that_was_killed_is_worth_what_it_wrote(before, tmp_path):
     out, passed = before
-    table = journal.read(out / journal.FILE)
+    table = journal.read(out / JOURNAL)
     cut = tmp_path / "cut"
     cut.mkdir()
     (cut / "scenario.json").write_bytes((out / "scenario.json").read_bytes())
-    whole = (out / journal.FILE).read_bytes()
-    (cut / journal.FILE).write_bytes(whole[: len(whole) * 3 // 4])
-    ticks = int(journal.read(cut / journal.FILE)["tick"].to_numpy().max()) + 1
+    whole = (out / JOURNAL).read_bytes()
+    (cut / JOURNAL).write_bytes(whole[: len(whole) * 3 // 4])
+    ticks = int(journal.read(cut / JOURNAL)["tick"].to_numpy().max()) + 1
     assert 0 < ticks < 100 == int(table["tick"].to_numpy().max()) + 1
     assert f"the run ends after {ticks * 0.01:g} s, this one after 1 s" in refused(cut, "time.dt=0.01")
     assert np.array_equal(worth(traced(cut, "time.dt=0.01", "time.duration=0.1"), 10), passed[:10])
@@ -118,7 +119,7 @@ def test_a_directory_that_is_no_air_is_refused(files, says, before, tmp_path):
     if "scenario.json" in files:
         (tmp_path / "scenario.json").write_bytes((out / "scenario.json").read_bytes())
     if "journal.arrows" in files:
-        journal.Writer(tmp_path / journal.FILE, plan_of("corridor").world.links, ["sense"]).close()
+        journal.Writer(tmp_path / JOURNAL, plan_of("corridor").world.links, ["sense"], 50).close()
     assert says in refused(tmp_path)
 
 
@@ -136,7 +137,7 @@ def test_of_a_larger_swarm_the_links_that_are_here_are_taken(tmp_path):
     plan, fates = flown(tmp_path / "run", HEXA)
     both = [pair for pair in plan.world.links.index if max(pair) < 10 and min(pair) <= 2]
     links = Links.both_ways(9, both)
-    carried = journal.carried(journal.read(tmp_path / "run" / journal.FILE), links, sensing=True)
+    carried = journal.carried(journal.read(tmp_path / "run" / JOURNAL), links, sensing=True)
     rows = [plan.world.links.index[pair] for pair in links.index]
     assert np.array_equal(carried.share, fates[:, 0, rows] == Fate.DELIVERED)
     assert carried.known.all()

@@ -17,6 +17,8 @@ from affinet.runtimes import run as running
 from affinet.runtimes.inject import Access
 from affinet.runtimes.rerun_command import NotMended, NoViewer
 from affinet.runtimes.run import fly
+from netem.medium import journal
+from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import about, afterwards, said
 from netem.wire.session import Login
 from world.books.history import History
@@ -334,12 +336,13 @@ def test_every_step_of_a_clean_up_is_taken_and_the_first_failure_is_the_one_that
 def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, monkeypatch):
     plan = plan_of("corridor", *SHORT, "record.enabled=false")
     out.mkdir()
-    monkeypatch.setattr("netem.medium.journal.Writer.close", lambda _: broken("journal")())
-    with (
-        pytest.raises(KeyError, match="first"),
+    monkeypatch.setattr("netem.core.arrow.Stream.close", lambda _: broken("a table")())
+    for table in (
         RunWriter(out, "run", plan.world, plan.channels, plan.books(None)),
+        journal.Writer(out / JOURNAL, plan.world.links, plan.channels, 50),
     ):
-        raise KeyError("first")
+        with pytest.raises(KeyError, match="first"), table:
+            raise KeyError("first")
 
 
 def test_arrays_are_saved_whole_or_not_at_all(tmp_path):

@@ -537,6 +537,8 @@ def test_a_timeline_that_waits_faces_what_is_injected_and_still_waits():
     injected = Fault(Verb.CUT, 2, 4, pairs=((2, 3),))
     timeline = Timeline(LINKS, WAITING, TRIGGERS).facing([injected])
     assert timeline.faults == (*WAITING, injected)
+    assert timeline.facing([]).faults == tuple(WAITING)
+    assert timeline.fired([0], 7).injected == (injected,)
     assert timeline.pending == (0, 1)
     assert timeline.due(np.array([3.0])) == [0]
 

@@ -9,6 +9,7 @@ from affinet.planning import plan as planning
 from affinet.runtimes.run import fly
 from affinet.scenario import verbs
 from netem.medium import journal
+from netem.medium.medium import JOURNAL
 from world.books import history
 
 pytestmark = PROCESSES
@@ -99,7 +100,7 @@ def test_both_runtimes_give_the_same_bits_and_count_the_same_bites(twice):
     assert one.digest == many.digest
     assert [bite.to_json() for bite in one.faults] == [bite.to_json() for bite in many.faults]
     assert one.messages == many.messages | {"uninstructed": 0}
-    books = [journal.read(out / journal.FILE) for out in outs]
+    books = [journal.read(out / JOURNAL) for out in outs]
     assert books[0].equals(books[1])
 
 

@@ -341,6 +341,8 @@ MEDIUM = MediumBrief(
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
+    journal="/tmp/run/journal.arrows",
+    batch=50,
 )
 
 

@@ -36,7 +36,7 @@ from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
 from netem.impairments.profile import Profile
-from netem.medium.medium import Verdicted, recorded
+from netem.medium.medium import JOURNAL, Verdicted, recorded
 from netem.processes.user_code import UserCodeError, definition
 from world.brief import RecordOptions
 from world.formation import stress
@@ -110,7 +110,7 @@ class Plan:
     @cached_property
     def timeline(self) -> Timeline:
         """All faults over the links."""
-        return Timeline(self.world.links, (*self.faults, *self.injected), self.triggers)
+        return Timeline(self.world.links, self.faults, self.triggers, self.injected)
 
     @cached_property
     def positioned(self) -> Mask:
@@ -202,7 +202,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
     """
     from netem.medium import journal  # pyarrow takes a while to import, and only a replay reads journals
 
-    file, judge = (out / journal.FILE).resolve(), inputs.kept(out).verdicts
+    file, judge = (out / JOURNAL).resolve(), inputs.kept(out).verdicts
     given = loading.resolved(out, overrides, folder)
     if verdicts:
         judged_by: Path | None = file

@@ -10,11 +10,11 @@ import numpy as np
 
 from affinet.planning.blueprint import formation_of
 from affinet.scenario import loading
-from affinet.scenario.inputs import JOURNAL
 from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
 from analysis.models.arrays import Mask
 from netem.core.links import Links
 from netem.impairments.trace import MeasuredAvailability
+from netem.medium.medium import JOURNAL
 
 if TYPE_CHECKING:
     from netem.medium.journal import Carried

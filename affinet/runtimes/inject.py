@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import zenoh
 from pydantic import TypeAdapter
 
 from affinet.planning.blueprint import formation_of
@@ -21,6 +20,7 @@ from netem.faults.control import Answer, Order, OrderAction
 from netem.faults.fault import Fault, UnderWay, Verb
 from netem.processes.system_errors import about, afterwards
 from netem.wire import messages
+from netem.wire.carrier import NotCarried, Session
 from netem.wire.keys import Keys
 from netem.wire.session import Login, client
 
@@ -138,13 +138,8 @@ class Access:
             When nobody answers, or the medium could not read the order.
         """
         try:
-            with zenoh.open(client(self.login, _CONNECT_S)) as session:
-                replies = session.get(Keys(self.run).control, payload=messages.pack_record(order), timeout=_PATIENCE_S)
-                for reply in replies:
-                    if reply.err is not None:
-                        raise NotFlying(f"the medium refused: {reply.err.payload.to_string()}")
-                    if reply.ok is not None:
-                        return messages.unpack(Answer, reply.ok.payload.to_bytes())
-        except zenoh.ZError as error:
-            raise NotFlying(f"the medium cannot be reached: {error}") from error
-        raise NotFlying(f"the medium did not answer within {_PATIENCE_S:g} s: the run ended, or stands still")
+            with Session(client(self.login, _CONNECT_S)) as session:
+                reply = session.ask(Keys(self.run).control, messages.pack_record(order), _PATIENCE_S)
+        except NotCarried as error:
+            raise NotFlying(f"the run has ended, stands still, or refuses: {error}") from error
+        return messages.unpack(Answer, reply)

@@ -20,6 +20,7 @@ from affinet.runtimes.told import Event
 from agents.centre.filter import Centre
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief
+from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
@@ -33,8 +34,8 @@ class LaunchRecord:
 
     Parameters
     ----------
-    in_flight, uninstructed
-        Messages still under way at the end, and messages lost that nobody ordered; None when the run did not get there.
+    uninstructed
+        Messages lost that nobody ordered; None when the run did not get to its end.
     fired
         In which tick each trigger fired that did.
     failure, user_code
@@ -45,7 +46,6 @@ class LaunchRecord:
         Every process there was.
     """
 
-    in_flight: int | None = None
     uninstructed: int | None = None
     fired: dict[int, int] = field(default_factory=dict)
     failure: str | None = None
@@ -177,8 +177,6 @@ class Launcher:
                 self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
             case "done" if child.role == WORLD:
                 self.flight.uninstructed = event["uninstructed"]
-            case "done" if child.role == HUB:
-                self.flight.in_flight = event["in_flight"]
 
     def _move(self, group: ProcessGroup, order: str, event: Event) -> None:
         match order:
@@ -230,6 +228,8 @@ class Launcher:
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
             positioned=self._plan.positioned,
+            journal=str(self._out / JOURNAL),
+            batch=self._plan.books(self._viewer).batch,
         )
 
     def _centre_brief(self, centre: Centre, login: Login) -> CentreBrief:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -13,10 +14,11 @@ from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.rerun_command import NotMended, NoViewer, mend
-from affinet.verdicts import accounts, outcome
+from affinet.verdicts import outcome
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
 from analysis.models.arrays import Array
+from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import said
 from netem.processes.user_code import UserCodeError
 from netem.wire import keys
@@ -76,7 +78,21 @@ def rehearse(plan: Plan) -> Evidence:
     swarm, flown = InProcessSwarm(plan), History(plan.world, len(plan.channels), plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
-    return _judged(plan, swarm, flown, time.perf_counter() - started, Path())
+    wall_s, arrays = time.perf_counter() - started, flown.arrays()
+    accounts = outcome.accounts_of(arrays, swarm.in_flight)
+    done = outcome.judge(
+        plan,
+        swarm.timeline,
+        arrays,
+        accounts=accounts,
+        uninstructed=0,
+        failure=None,
+        user_code=False,
+        wall_s=wall_s,
+        processes=[],
+        out=Path(),
+    )
+    return Evidence(plan, arrays, done)
 
 
 def evidence(plan: Plan, done: Outcome) -> Evidence | None:
@@ -91,15 +107,14 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
     flight = launcher.flight
     launcher.fly()
-    path, recording, book = out / history.FILE, out / "run.rrd", out / journal.FILE
-    failure, timeline, told = flight.failure, plan.timeline, None
+    path, recording, book = out / history.FILE, out / "run.rrd", out / JOURNAL
+    failure, timeline, accounts = flight.failure, plan.timeline, None
     try:
         if book.exists():
-            timeline = plan.facing(journal.injected(journal.read(book))).timeline
+            timeline = timeline.facing(journal.injected(journal.read(book)))
+            accounts = journal.accounts(book)
         for trigger, tick in flight.fired.items():
             timeline = timeline.fired([trigger], tick)
-        if book.exists() and not path.exists():
-            told = accounts.of_journal(plan, timeline, book)
     except journal.JournalError as error:
         failure = "; ".join([*filter(None, [failure]), str(error)])
     if failure and not path.exists() and recording.exists():
@@ -113,11 +128,10 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
         plan,
         timeline,
         history.load(path) if path.exists() else None,
-        in_flight=flight.in_flight,
+        accounts=accounts,
         uninstructed=flight.uninstructed,
         failure=failure,
         user_code=flight.user_code,
-        accounts=told,
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
@@ -125,16 +139,18 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
 
 
 def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
-    from world.recording.logbook import RunWriter  # takes a second to import; over processes only the world needs it
+    from netem.medium import journal  # these take a second to import; over processes others need them
+    from world.recording.logbook import RunWriter
 
-    swarm, books, flown = (
-        InProcessSwarm(plan),
-        plan.books(viewer),
-        History(plan.world, len(plan.channels), plan.reports),
-    )
+    swarm, books = InProcessSwarm(plan), plan.books(viewer)
+    flown = History(plan.world, len(plan.channels), plan.reports)
+    booked: journal.Writer | None = None
     started, failure, broken = time.perf_counter(), None, None
     try:
-        with RunWriter(out, keys.fresh(), plan.world, plan.channels, books) as logbook:
+        with (
+            journal.Writer(out / JOURNAL, plan.world.links, plan.channels, books.batch) as booked,
+            RunWriter(out, keys.fresh(), plan.world, plan.channels, books) as logbook,
+        ):
 
             def see(moments: Moments, next_position: Array) -> None:
                 flown.extend(moments, next_position)
@@ -142,7 +158,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
                 watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
                 interruption.heed()
 
-            broken = _flown(swarm, see, books.batch, out)
+            broken = _broken(partial(swarm.fly, see, books.batch, booked.enter), out)
             failure = None if broken is None else str(broken)
     except Interrupted as error:
         failure = str(error)
@@ -154,42 +170,27 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
             flown.save(out / history.FILE)
     except OSError as error:
         failure = failure or f"the run could not be written down: {said(error)}"
-    return _judged(plan, swarm, flown, wall_s, out, failure, user_code=broken is not None).outcome
+    return outcome.judge(
+        plan,
+        swarm.timeline,
+        flown.arrays() if flown.ticks else None,
+        accounts=booked.accounts if booked else None,
+        uninstructed=0,
+        failure=failure,
+        user_code=broken is not None,
+        wall_s=wall_s,
+        processes=[],
+        out=out,
+    )
 
 
-def _flown(swarm: InProcessSwarm, see: Callable[[Moments, Array], None], batch: int, out: Path) -> UserCodeError | None:
+def _broken(fly: Callable[[], None], out: Path) -> UserCodeError | None:
     """Why the swarm did not fly to the end, if a user's own code is why; its log has the traceback."""
     try:
-        swarm.fly(see, batch)
+        fly()
     except UserCodeError as error:
         log = out / "logs" / "inprocess.log"
         log.parent.mkdir(exist_ok=True)
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8", errors="backslashreplace")
         return error
     return None
-
-
-def _judged(
-    plan: Plan,
-    swarm: InProcessSwarm,
-    flown: History,
-    wall_s: float,
-    out: Path,
-    failure: str | None = None,
-    *,
-    user_code: bool = False,
-) -> Evidence:
-    arrays = flown.arrays()
-    done = outcome.judge(
-        plan,
-        swarm.timeline,
-        arrays if flown.ticks else None,
-        in_flight=None if failure else swarm.in_flight,
-        uninstructed=0,
-        failure=failure,
-        user_code=user_code,
-        wall_s=wall_s,
-        processes=[],
-        out=out,
-    )
-    return Evidence(plan, arrays, done)

@@ -18,10 +18,10 @@ from typing import Any
 from affinet.scenario.finding import Finding
 from affinet.scenario.sections import Scenario, ScenarioError
 from agents.loading import modules
+from netem.medium.medium import JOURNAL
 
 FOLDER = "inputs"  # in a run directory
 SCENARIO = "scenario.json"  # in a run directory, as resolved
-JOURNAL = "journal.arrows"
 _BOOK = "inputs.json"
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.plan import Plan
-from affinet.runtimes.inprocess import FlownTick, InProcessSwarm
+from affinet.runtimes.inprocess import BatchTick, InProcessSwarm
 from affinet.runtimes.side_by_side import side_by_side
 from analysis.metrics import consistency, errors
 from analysis.metrics.localization import EdgeInformation, centroid, distance, ringing, weights
@@ -161,12 +161,12 @@ class _Places:
         self._since = 0
         self._rang: list[Array] = []
 
-    def measure(self, instant: FlownTick, timeline: Timeline) -> None:
+    def measure(self, instant: BatchTick, timeline: Timeline) -> None:
         """Take in the measurements of a tick; all runs have the faults of one."""
         if self._wanted:
-            measured, fates = self._of_runs(instant.measured), self._of_runs(instant.verdicts.fate[0])
+            measured, fates = self._of_runs(instant.measured), self._of_runs(instant.acted.relayed.verdicts.fate[0])
             self._first.tick(timeline, instant.tick, measured, fates)
-            self._recent.append(self._of_runs(instant.action.estimate.reports[channels.PLACE]))
+            self._recent.append(self._of_runs(instant.acted.action.estimate.reports[channels.PLACE]))
             self._since += 1
 
     def keep(self, moment: Moment) -> None:
@@ -202,7 +202,7 @@ def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any
         plan.world,
         position=moment.position,
         measured=moment.measured,
-        fates=moment.fates[0],
+        fates=moment.entry.fates[0],
         estimate=moment.estimate,
         covariance=moment.covariance,
         known=moment.known,

@@ -15,6 +15,7 @@ from netem.faults import lie
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import Medium
+from netem.medium.relay import Relay
 from netem.medium.verdict import FATE_OF, Fate, Fates
 from world.books.history import Arrays
 
@@ -99,11 +100,11 @@ class _Rejudged:
 
     def _judged_again(self, timeline: Timeline, ticks: int) -> Integers:
         fates, position = self.arrays["fates"], self.arrays["position"]
-        medium = Medium(self.plan.scenario.seed, self.plan.channels, self.plan.profiles, timeline)
-        air, arrivals = medium.begin(), np.empty((ticks, *fates.shape[1:]), dtype=np.int64)
+        relay = Relay[None](Medium(self.plan.scenario.seed, self.plan.channels, self.plan.profiles, timeline))
+        arrivals = np.empty((ticks, *fates.shape[1:]), dtype=np.int64)
         for tick in range(ticks):
-            air, verdicts = medium.judge(air, tick, fates[tick] != Fate.SILENT, position[tick])
-            air, _ = medium.deliver(air, tick, verdicts)
+            verdicts = relay.decide_on(tick, fates[tick] != Fate.SILENT, position[tick]).verdicts
+            relay.finish(tick)
             arrivals[tick] = np.where(verdicts.fate <= Fate.DELAYED, verdicts.due, -1)
         return arrivals
 

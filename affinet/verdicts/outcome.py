@@ -14,17 +14,18 @@ import numpy as np
 from affinet.planning.plan import Plan
 from affinet.scenario import inputs, loading
 from affinet.verdicts import measures
-from affinet.verdicts.accounts import Accounts
 from affinet.verdicts.bites import Bite, bites
 from affinet.verdicts.measures import Figures
 from netem.faults.timeline import Timeline
-from netem.medium.verdict import Fate, Ledger
+from netem.medium.ledger import NOTHING, Accounts, Ledger
+from netem.medium.medium import JOURNAL
+from netem.medium.verdict import Fate
 from netem.processes import system_errors
 from world.books import history
 from world.books.history import Arrays, digest
 
 _SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, _SUMMARY, history.FILE, "journal.arrows", "graph.arrows", "run.rrd")
+_LEFT_BY_A_RUN = (loading.FILE, _SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
 
 Verdict = Literal["pass", "fail", "vacuous"]
 
@@ -98,11 +99,10 @@ def judge(
     timeline: Timeline,
     arrays: Arrays | None,
     *,
-    in_flight: int | None,
+    accounts: Accounts | None,
     uninstructed: int | None,
     failure: str | None,
     user_code: bool,
-    accounts: Accounts | None = None,
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
@@ -117,23 +117,23 @@ def judge(
         Its faults, where they came to lie.
     arrays
         What happened; None when the run left no arrays.
-    in_flight, uninstructed
-        Messages under way at the end, and lost though nobody ordered it; None when the run did not get that far.
+    accounts
+        What the medium has booked of its messages; None when the run did not get that far.
+    uninstructed
+        Messages lost though nobody ordered it; None when the run did not get to its end.
     failure, user_code
         Why the run ended early, if it did, and whether a user's own code is why.
-    accounts
-        What the journal says where there are no arrays.
     wall_s
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
     """
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
-    messages = _messages(arrays, accounts, in_flight, uninstructed)
+    booked = accounts or NOTHING
     faults = [] if arrays is None else bites(plan, timeline, arrays)
     wrong = [failure] if failure else []
     if not failure:
-        wrong += _what_is_wrong(arrays, messages)
+        wrong += _what_is_wrong(arrays, booked, uninstructed)
     idle = [bite for bite in faults if not bite.touched]
     empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
     empty += _untracked(arrays)
@@ -150,7 +150,7 @@ def judge(
         simulated_s=ticks * plan.world.dt,
         tracking_error=_tracking(arrays),
         errors={} if arrays is None else measures.errors(plan, timeline, arrays),
-        messages=messages,
+        messages=_messages(booked, uninstructed),
         faults=tuple(faults),
         timeline=timeline,
         processes=tuple(processes),
@@ -187,27 +187,11 @@ def prepare(plan: Plan, out: Path) -> None:
             file.write(text)
 
 
-def _messages(
-    arrays: Arrays | None, accounts: Accounts | None, in_flight: int | None, uninstructed: int | None
-) -> dict[str, Any]:
-    if arrays is not None:
-        ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
-        in_flight = ledger.outstanding if in_flight is None else in_flight
-    elif accounts is not None:
-        ledger, in_flight = accounts.ledger, accounts.in_flight
-    else:
-        ledger = Ledger(offered=0, copies=0, delivered=0, dropped={})
-    return {
-        "offered": ledger.offered,
-        "copies": ledger.copies,
-        "delivered": ledger.delivered,
-        "dropped": ledger.dropped,
-        "in_flight": in_flight,
-        "uninstructed": uninstructed,
-    }
+def _messages(booked: Accounts, uninstructed: int | None) -> dict[str, Any]:
+    return vars(booked.ledger) | {"in_flight": booked.in_flight, "uninstructed": uninstructed}
 
 
-def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]:
+def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:
     wrong = []
     if arrays is None or not np.isfinite(arrays["position"]).all():
         wrong.append("the swarm diverged: a position is not a number any more")
@@ -215,13 +199,20 @@ def _what_is_wrong(arrays: Arrays | None, messages: dict[str, Any]) -> list[str]
         wrong.append("the swarm diverged: its tracking error is too large for a number")
     elif not np.isfinite(arrays["estimate"][arrays["known"]]).all():
         wrong.append("an estimate is not a number any more")
-    if messages["uninstructed"]:
-        wrong.append(f"{messages['uninstructed']} messages were lost that nobody ordered")
-    booked = messages["delivered"] + sum(messages["dropped"].values()) + (messages["in_flight"] or 0)
-    if messages["offered"] + messages["copies"] != booked:
-        offered = f"{messages['offered']} messages offered and {messages['copies']} doubled"
-        wrong.append(f"the accounts do not close: {offered}, {booked} accounted for")
+    if uninstructed:
+        wrong.append(f"{uninstructed} messages were lost that nobody ordered")
+    if not booked.close:
+        offered = f"{booked.ledger.offered} messages offered and {booked.ledger.copies} doubled"
+        wrong.append(f"the accounts do not close: {offered}, {booked.accounted_for} accounted for")
+    if arrays is not None and accounts_of(arrays, booked.in_flight) != booked:
+        wrong.append("what the medium has booked and what the world was told do not agree")
     return wrong
+
+
+def accounts_of(arrays: Arrays, in_flight: int) -> Accounts:
+    """The accounts of a run that is known by its arrays, after which so many messages are under way."""
+    ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+    return Accounts(len(arrays["error"]), ledger, in_flight)
 
 
 def _untracked(arrays: Arrays | None) -> list[str]:

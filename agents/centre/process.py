@@ -7,16 +7,17 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import zenoh
 
 from agents.centre.filter import Centre, CentreEstimate
 from netem.core.channels import INPUT, MEASUREMENT
+from netem.core.clock import Clock, Lockstep
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
 from netem.wire.broadcasts import Broadcasts
+from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering
-from netem.wire.session import CENTRE, Login, await_subscribers, client
+from netem.wire.session import CENTRE, Login, client
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,11 @@ class CentreBrief:
 class CentreNode:
     """The centre on the network."""
 
-    def __init__(self, session: zenoh.Session, supervisor: Supervisor, brief: CentreBrief) -> None:
+    def __init__(self, session: Session, supervisor: Supervisor, brief: CentreBrief) -> None:
         self._supervisor, self._brief, self._centre = supervisor, brief, brief.centre
         keys, self._agents = Keys(brief.run), range(1, len(brief.centre.neighbours) + 1)
-        self._ears = {
-            channel: session.declare_subscriber(keys.broadcast("*", channel), zenoh.handlers.FifoChannel(4096))
-            for channel in (MEASUREMENT, INPUT)
-        }
-        self._told = {agent: session.declare_publisher(keys.told(agent)) for agent in self._agents}
+        self._ears = {channel: session.hears(keys.broadcast("*", channel), 4096) for channel in (MEASUREMENT, INPUT)}
+        self._told = {agent: session.says(keys.told(agent)) for agent in self._agents}
         self._reader, self._numbers = Broadcasts(keys, self._agents, (MEASUREMENT, INPUT)), Numbering()
         self._dimension = len(brief.centre.process) // len(brief.centre.neighbours)
         slots = zip(brief.centre.neighbours.tolist(), brief.centre.present.tolist(), strict=True)
@@ -60,12 +58,12 @@ class CentreNode:
 
     def await_everybody(self) -> None:
         """Wait until all agents listen."""
-        await_subscribers(self._told.values())
+        await_heard(self._told.values())
 
-    def run(self) -> None:
+    def run(self, clock: Clock) -> None:
         """Tick after tick: hear everybody, estimate, tell everybody."""
         state = self._centre.begin(())
-        for tick in range(self._brief.ticks):
+        for tick in clock:
             said = {channel: self._hear(channel, tick) for channel in self._ears}
             measured, seen = self._measurements(said[MEASUREMENT])
             inputs = np.array([self._input(agent, said[INPUT][agent]) for agent in self._agents])
@@ -78,8 +76,8 @@ class CentreNode:
         self._supervisor.waits(tick, "what it broadcasts", partial(_silent, self._agents, said))
         awaited = {(agent, channel) for agent in self._agents}
         while awaited:
-            sample = self._ears[channel].recv()
-            broadcast = self._reader.read(str(sample.key_expr), sample.payload.to_bytes(), tick, awaited)
+            arrived = self._ears[channel].next()
+            broadcast = self._reader.read(arrived.key, arrived.data, tick, awaited)
             awaited.remove((broadcast.src, channel))
             said[broadcast.src] = broadcast.payload
         return said
@@ -104,10 +102,10 @@ class CentreNode:
         return measured, seen
 
     def _tell(self, tick: int, told: CentreEstimate) -> None:
-        for agent, publisher in self._told.items():
+        for agent, voice in self._told.items():
             number = self._numbers.next(str(agent))
             message = messages.Told(tick, CENTRE, number, told.relative[agent - 1], told.covariance[agent - 1])
-            publisher.put(messages.pack(message))
+            voice.say(messages.pack(message))
 
 
 def _silent(agents: range, said: dict[int, Any]) -> list[str]:
@@ -118,11 +116,11 @@ def main() -> None:
     """Estimate until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(CentreBrief)
-    with supervisor.confessing(), zenoh.open(client(brief.login)) as session:
+    with supervisor.confessing(), Session(client(brief.login)) as session:
         listener = CentreNode(session, supervisor, brief)
         listener.await_everybody()
         supervisor.tell("ready")
-        listener.run()
+        listener.run(Lockstep(brief.ticks))
         supervisor.tell("done")
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.models.arrays import Integers, Mask
+from netem.core.plain import plainly
 
 Names = Sequence[str] | NDArray[np.str_]
 
+_NOTE = b"note"
 NAMES = pa.dictionary(pa.int8(), pa.string())
 
 
@@ -38,13 +41,14 @@ class Stream:
         options = pa.ipc.IpcWriteOptions(compression="zstd")
         self._stream = pa.ipc.new_stream(self._sink, schema, options=options)
 
-    def write(self, columns: Mapping[str, Any]) -> None:
-        """More rows, as a column for each name of the schema."""
+    def write(self, columns: Mapping[str, Any], note: Any = None) -> None:
+        """More rows, as a column for each name of the schema; and a note about the table so far, of plain values."""
         arrays = [
             column if isinstance(column, pa.Array) else pa.array(column, self._schema.field(name).type)
             for name, column in columns.items()
         ]
-        self._stream.write_batch(pa.record_batch(arrays, schema=self._schema))
+        beside = None if note is None else {_NOTE: json.dumps(note, default=plainly)}
+        self._stream.write_batch(pa.record_batch(arrays, schema=self._schema), custom_metadata=beside)
 
     def close(self) -> None:
         """End the file."""
@@ -75,16 +79,37 @@ def read(path: Path, schema: Any) -> Any:
     TableError
         When there is none, or it has other columns.
     """
+    stream = _opened(path, schema)
+    return pa.Table.from_batches([batch for batch, _ in _batches(stream)], schema=stream.schema)
+
+
+def read_note(path: Path, schema: Any) -> Any:
+    """The last note in the table, None where there is none.
+
+    Raises
+    ------
+    TableError
+        As for `read`.
+    """
+    last = None
+    for _, beside in _batches(_opened(path, schema)):
+        last = beside or last
+    return None if last is None else json.loads(last[_NOTE])
+
+
+def _opened(path: Path, schema: Any) -> Any:
     try:
         stream = pa.ipc.open_stream(pa.memory_map(str(path)))
     except (OSError, pa.ArrowInvalid) as error:
         raise TableError(f"{path}: no such table: {error}") from error
     if stream.schema.names != schema.names:
         raise TableError(f"{path}: its columns are {stream.schema.names}, not {schema.names}")
-    batches = []
+    return stream
+
+
+def _batches(stream: Any) -> Iterator[tuple[Any, Any]]:
     while True:
         try:
-            batches.append(stream.read_next_batch())
+            yield stream.read_next_batch_with_custom_metadata()
         except (StopIteration, OSError, pa.ArrowInvalid):  # the end, or where a killed run stopped writing
-            break
-    return pa.Table.from_batches(batches, schema=stream.schema)
+            return

@@ -6,7 +6,6 @@ the timeline. Healing ends what was injected; what the scenario scripted stays.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -60,26 +59,19 @@ class Answer:
     refused: str | None
 
 
-def obey(order: Order, tick: int, scripted: Sequence[Fault], injected: Sequence[Fault], links: Links) -> Obeyed:
-    """The faults injected after an order that holds from `tick` on, and the answer to it."""
-    after, refused = tuple(injected), None
+def obey(order: Order, tick: int, timeline: Timeline) -> tuple[Timeline, Answer]:
+    """The timeline after an order that holds from `tick` on, and the answer to it."""
+    injected, refused = timeline.injected, None
     if order.action is OrderAction.HEAL:
-        after = tuple(replace(fault, end=tick) if fault.active(tick) else fault for fault in injected)
+        injected = tuple(replace(fault, end=tick) if fault.active(tick) else fault for fault in injected)
     if order.action is OrderAction.INJECT:
-        refused = _why_not(order.fault, links)
+        refused = _why_not(order.fault, timeline.links)
         if refused is None and order.fault is not None:
             lasts = order.fault.end
-            after = (*injected, replace(order.fault, start=tick, end=None if lasts is None else tick + lasts))
-    holds = tuple(fault.describe() for fault in (*scripted, *after) if fault.active(tick))
-    return Obeyed(after, Answer(tick, holds, refused))
-
-
-@dataclass(frozen=True)
-class Obeyed:
-    """What an order led to."""
-
-    injected: tuple[Fault, ...]
-    answer: Answer
+            injected = (*injected, replace(order.fault, start=tick, end=None if lasts is None else tick + lasts))
+    after = timeline if injected == timeline.injected else timeline.facing(injected)
+    holds = tuple(fault.describe() for fault in after.faults if fault.active(tick))
+    return after, Answer(tick, holds, refused)
 
 
 def _why_not(fault: Fault | None, links: Links) -> str | None:

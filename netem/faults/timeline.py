@@ -105,16 +105,25 @@ class Timeline:
     ----------
     links
         Of the nominal graph.
-    faults
-        All of them.
+    scripted
+        Faults of the scenario.
     triggers
         Those that set some of them off.
+    injected
+        Faults that were put on top while the run flew.
     """
 
-    def __init__(self, links: Links, faults: Sequence[Fault], triggers: Sequence[Trigger] = ()) -> None:
+    def __init__(
+        self,
+        links: Links,
+        scripted: Sequence[Fault],
+        triggers: Sequence[Trigger] = (),
+        injected: Sequence[Fault] = (),
+    ) -> None:
         """Fails with ValueError where a fault names a link, group or agent that does not exist."""
         self.links = links
-        self.faults = tuple(faults)
+        self.scripted, self.injected = tuple(scripted), tuple(injected)
+        self.faults = (*self.scripted, *self.injected)
         self.triggers = tuple(triggers)
         self._link_masks = [self._links_held(fault) for fault in self.faults]
         self._agent_masks = [self._agents_held(fault) for fault in self.faults]
@@ -139,15 +148,12 @@ class Timeline:
     def fired(self, triggers: Iterable[int], tick: int) -> Timeline:
         """The timeline once these triggers have fired in this tick."""
         chosen = set(triggers)
-        return Timeline(
-            self.links,
-            [_placed(fault, tick) if fault.trigger in chosen else fault for fault in self.faults],
-            self.triggers,
-        )
+        placed = [_placed(fault, tick) if fault.trigger in chosen else fault for fault in self.scripted]
+        return Timeline(self.links, placed, self.triggers, self.injected)
 
-    def facing(self, injected: Iterable[Fault]) -> Timeline:
-        """The timeline with faults on top."""
-        return Timeline(self.links, (*self.faults, *injected), self.triggers)
+    def facing(self, injected: Sequence[Fault]) -> Timeline:
+        """The timeline with these faults injected, and no others."""
+        return Timeline(self.links, self.scripted, self.triggers, injected)
 
     def starting(self, tick: int) -> list[Fault]:
         """Faults whose first tick this is."""

@@ -14,9 +14,11 @@ from analysis.models.arrays import Integers, Mask
 from netem.impairments.corrupt import Mark, Marks
 from netem.medium.verdict import PASSED, Fate, Fates
 
-# Rows of `Air.under_way`.
+# Rows of `MediumState.under_way`.
 _DUE, _SENT, _CELL, _CONTENT, _MARK, _NUMBER = range(6)
 _MARK_BITS = 3
+# Columns of `Entry.odd` and `Entry.dropped`.
+_COPY_DUE, _FATE = 4, 4
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED, _STALE = int(Fate.DELIVERED), int(Fate.DELAYED), int(Mark.STALE)
@@ -125,7 +127,7 @@ class Delivery(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """What the journal is told of one tick.
+    """What is written down of one tick of the medium.
 
     Parameters
     ----------
@@ -133,17 +135,29 @@ class Entry(NamedTuple):
         Verdicts, shape (C, L).
     odd
         Messages that passed late, twice or corrupted, rows of `out_of_the_ordinary`.
-    dropped, released
-        What became of messages under way, rows as in `Delivery`.
+    apart, late, dropped, released
+        What became of messages under way, as in `Delivery`.
     injected
         All faults injected so far, in plain form, when one was injected or healed.
     """
 
     fates: Fates
     odd: Integers
+    apart: Integers
+    late: int
     dropped: Integers
     released: Integers
     injected: list[Any] | None
+
+    @property
+    def copies(self) -> int:
+        """How many messages were doubled."""
+        return int(np.count_nonzero(self.odd[:, _COPY_DUE] >= 0))
+
+    @property
+    def dropped_by_fate(self) -> Integers:
+        """How many messages under way were dropped, by fate, shape (fates,)."""
+        return np.bincount(self.dropped[:, _FATE], minlength=len(Fate))
 
 
 def deliver(air: MediumState, tick: int, verdicts: Verdicts, doom: Fates, holds: Mask) -> tuple[MediumState, Delivery]:

@@ -24,9 +24,10 @@ from netem.core.plain import from_plain, plainly
 from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts
+from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.verdict import Fate
+from netem.processes import system_errors
 
-FILE = "journal.arrows"
 VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")
 _DELIVERED, _DELAYED, _DROPPED, _COPIED, _RELEASED = range(5)
 _REASON = np.array([fate.label for fate in Fate])
@@ -53,7 +54,7 @@ class JournalError(ValueError):
 
 
 class Writer:
-    """Writes the journal of a run.
+    """Writes the journal of a run, and with it the accounts so far; what is entered is written when it is closed at the latest.
 
     Parameters
     ----------
@@ -61,13 +62,25 @@ class Writer:
         Of the file.
     links, channels
         What the rows of the verdicts stand for.
+    batch
+        How many ticks are written at once.
+
+    Raises
+    ------
+    OSError
+        By all its methods: when something cannot be written, from the first byte to the last.
     """
 
-    def __init__(self, path: Path, links: Links, channels: Sequence[str]) -> None:
+    def __init__(self, path: Path, links: Links, channels: Sequence[str], batch: int) -> None:
+        self._path = path
         self._links = links
         self._channels = list(channels)
         self._offered = np.zeros((len(channels), len(links)), dtype=np.int64)
-        self._stream = Stream(path, SCHEMA)
+        self._batch = batch
+        self._entered: list[Entry] = []
+        self.accounts = NOTHING
+        with system_errors.about(path):
+            self._stream = Stream(path, SCHEMA)
 
     def __enter__(self) -> Writer:
         return self
@@ -75,10 +88,29 @@ class Writer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        with system_errors.afterwards(self._write, self.close):
+            if error is not None:
+                raise error
 
-    def write(self, first: int, entries: Sequence[Entry]) -> None:
-        """Write down consecutive ticks."""
+    def enter(self, entry: Entry, in_flight: int) -> None:
+        """Write down the next tick, after which so many messages are under way."""
+        self._entered.append(entry)
+        self._in_flight = in_flight
+        if len(self._entered) == self._batch:
+            self._write()
+
+    def close(self) -> None:
+        """End the file."""
+        with system_errors.about(self._path):
+            self._stream.close()
+
+    def _write(self) -> None:
+        if not self._entered:
+            return
+        entries, self._entered = self._entered, []
+        first = self.accounts.ticks
+        ledger = self.accounts.ledger.plus(_ledger(entries))
+        self.accounts = Accounts(first + len(entries), ledger, self._in_flight)
         parts = [rows for n, entry in enumerate(entries) for rows in self._of_tick(first + n, entry)]
         columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
         events = {
@@ -86,11 +118,8 @@ class Writer:
             for n, entry in enumerate(entries)
             if entry.injected is not None
         }
-        self._stream.write(self._table(_Rows(*columns), events))
-
-    def close(self) -> None:
-        """End the file."""
-        self._stream.close()
+        with system_errors.about(self._path):
+            self._stream.write(self._table(_Rows(*columns), events), self.accounts)
 
     def _of_tick(self, tick: int, entry: Entry) -> list[_Rows]:
         due, mark, copy_due = _dense(tick, entry.fates.shape, entry.odd)
@@ -125,6 +154,15 @@ class Writer:
             "mark": named(rows.mark, _MARK, rows.mark == Mark.NONE),
             "event": event,
         }
+
+
+def _ledger(entries: Sequence[Entry]) -> Ledger:
+    return Ledger.of(
+        fates=np.stack([entry.fates for entry in entries]),
+        copies=np.array([entry.copies for entry in entries]),
+        late=np.array([entry.late for entry in entries]),
+        dropped=np.stack([entry.dropped_by_fate for entry in entries]),
+    )
 
 
 class _Rows(NamedTuple):
@@ -165,6 +203,21 @@ def read(path: Path) -> Any:
         return arrow.read(path, SCHEMA)
     except arrow.TableError as error:
         raise JournalError(str(error)) from error
+
+
+def accounts(path: Path) -> Accounts | None:
+    """The accounts of a run, as far as its journal was written; None where it holds no tick.
+
+    Raises
+    ------
+    JournalError
+        When it is no journal.
+    """
+    try:
+        plain = arrow.read_note(path, SCHEMA)
+    except arrow.TableError as error:
+        raise JournalError(str(error)) from error
+    return None if plain is None else from_plain(Accounts, plain)
 
 
 def injected(table: Any) -> tuple[Fault, ...]:

@@ -24,6 +24,8 @@ from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
 from netem.medium.link_model import LinkModel, Memory
 from netem.medium.verdict import PASSED, Fate, Fates, doom, standing
 
+JOURNAL = "journal.arrows"  # in a run directory
+
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED, _PAUSED, _SCRIPTED, _DROPOUT = (
     np.uint8(fate) for fate in (Fate.DELIVERED, Fate.DELAYED, Fate.PAUSED, Fate.SCRIPTED, Fate.DROPOUT)
@@ -111,6 +113,10 @@ class Medium:
     def begin(self) -> MediumState:
         """The air before the first tick."""
         return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
+
+    def offered(self, awake: Mask) -> Mask:
+        """Where messages are offered when these agents (N,) speak on all their links, shape (C, L); all sensors sense."""
+        return awake[self._links.src - 1] | self._sensing
 
     def judge(self, air: MediumState, tick: int, offered: Mask, position: Array | None) -> tuple[MediumState, Verdicts]:
         """The verdict on every message offered in a tick.

@@ -1,20 +1,17 @@
-"""What can become of a message, and the accounts that must close."""
+"""What can become of a message, and what the timeline makes of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.models.arrays import Integers
 from netem.core.links import Links
 from netem.faults.fault import Verb
 from netem.faults.timeline import Conditions
 
 Fates = NDArray[np.uint8]
-Counts = Integers
 
 # No layer holds the message: above every reason, so that the strongest reason is the smallest number.
 PASSED = np.uint8(255)
@@ -85,42 +82,3 @@ def doom(links: Links, now: Conditions) -> Fates:
     ):
         reason[held] = fate
     return reason
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """Every message accounted for: offered + copies = delivered + dropped + in flight."""
-
-    offered: int
-    copies: int
-    delivered: int
-    dropped: dict[str, int]
-
-    @classmethod
-    def of(cls, fates: Fates, copies: Counts, late: Counts, dropped: Counts) -> Ledger:
-        """The accounts of a run.
-
-        Parameters
-        ----------
-        fates
-            Verdicts on what was offered, shape (ticks, C, L).
-        copies
-            Duplicates made in each tick, shape (ticks,).
-        late
-            Messages and copies that each tick delivered from under way, shape (ticks,).
-        dropped
-            Messages under way that each tick dropped, by fate, shape (ticks, fates).
-        """
-        offered = np.bincount(fates.ravel(), minlength=len(Fate))
-        lost = offered + dropped.sum(axis=0)
-        return cls(
-            offered=int(offered.sum() - offered[Fate.SILENT]),
-            copies=int(copies.sum()),
-            delivered=int(offered[Fate.DELIVERED] + late.sum()),
-            dropped={reason.label: int(lost[reason]) for reason in REASONS if lost[reason]},
-        )
-
-    @property
-    def outstanding(self) -> int:
-        """Messages that must still be in flight for the accounts to close."""
-        return self.offered + self.copies - self.delivered - sum(self.dropped.values())

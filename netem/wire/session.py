@@ -1,4 +1,4 @@
-"""Zenoh configuration of a run: a hermetic star on loopback, with a name and a password for each process.
+"""The network of a run as Zenoh is told of it: a hermetic star on loopback, with a name and a password for each process.
 
 The medium is the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's
 messages to any other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
@@ -6,15 +6,12 @@ messages to any other that subscribes, so access control at the hub says, by def
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
-
-import zenoh
 
 from netem.core.channels import INPUT, MEASUREMENT
 from netem.wire.keys import Keys
@@ -83,7 +80,7 @@ class Login:
     password: str
 
 
-def client(login: Login, patience_s: float | None = None) -> zenoh.Config:
+def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
     """Configuration of an agent or the world: connects to the hub, and to nobody else.
 
     It tries for as long as `patience_s`; None for ever, where a launcher watches.
@@ -102,7 +99,7 @@ def client(login: Login, patience_s: float | None = None) -> zenoh.Config:
     )
 
 
-def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> zenoh.Config:
+def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
     """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do."""
     return _config(
         {
@@ -115,31 +112,16 @@ def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -
     )
 
 
-def await_subscribers(publishers: Iterable[zenoh.Publisher]) -> None:
-    """Wait until each publisher has somebody to hear it: what it sends from then on is not lost at the start."""
-    for publisher in publishers:
-        changes = publisher.declare_matching_listener(zenoh.handlers.FifoChannel(4))
-        matching: Any = publisher.matching_status
-        while not matching.matching:
-            matching = changes.recv()
-        changes.undeclare()  # type: ignore[no-untyped-call]
-
-
-def _config(base: dict[str, Any], login: Login, **auth: str) -> zenoh.Config:
-    return zenoh.Config.from_json5(
-        json.dumps(
-            base
-            | {
-                "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-                "transport": {
-                    "shared_memory": {"enabled": False},
-                    "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
-                    "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
-                    "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
-                },
-            }
-        )
-    )
+def _config(base: dict[str, Any], login: Login, **auth: str) -> dict[str, Any]:
+    return base | {
+        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {
+            "shared_memory": {"enabled": False},
+            "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
+            "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
+            "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
+        },
+    }
 
 
 def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:

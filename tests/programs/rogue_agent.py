@@ -7,6 +7,7 @@ import zenoh
 
 from agents.process import AgentBrief, AgentNode
 from netem.processes.supervised import Supervisor
+from netem.wire.carrier import Session
 from netem.wire.keys import Keys
 from netem.wire.session import client
 
@@ -17,7 +18,8 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     keys = Keys(brief.run)
-    with zenoh.open(client(brief.login)) as session, zenoh.open(client(brief.login)) as side:
+    aside = zenoh.Config.from_json5(json.dumps(client(brief.login)))
+    with Session(client(brief.login)) as session, zenoh.open(aside) as side:
         node = AgentNode(session, supervisor, brief)
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
         private = [key for peer in PEERS for key in (keys.inbox(peer), keys.told(peer))]

@@ -4,10 +4,9 @@ import os
 import sys
 import time
 
-import zenoh
-
 from agents.process import AgentBrief, AgentNode
 from netem.processes.supervised import Supervisor
+from netem.wire.carrier import Session
 from netem.wire.session import client
 
 TICK = 4
@@ -36,7 +35,7 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     wrong = sys.argv[1] if brief.agent == 2 or sys.argv[1] == "thinks" else ""
-    with zenoh.open(client(brief.login)) as session:
+    with Session(client(brief.login)) as session:
         node = Wayward(session, supervisor, brief, wrong)
         node.await_everybody()
         supervisor.tell("ready")

@@ -19,13 +19,16 @@ EXEMPT = {
         netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.jamming.Zone.jammed
         netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
         netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
-        netem.core.draws.DrawnAhead.at
+        netem.core.draws.DrawnAhead.at netem.medium.relay.Relay.decide netem.medium.relay.Relay.decide_on
+        netem.medium.relay.Relay.as_told netem.medium.relay.Relay.as_it_arrives
     """,
     WHOLE: """
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
         netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
-        netem.medium.verdict.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
+        netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
+        netem.medium.medium.Medium.offered netem.medium.relay.Relay.lies netem.medium.relay.Relayed.arriving
+        netem.medium.relay.Relayed.awake netem.medium.relay.Relayed.seen netem.medium.relay.changed_on_the_way
         netem.core.links.Links.degree netem.core.links.Links.present netem.core.links.Links.slots
         netem.core.links.Links.neighbours netem.core.links.Links.back netem.core.links.Links.touching
         netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
@@ -44,7 +47,7 @@ EXEMPT = {
         world.physics.target.MovingTarget.step world.physics.sensors.astray world.physics.world.World.begin
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
         world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
-        world.physics.world.World.odometry world.physics.world.World.step
+        world.physics.world.World.odometry world.physics.world.World.step world.carrier.ZenohCarrier.carry world.flight.fly
     """,
     ONCE: """
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
@@ -58,7 +61,8 @@ EXEMPT = {
         analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
     """,
     WRITTEN: """
-        netem.medium.journal.Writer.write netem.medium.journal.Recorded.verdicts
+        netem.medium.journal.Writer.enter netem.medium.in_flight.Entry.dropped_by_fate
+        netem.medium.relay.Relayed.entry netem.medium.journal.Recorded.verdicts
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
         world.books.history.digest world.books.history.one_nan world.books.localized.FirstMeasurements.of
@@ -79,7 +83,8 @@ EXEMPT = {
     PROTOCOL: """
         agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
-        agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance
+        agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance world.flight.Acted.input
+        world.flight.Carrier.carry
     """,
     FLOWN: """
         agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act

@@ -47,7 +47,7 @@ _BY_TICK = {
 }
 TAKEN = frozenset(_BY_TICK)  # names that no report can have
 UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
-_MARK, _COPY_DUE, _FATE = 3, 4, 4  # columns of `Moment.odd` and `Moment.dropped`
+_MARK = 3  # column of `Entry.odd`
 
 
 class Moment(NamedTuple):
@@ -69,14 +69,8 @@ class Moment(NamedTuple):
         Whether what an agent sees determines a local map, 1 or 0, or `UNTOLD`, shape (N,).
     reports
         What else the agents' estimators said, by name, shape (N, *), NaN of those who did not.
-    fates
-        Verdicts, shape (C, L).
-    odd
-        Messages that passed late, twice or corrupted, rows of `air.out_of_the_ordinary`.
-    apart, late, dropped, released
-        What became of messages under way, as in `air.Delivery`.
-    injected
-        All faults injected so far, in plain form, when one was injected or healed.
+    entry
+        What became of the messages.
     """
 
     position: Any
@@ -89,13 +83,7 @@ class Moment(NamedTuple):
     psi: Any
     feasible: Any
     reports: Mapping[str, Any]
-    fates: Any
-    odd: Any
-    apart: Any
-    late: int
-    dropped: Any
-    released: Any
-    injected: list[Any] | None
+    entry: Entry
 
 
 @dataclass(frozen=True)
@@ -116,8 +104,6 @@ class Moments:
         How many messages were doubled, and how many arrived late, shape (T,).
     dropped
         How many were dropped under way, by fate, shape (T, fates).
-    entries
-        What the journal is told.
     """
 
     first: int
@@ -137,7 +123,6 @@ class Moments:
     dropped: Integers
     target: Array
     error: Array
-    entries: list[Entry]
 
     @property
     def ticks(self) -> Integers:
@@ -149,11 +134,8 @@ def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments
     """Consecutive moments as arrays, with what they are measured against."""
     ticks = np.arange(first, first + len(moments))
     where, target = (np.array([getattr(moment, name) for moment in moments]) for name in ("position", "target"))
-    fates = np.array([moment.fates for moment in moments], dtype=np.uint8)
-    entries = [
-        Entry(each, _rows(moment.odd), _rows(moment.dropped), _rows(moment.released), moment.injected)
-        for each, moment in zip(fates, moments, strict=True)
-    ]
+    entries = [moment.entry for moment in moments]
+    fates = np.array([entry.fates for entry in entries], dtype=np.uint8)
     return Moments(
         first=first,
         position=where,
@@ -166,29 +148,22 @@ def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments
         feasible=np.array([moment.feasible for moment in moments], dtype=np.int8),
         reports={name: np.array([moment.reports[name] for moment in moments]) for name in moments[0].reports},
         fates=fates,
-        newest=_newest(ticks, fates, entries, moments),
-        copies=np.array([np.count_nonzero(entry.odd[:, _COPY_DUE] >= 0) for entry in entries]),
-        late=np.array([moment.late for moment in moments]),
-        dropped=np.array([np.bincount(entry.dropped[:, _FATE], minlength=len(Fate)) for entry in entries]),
+        newest=_newest(ticks, fates, entries),
+        copies=np.array([entry.copies for entry in entries]),
+        late=np.array([entry.late for entry in entries]),
+        dropped=np.array([entry.dropped_by_fate for entry in entries]),
         target=target,
         error=tracking_error(where, target, timeline.present(ticks.tolist())),
-        entries=entries,
     )
 
 
-def _rows(given: Any) -> Integers:
-    """Rows that came over the wire, or are arrays already; none have the width of the widest."""
-    rows = np.asarray(given, dtype=np.int64)
-    return rows if rows.ndim == 2 else np.empty((0, 5), dtype=np.int64)
-
-
-def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry], moments: Sequence[Moment]) -> NDArray[np.int32]:
+def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry]) -> NDArray[np.int32]:
     newest = np.where(fates == Fate.DELIVERED, ticks[:, None, None], -1)
-    for row, (entry, moment) in enumerate(zip(entries, moments, strict=True)):
+    for row, entry in enumerate(entries):
         marked = entry.odd[entry.odd[:, _MARK] != Mark.NONE]
         newest[row, marked[:, 0], marked[:, 1]] = -1
-        if len(moment.apart):
-            newest[row] = newest_of(newest[row], _rows(moment.apart))
+        if len(entry.apart):
+            newest[row] = newest_of(newest[row], entry.apart)
     return newest.astype(np.int32)
 
 

@@ -1,4 +1,4 @@
-"""What a run leaves behind while it flies: journal, realised graph and recording, a batch of ticks at a time."""
+"""What the world of a run leaves behind while it flies: realised graph and recording, a batch of ticks at a time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pyarrow as pa
 
 from netem.core.arrow import NAMES, Stream, named
 from netem.faults.timeline import Timeline
-from netem.medium.journal import FILE, Writer
 from netem.processes import system_errors
 from world.books.history import Moments
 from world.books.realised import GraphWatch, columns
@@ -34,7 +33,7 @@ GRAPH_SCHEMA = pa.schema(
 
 
 class RunWriter:
-    """Writes the journal, and the recording if one is wanted.
+    """Writes the realised graph, and the recording if one is wanted.
 
     Parameters
     ----------
@@ -55,7 +54,6 @@ class RunWriter:
         self._every = books.every
         self._channels = list(channels)
         self._out = out
-        self._journal = Writer(out / FILE, world.links, channels)
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
         self._watch = GraphWatch(world.formation, world.links, world.dt, books.window)
         self._recorder = None
@@ -77,19 +75,17 @@ class RunWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        def close_tables() -> None:
-            with system_errors.about(self._out), system_errors.afterwards(self._graph.close):
-                self._journal.close()
+        def close_graph() -> None:
+            with system_errors.about(self._out / GRAPH):
+                self._graph.close()
 
-        closing = [close_tables, *([self._recorder.close] if self._recorder else [])]
+        closing = [close_graph, *([self._recorder.close] if self._recorder else [])]
         with system_errors.afterwards(*closing):
             if error is not None:
                 raise error
 
     def write(self, moments: Moments, timeline: Timeline) -> None:
         """Write down consecutive ticks, flown under this timeline."""
-        with system_errors.about(self._out / FILE):
-            self._journal.write(moments.first, moments.entries)
         realised = self._watch.follow(moments.first, moments.newest, timeline, self._every)
         table = columns(realised, self._channels)
         with system_errors.about(self._out / GRAPH):

@@ -1,0 +1,150 @@
+"""All agents of a run as one batch in this process, and the medium between them: what they say is carried as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from affinet.planning.plan import Plan
+from agents.agent import AgentAction, AgentState, renew
+from agents.brief import Reading
+from agents.centre.filter import Centre
+from agents.exchange import Fields, Heard
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core import channels
+from netem.faults.timeline import Timeline
+from netem.impairments.corrupt import Mark, Marks
+from netem.medium.in_flight import Delivery
+from netem.medium.medium import Medium
+from netem.medium.relay import Relay, Relayed, changed_on_the_way
+from netem.processes.user_code import UserCodeError
+from world.physics.world import Scene
+
+Broadcasts = Mapping[str, Fields]
+
+
+class BatchActed(NamedTuple):
+    """What all agents decided and believed, and what the medium made of their messages."""
+
+    input: Array
+    action: AgentAction
+    relayed: Relayed
+
+
+class ArrayCarrier:
+    """Carries a run's messages in this process.
+
+    Parameters
+    ----------
+    plan
+        What is flown.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._world = plan.world
+        self._links = plan.world.links
+        self._channels = plan.channels
+        self._agents = plan.agents
+        self._numbers = np.arange(1, self._links.agents + 1)
+        self._fields = self._agents.channels()
+        self._state = self._fresh = self._agents.init(self._numbers.shape)
+        medium = Medium(plan.world.seed, plan.channels, plan.profiles, plan.timeline, plan.recorded())
+        self._relay = Relay[Broadcasts](medium)
+        self._centre = plan.centre
+        if self._centre:
+            self._whole = self._centre.begin((plan.world.swarms,))
+
+    @property
+    def timeline(self) -> Timeline:
+        """The faults of the run, as far as they are known by now."""
+        return self._relay.timeline
+
+    @property
+    def in_flight(self) -> int:
+        """Messages under way."""
+        return self._relay.in_flight
+
+    def fire(self, tick: int, triggers: Sequence[int]) -> None:
+        """From this tick on, what waited for these triggers holds."""
+        self._relay.fire(triggers, tick)
+
+    def carry(self, tick: int, scene: Scene, measured: Array) -> BatchActed:
+        """One tick of everybody.
+
+        Raises
+        ------
+        UserCodeError
+            When estimator or law do something wrong: in which tick.
+        """
+        try:
+            return self._tick(tick, scene, measured)
+        except UserCodeError as error:
+            error.tick = tick
+            raise
+
+    def _tick(self, tick: int, scene: Scene, sensed: Array) -> BatchActed:
+        links, before = self._links, self._welcomed_back(tick)
+        relayed = self._relay.decide(tick, scene.position)
+        idle = relayed.conditions.idle
+        seen = relayed.seen[links.slots] & links.present
+        measured = np.where(seen[..., None], sensed[links.slots], 0.0)
+        motion = self._world.odometry(scene)
+        state, said = self._agents.sense(before, measured, seen, motion)
+        told = {name: self._relay.as_told(tick, name, self._numbers, fields) for name, fields in said.items()}
+        self._relay.keep(tick, told)
+        heard = {name: self._hear(tick, name, relayed.delivery) for name in self._fields}
+        if self._centre:
+            heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
+        sighting = self._world.sighting(tick, scene)
+        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
+        self._state = renew(state, before, idle) if idle.any() else state
+        self._relay.finish(tick)
+        return BatchActed(np.where(idle[:, None], 0.0, action.input), action, relayed)
+
+    def _welcomed_back(self, tick: int) -> AgentState:
+        timeline = self.timeline
+        if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
+            return renew(self._state, self._fresh, np.isin(self._numbers, [*cold]))
+        return self._state
+
+    def _from_the_centre(self, centre: Centre, measured: Array, seen: Mask, inputs: Array) -> Heard:
+        def of_swarms(array: Any) -> Any:
+            return array.reshape(self._world.swarms, len(centre.neighbours), *array.shape[1:])
+
+        self._whole, told = centre.step(self._whole, of_swarms(measured), of_swarms(seen), of_swarms(inputs))
+        fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in told._asdict().items()}
+        return Heard(fields, seen)
+
+    def _reading(self, tick: int) -> Reading:
+        """What the clocks say; one reading for all, where they agree, spares looking up the manoeuvre for each."""
+        clocks = self.timeline.clock(tick)
+        return int(clocks[0]) if (clocks == clocks[0]).all() else clocks
+
+    def _hear(self, tick: int, channel: str, delivery: Delivery) -> Heard:
+        row, links = self._channels.index(channel), self._links
+        content = np.where(links.present, delivery.newest[row, links.slots], -1)
+        fresh = content >= 0
+        spoken = np.unique(content[fresh]).tolist() or [tick]
+        gathered = {name: self._gather(channel, name, content, spoken) for name in self._fields[channel]}
+        mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
+        return Heard(self._changed(gathered, row, content, mark) if mark.any() else gathered, fresh)
+
+    def _gather(self, channel: str, field: str, content: Integers, spoken: list[int]) -> Any:
+        gathered = np.zeros(0)
+        for number, tick in enumerate(spoken):
+            values = self._relay.said(tick)[channel][field][self._links.neighbours]
+            chosen = (content == tick).reshape(content.shape + (1,) * (values.ndim - content.ndim))
+            gathered = np.where(chosen, values, np.zeros_like(values) if number == 0 else gathered)
+        return gathered
+
+    def _changed(self, fields: dict[str, Any], row: int, content: Integers, mark: Marks) -> dict[str, Any]:
+        struck = np.nonzero(changed_on_the_way(mark))
+        link = self._links.slots[struck]
+        whole = {name: field[struck] for name, field in fields.items()}
+        wrong = self._relay.as_it_arrives(content[struck], np.full(link.shape, row), link, mark[struck], whole)
+        arriving = {name: field.copy() for name, field in fields.items()}
+        for name, field in wrong.items():
+            arriving[name][struck] = field
+        return arriving

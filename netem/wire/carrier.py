@@ -1,0 +1,167 @@
+"""Bytes carried by key over Zenoh: the one place that knows it. Everybody else hears, says, asks and answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from types import TracebackType
+from typing import Any
+
+import zenoh
+
+_WAITING_CHANGES = 4
+
+
+class NotCarried(RuntimeError):
+    """Nobody can be reached, or nobody answers: why."""
+
+
+class Arrived:
+    """Bytes that arrived, and the key they arrived on."""
+
+    def __init__(self, sample: zenoh.Sample) -> None:
+        self._sample = sample
+
+    @property
+    def key(self) -> str:
+        """The key."""
+        return str(self._sample.key_expr)
+
+    @property
+    def data(self) -> bytes:
+        """The bytes."""
+        return self._sample.payload.to_bytes()
+
+
+class Ear:
+    """Hears what is said on a key."""
+
+    def __init__(self, subscriber: Any) -> None:
+        self._subscriber = subscriber
+
+    def next(self) -> Arrived:
+        """Wait for the next message, in the order of their arrival."""
+        return Arrived(self._subscriber.recv())
+
+
+class Voice:
+    """Says something on a key."""
+
+    def __init__(self, publisher: zenoh.Publisher) -> None:
+        self._publisher = publisher
+
+    def say(self, data: bytes) -> None:
+        """Say it to whoever hears the key."""
+        self._publisher.put(data)
+
+    def await_heard(self) -> None:
+        """Wait until somebody hears: what is said from then on is not lost at the start."""
+        changes = self._publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
+        matching: Any = self._publisher.matching_status
+        while not matching.matching:
+            matching = changes.recv()
+        changes.undeclare()  # type: ignore[no-untyped-call]
+
+
+class Question:
+    """A question that somebody waits for an answer to; a block gives it back."""
+
+    def __init__(self, key: str, query: zenoh.Query) -> None:
+        self._key, self._query = key, query
+
+    def __enter__(self) -> Question:
+        self._query.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._query.__exit__(kind, error, trace)  # type: ignore[no-untyped-call]
+
+    @property
+    def data(self) -> bytes:
+        """What was asked."""
+        return self._query.payload.to_bytes() if self._query.payload else b""
+
+    def answer(self, data: bytes) -> None:
+        """Answer it."""
+        self._query.reply(self._key, data)
+
+    def refuse(self, why: str) -> None:
+        """Say why there is no answer."""
+        self._query.reply_err(why.encode())
+
+
+class Questions:
+    """What is asked on a key."""
+
+    def __init__(self, key: str, queryable: Any) -> None:
+        self._key, self._queryable = key, queryable
+
+    def waiting(self) -> Question | None:
+        """The next one that waits, if one does."""
+        query = self._queryable.try_recv()
+        return None if query is None else Question(self._key, query)
+
+
+class Session:
+    """One process on the network; a block leaves it.
+
+    Parameters
+    ----------
+    config
+        Where to connect or listen, and as whom: `session.client` or `session.hub`.
+
+    Raises
+    ------
+    NotCarried
+        When it cannot connect, or listen.
+    """
+
+    def __init__(self, config: Mapping[str, Any]) -> None:
+        try:
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+        except zenoh.ZError as error:
+            raise NotCarried(str(error)) from error
+
+    def __enter__(self) -> Session:
+        self._session.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._session.__exit__(kind, error, trace)  # type: ignore[no-untyped-call]
+
+    def hears(self, key: str, room: int) -> Ear:
+        """Hear a key; so many messages may wait."""
+        return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
+
+    def says(self, key: str) -> Voice:
+        """Say something on a key."""
+        return Voice(self._session.declare_publisher(key))
+
+    def answers(self, key: str, room: int) -> Questions:
+        """Answer questions on a key; so many may wait."""
+        return Questions(key, self._session.declare_queryable(key, zenoh.handlers.FifoChannel(room)))
+
+    def ask(self, key: str, data: bytes, patience_s: float) -> bytes:
+        """Ask whoever answers on a key.
+
+        Raises
+        ------
+        NotCarried
+            When nobody answers for so many seconds, or whoever does refuses.
+        """
+        for reply in self._session.get(key, payload=data, timeout=patience_s):
+            if reply.err is not None:
+                raise NotCarried(f"refused: {reply.err.payload.to_string()}")
+            if reply.ok is not None:
+                return reply.ok.payload.to_bytes()
+        raise NotCarried(f"no answer within {patience_s:g} s")
+
+
+def await_heard(voices: Iterable[Voice]) -> None:
+    """Wait until each of them has somebody to hear it."""
+    for voice in voices:
+        voice.await_heard()

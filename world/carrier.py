@@ -1,0 +1,175 @@
+"""The world's side of a run over processes: what is sensed goes to the medium, what agents do and the verdicts come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from analysis.models.arrays import Array
+from netem.core.plain import from_plain
+from netem.faults.fault import Fault
+from netem.faults.timeline import Timeline
+from netem.medium.in_flight import Entry
+from netem.processes.supervised import Supervisor, called
+from netem.wire import messages
+from netem.wire.carrier import Session, await_heard
+from netem.wire.keys import Keys
+from netem.wire.sequence import Numbering
+from netem.wire.session import HUB, WORLD
+from world.acts import Acts, Beliefs
+from world.brief import WorldBrief
+from world.physics.world import Scene
+
+
+class ProcessesActed(NamedTuple):
+    """What came back from all agents, and what the medium says it made of their messages.
+
+    Parameters
+    ----------
+    input
+        What they steer, shape (N, D).
+    acts
+        What those who are awake said, by number.
+    believed
+        What everybody believes of edges.
+    entry
+        What became of the messages.
+    """
+
+    input: Array
+    acts: Mapping[int, messages.Act]
+    believed: Beliefs
+    entry: Entry
+
+
+class ZenohCarrier:
+    """Carries the messages of a world over the network.
+
+    Parameters
+    ----------
+    session, supervisor, brief
+        Where, watched by whom, and of which world.
+    meanwhile
+        What to do in a tick while the agents work on it.
+    """
+
+    def __init__(
+        self, session: Session, supervisor: Supervisor, brief: WorldBrief, meanwhile: Callable[[int], None]
+    ) -> None:
+        keys, world = Keys(brief.run), brief.world
+        self._world, self._supervisor, self._meanwhile = world, supervisor, meanwhile
+        self.timeline = Timeline(world.links, brief.faults, brief.triggers)
+        self._reader = Acts(keys, world.links, world.formation.dimension, brief.reports)
+        self._acts = session.hears(keys.act("*"), 4096)
+        self._journal = session.hears(keys.journal, 64)
+        self._sense = session.says(keys.sense)
+        self._numbers = Numbering()
+        self._heard = dict.fromkeys(range(1, world.links.agents + 1), 0)
+        self._fired: Sequence[int] = ()
+        self._awaited: set[int] = set()
+        self.uninstructed = 0
+
+    def await_everybody(self) -> None:
+        """Wait until the medium listens."""
+        await_heard([self._sense])
+
+    def fire(self, tick: int, triggers: Sequence[int]) -> None:
+        """From this tick on, what waited for these triggers holds; the medium and the launcher are told."""
+        self._fired = triggers
+        self.timeline = self.timeline.fired(triggers, tick)
+        self._supervisor.tell("fired", triggers=triggers, k=tick)
+
+    def carry(self, tick: int, scene: Scene, measured: Array) -> ProcessesActed:
+        """Publish what is sensed; wait for the verdicts, and for everybody's act."""
+        self._move_processes(tick)
+        self._publish(tick, scene, measured)
+        self._meanwhile(tick)
+        journal = self._read_journal(tick)
+        acts = self._read_acts(tick)
+        self._supervisor.works(tick)
+        if journal.injected is not None:
+            self.timeline = self.timeline.facing([from_plain(Fault, fault) for fault in journal.injected])
+        self._account(journal, acts)
+        steered = np.zeros((self._world.links.agents, self._world.formation.dimension))
+        for agent, act in acts.items():
+            steered[agent - 1] = act.input
+        return ProcessesActed(steered, acts, self._reader.beliefs(acts), _entry(journal))
+
+    def end(self) -> None:
+        """The run is over: tell the medium."""
+        ticks, number = self._world.ticks, self._numbers.next("sense")
+        self._sense.say(messages.pack(messages.Sense(ticks, WORLD, number, True, [], [], None, None, [])))
+
+    def _move_processes(self, tick: int) -> None:
+        timeline = self.timeline
+        for event, agents in (
+            ("kill", timeline.killed(tick)),
+            ("restart", timeline.restarted(tick)),
+            ("pause", timeline.paused(tick)),
+            ("resume", timeline.resumed(tick)),
+        ):
+            if agents:
+                self._supervisor.tell(event, agents=agents, remembering=timeline.remembering(tick), k=tick)
+                self._supervisor.await_order(event)
+        for agent in timeline.restarted(tick):
+            self._reader.restart(agent)
+            self._heard[agent] = 0
+
+    def _publish(self, tick: int, scene: Scene, measured: Array) -> None:
+        number, motion = self._numbers.next("sense"), self._world.odometry(scene)
+        fired, self._fired = list(self._fired), ()
+        sense = messages.Sense(
+            tick, WORLD, number, False, measured, scene.position, motion, self._sightings(tick, scene), fired
+        )
+        self._sense.say(messages.pack(sense))
+
+    def _sightings(self, tick: int, scene: Scene) -> list[dict[str, Any]] | None:
+        sighting = self._world.sighting(tick, scene)
+        if sighting is None:
+            return None
+        agents = zip(*(field.tolist() for field in sighting), strict=True)
+        return [dict(zip(sighting._fields, said, strict=True)) for said in agents]
+
+    def _read_journal(self, tick: int) -> messages.Journal:
+        self._supervisor.waits(tick, "its journal", lambda: (HUB,))
+        journal = messages.unpack(messages.Journal, self._journal.next().data)
+        if journal.k != tick:
+            raise messages.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
+        return journal
+
+    def _read_acts(self, tick: int) -> dict[int, messages.Act]:
+        self._awaited = set((np.flatnonzero(~self.timeline.at(tick).idle) + 1).tolist())
+        self._supervisor.waits(tick, "its act", self._idle)
+        acts = {}
+        while self._awaited:
+            arrived = self._acts.next()
+            act = self._reader.read(arrived.key, arrived.data, tick, self._awaited)
+            self._awaited.remove(act.src)
+            acts[act.src] = act
+        return acts
+
+    def _idle(self) -> list[str]:
+        return [called(agent) for agent in sorted(self._awaited)]
+
+    def _account(self, journal: messages.Journal, acts: Mapping[int, messages.Act]) -> None:
+        """What the agents say they heard must be what the medium says it delivered, message by message."""
+        for agent, act in acts.items():
+            self.uninstructed += abs(journal.handed[agent - 1] - (act.heard - self._heard[agent]))
+            self._heard[agent] = act.heard
+
+
+def _entry(journal: messages.Journal) -> Entry:
+    def rows(given: Any, width: int) -> Any:
+        return np.array(given, dtype=np.int64).reshape(-1, width)
+
+    return Entry(
+        fates=np.array(journal.fates, dtype=np.uint8),
+        odd=rows(journal.odd, 5),
+        apart=rows(journal.apart, 4),
+        late=journal.late,
+        dropped=rows(journal.dropped, 5),
+        released=rows(journal.released, 4),
+        injected=journal.injected,
+    )
