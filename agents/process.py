@@ -171,19 +171,24 @@ class AgentNode:
         if inbox.neighbours:
             slots = [self._slot[number] for number in inbox.neighbours]
             measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, measured, seen, _numbers(inbox.motion))
+        self._state, said = self._agent.sense(self._state, measured, seen, inbox.motion)
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
             self._broadcasts[name].say(
-                messages.pack(messages.Broadcast(inbox.k, self._number, name, self._numbers.next(name), dict(fields)))
+                messages.pack(
+                    messages.Broadcast(
+                        k=inbox.k, src=self._number, channel=name, seq=self._numbers.next(name), payload=dict(fields)
+                    )
+                )
             )
 
     def _exchange(self, inbox: messages.ExchangeInbox, sensed: messages.SenseInbox) -> None:
         self._heard += len(inbox.messages)
         heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
-        position, motion = _numbers(sensed.position), _numbers(sensed.motion)
         sighting = _sighting(sensed.sighting)
-        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, motion, sighting)
+        self._state, action = self._agent.act(
+            self._state, sensed.clock, heard, sensed.position, sensed.motion, sighting
+        )
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
@@ -211,15 +216,15 @@ class AgentNode:
         self._tellings.check("told", told.seq)
         if told.k != tick:
             raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
-        fields = {name: np.array(getattr(told, name), dtype=np.float64) for name in ("relative", "covariance")}
+        fields = {"relative": told.relative, "covariance": told.covariance}
         return {channels.CENTRE: Heard(fields, np.ones(self._width, dtype=bool))}
 
-    def _gather(self, arrived: messages.Rows) -> Mapping[str, Heard]:
+    def _gather(self, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.
         said: dict[str, dict[int, Any]] = {name: {} for name in self._channels}
         for message in arrived:
-            if message["channel"] in said:
-                said[message["channel"]][self._slot[message["src"]]] = message["payload"]
+            if message.channel in said:
+                said[message.channel][self._slot[message.src]] = message.payload
         return {name: self._heard_on(name, said[name]) for name in self._channels}
 
     def _heard_on(self, channel: str, said: dict[int, Any]) -> Heard:
@@ -241,20 +246,10 @@ class AgentNode:
         return rows.astype(field.dtype, copy=False)
 
 
-def _numbers(given: messages.Rows | None) -> Array | None:
-    return None if given is None else np.array(given, dtype=np.float64)
-
-
-def _sighting(said: Mapping[str, Any] | None) -> Sighting | None:
+def _sighting(said: messages.Sighted | None) -> Sighting | None:
     if said is None:
         return None
-    try:
-        place = np.array(said["position"], dtype=np.float64)
-        return Sighting(place, np.array(bool(said["done"])), np.array(int(said["by"])), np.array(int(said["method"])))
-    except (KeyError, TypeError, ValueError) as error:
-        raise messages.WireError(
-            f"a sighting has position, done, by and method, not {said!r} (see docs/protocol.md)"
-        ) from error
+    return Sighting(said.position, np.array(said.done), np.array(said.by), np.array(said.method))
 
 
 def main() -> NoReturn:

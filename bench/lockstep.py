@@ -37,31 +37,42 @@ def sizes(plan: Plan) -> dict[str, int]:
     agents = plan.world.formation.agents
     degree = round(links / agents)
     heard = round(degree * plan.scenario.network.availability)
+    nothing = np.empty((0, 5), dtype=np.int64)
     map_ = number(size=(dimension, dimension))
     said: dict[str, dict[str, Any]] = {
         "input": {"velocity": number(size=dimension)},
         "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
         "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
     }
-    broadcasts = [messages.pack(messages.Broadcast(500, 1, name, 500, fields)) for name, fields in said.items()]
+    broadcasts = [
+        messages.pack(messages.Broadcast(k=500, src=1, channel=name, seq=500, payload=fields))
+        for name, fields in said.items()
+    ]
     told = {
         "sense": messages.pack(
             messages.Sense(
-                500, WORLD, 500, False, number(size=(links, dimension)), number(size=(agents, 2)), None, None, []
+                k=500,
+                src=WORLD,
+                seq=500,
+                last=False,
+                measured=number(size=(links, dimension)),
+                position=number(size=(agents, 2)),
+                motion=None,
+                sightings=None,
+                fired=[],
             )
         ),
         "seen": messages.pack(
             messages.SenseInbox(
-                500,
-                HUB,
-                500,
-                messages.Phase.SENSE,
-                500,
-                [1] * heard,
-                number(size=(heard, 2)).tolist(),
-                None,
-                None,
-                None,
+                k=500,
+                src=HUB,
+                seq=500,
+                clock=500,
+                neighbours=[1] * heard,
+                measured=number(size=(heard, 2)),
+                position=None,
+                motion=None,
+                sighting=None,
             )
         ),
         "heard": messages.pack_exchange(500, 500, broadcasts * heard),
@@ -72,7 +83,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 seq=500,
                 input=number(size=dimension),
                 estimate=number(size=(degree, dimension)),
-                known=[True] * degree,
+                known=np.ones(degree, dtype=bool),
                 covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
                 psi=0.1,
                 feasible=True,
@@ -81,7 +92,19 @@ def sizes(plan: Plan) -> dict[str, int]:
             )
         ),
         "journal": messages.pack(
-            messages.Journal(500, HUB, 500, np.ones((4, links), np.uint8), [], [], 0, [], [], [9] * agents, None)
+            messages.Journal(
+                k=500,
+                src=HUB,
+                seq=500,
+                fates=np.ones((4, links), np.uint8),
+                odd=nothing,
+                apart=nothing,
+                late=0,
+                dropped=nothing,
+                released=nothing,
+                handed=[9] * agents,
+                injected=None,
+            )
         ),
     }
     return {name: len(data) for name, data in told.items()} | {"said": len(broadcasts[-1])}

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
@@ -159,7 +160,7 @@ class MediumNode:
             if sense.fired:
                 self._relay.fire(sense.fired, sense.k)
             if decided is None:
-                decided = self._decide(sense.k, np.array(sense.position, dtype=np.float64))
+                decided = self._decide(sense.k, sense.position)
             self._welcome_back(sense.k)
             self._hand_out_measurements(sense, decided)
             self._journal.say(decided.journal)
@@ -194,7 +195,7 @@ class MediumNode:
                 except messages.WireError as error:
                     question.refuse(str(error))
                     continue
-                question.answer(messages.pack_record(self._relay.obey(order, tick)))
+                question.answer(messages.pack(self._relay.obey(order, tick)))
 
     def _seen(self, arrived: Mask) -> dict[int, list[int]]:
         seen: dict[int, list[int]] = defaultdict(list)
@@ -221,10 +222,9 @@ class MediumNode:
                 k=sense.k,
                 src=HUB,
                 seq=self._numbers.next(f"inbox {agent}"),
-                phase=messages.Phase.SENSE,
                 clock=clock[agent - 1],
                 neighbours=[self._src[link] for link in links],
-                measured=[sense.measured[link] for link in links],
+                measured=sense.measured[links],
                 position=sense.position[agent - 1] if self._brief.positioned[agent - 1] else None,
                 motion=None if sense.motion is None else sense.motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
@@ -270,15 +270,14 @@ class MediumNode:
 
     def _end(self, tick: int) -> None:
         for agent, inbox in self._inboxes.items():
-            inbox.say(
-                messages.pack(messages.EndInbox(tick, HUB, self._numbers.next(f"inbox {agent}"), messages.Phase.END))
-            )
+            number = self._numbers.next(f"inbox {agent}")
+            inbox.say(messages.pack(messages.EndInbox(k=tick, src=HUB, seq=number)))
 
 
 def _rewritten(said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
     """A broadcast with its named fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
     changed = change({name: field[None] for name, field in fields(said).items()})
-    return messages.pack(said._replace(payload={name: field[0] for name, field in changed.items()}))
+    return messages.pack(replace(said, payload={name: field[0] for name, field in changed.items()}))
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
 """The wire: every message survives the trip, and what is no such message is refused by name and field."""
 
+import re
 from dataclasses import asdict, replace
 
 import msgpack
@@ -8,6 +9,7 @@ import pytest
 from airs import IMPAIRMENTS, mixture
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
@@ -16,18 +18,30 @@ from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
-from netem.core.plain import PlainError, from_plain, plainly
+from netem.core.plain import PlainError, from_plain, to_plain
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
 from netem.impairments.delay import DelayLaw
 from netem.process import MediumBrief
 from netem.wire import messages
-from netem.wire.messages import Phase, WireError
+from netem.wire.messages import WireError
 from netem.wire.session import Login
+
+SIGHTED = messages.Sighted(position=np.array([1.5, 2.0]), done=True, by=0, method=1)
 
 
 def name(message):
     return type(message).__name__
+
+
+def plain(message):
+    return msgpack.unpackb(messages.pack(message))
+
+
+def same(one, other):
+    """Whether two messages say the same, number by number."""
+    assert type(one) is type(other)
+    np.testing.assert_equal(plain(one), plain(other))
 
 
 MESSAGES = [
@@ -36,37 +50,36 @@ MESSAGES = [
         src="world",
         seq=7,
         last=False,
-        measured=[[0.5, -1.0]],
-        position=[[1.0, 2.0], [0.5, 3.0]],
-        motion=[[[0.25, 0.0], [1.0, 2.0]], [[0.0, -4.0], [3.0, 0.5]]],
-        sightings=[{"position": [1.5, 2.0], "done": True, "by": 0, "method": 1}] * 2,
+        measured=np.array([[0.5, -1.0]]),
+        position=np.array([[1.0, 2.0], [0.5, 3.0]]),
+        motion=np.array([[[0.25, 0.0], [1.0, 2.0]], [[0.0, -4.0], [3.0, 0.5]]]),
+        sightings=[SIGHTED] * 2,
         fired=[1],
     ),
     messages.SenseInbox(
         k=7,
         src="netem",
         seq=14,
-        phase=Phase.SENSE,
         clock=9,
         neighbours=[2],
-        measured=[[0.5, 1.0]],
+        measured=np.array([[0.5, 1.0]]),
         position=None,
-        motion=[[0.25, 0.0], [1.0, 2.0]],
-        sighting={"position": [1.5, 2.0], "done": True, "by": 0, "method": 1},
+        motion=np.array([[0.25, 0.0], [1.0, 2.0]]),
+        sighting=SIGHTED,
     ),
     messages.Broadcast(
         k=7, src=3, channel="theta", seq=7, payload={"local": [[1.0, 0.0], [0.0, 1.0]], "feasible": True}
     ),
-    messages.ExchangeInbox(k=7, src="netem", seq=15, phase=Phase.EXCHANGE, messages=[]),
-    messages.EndInbox(k=7, src="netem", seq=16, phase=Phase.END),
+    messages.ExchangeInbox(k=7, src="netem", seq=15, messages=[]),
+    messages.EndInbox(k=7, src="netem", seq=16),
     messages.Act(
         k=7,
         src=3,
         seq=7,
-        input=[1.0, 2.0],
-        estimate=[[1.0, 0.0]],
-        known=[True],
-        covariance=[[0.5, 0.0, 0.5]],
+        input=np.array([1.0, 2.0]),
+        estimate=np.array([[1.0, 0.0]]),
+        known=np.array([True]),
+        covariance=np.array([[0.5, 0.0, 0.5]]),
         psi=0.25,
         feasible=True,
         reports={"place": [1.0, 2.0]},
@@ -76,67 +89,72 @@ MESSAGES = [
         k=7,
         src="netem",
         seq=7,
-        fates=[[0, 1], [2, 7]],
-        odd=[[1, 0, 9, 0, 8]],
-        apart=[[4, 1, 1, 0]],
+        fates=np.array([[0, 1], [2, 7]], dtype=np.uint8),
+        odd=np.array([[1, 0, 9, 0, 8]]),
+        apart=np.array([[4, 1, 1, 0]]),
         late=1,
-        dropped=[[3, 1, 1, 0, 5]],
-        released=[[4, 1, 1, 1]],
+        dropped=np.array([[3, 1, 1, 0, 5]]),
+        released=np.array([[4, 1, 1, 1]]),
         handed=[1, 0],
         injected=None,
     ),
 ]
 FIELDS = [
-    pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in message._fields
+    pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in plain(message)
 ]
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_a_message_survives_the_trip(message):
-    assert messages.unpack(type(message), messages.pack(message)) == message
+    same(messages.unpack(type(message), messages.pack(message)), message)
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_a_message_is_a_plain_map_for_any_messagepack_codec(message):
-    plain = msgpack.unpackb(messages.pack(message))
-    assert plain == message._asdict()
-    assert {"k", "src", "seq"} <= plain.keys()
+    np.testing.assert_equal(
+        {name: value for name, value in plain(message).items() if name != "phase"}, to_plain(message_fields(message))
+    )
+    assert {"k", "src", "seq"} <= plain(message).keys()
 
 
-@pytest.mark.parametrize("message", [m for m in MESSAGES if hasattr(m, "phase")], ids=name)
+def message_fields(message):
+    return {name: getattr(message, name) for name in message.__struct_fields__}
+
+
+@pytest.mark.parametrize("message", [m for m in MESSAGES if "phase" in plain(m)], ids=name)
 def test_an_inbox_is_known_by_its_phase(message):
-    assert messages.unpack_inbox(messages.pack(message)) == message
+    same(messages.unpack_inbox(messages.pack(message)), message)
 
 
-def test_arrays_travel_as_nested_lists():
-    sense = MESSAGES[0]._replace(measured=np.array([[0.1, 0.2]]), position=np.zeros((2, 2)))
-    arrived = messages.unpack(messages.Sense, messages.pack(sense))
-    assert arrived.measured == [[0.1, 0.2]]
-    assert arrived.position == [[0.0, 0.0], [0.0, 0.0]]
+def test_arrays_travel_as_nested_lists_and_arrive_as_arrays():
+    assert plain(MESSAGES[0])["measured"] == [[0.5, -1.0]]
+    arrived = messages.unpack(messages.Sense, messages.pack(MESSAGES[0]))
+    assert arrived.measured.dtype == np.float64
+    assert arrived.measured.shape == (1, 2)
 
 
 def test_numpy_scalars_travel_as_numbers():
-    act = MESSAGES[5]._replace(k=np.int64(7), psi=np.float64(0.25), heard=np.int32(12), known=np.array([True]))
-    assert messages.unpack(messages.Act, messages.pack(act)) == MESSAGES[5]
+    act = changed(MESSAGES[5], k=np.int64(7), psi=np.float64(0.25), heard=np.int32(12))
+    same(messages.unpack(messages.Act, messages.pack(act)), MESSAGES[5])
 
 
 def test_an_undefined_indicator_travels_as_nan():
-    assert np.isnan(messages.unpack(messages.Act, messages.pack(MESSAGES[5]._replace(psi=np.nan))).psi)
+    assert np.isnan(messages.unpack(messages.Act, messages.pack(changed(MESSAGES[5], psi=np.nan))).psi)
 
 
 def test_numbers_arrive_bit_for_bit():
-    numbers = [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf]
-    arrived = messages.unpack(messages.Act, messages.pack(MESSAGES[5]._replace(input=np.array(numbers)))).input
-    assert np.array(arrived).tobytes() == np.array(numbers).tobytes()
+    numbers = np.array([0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf])
+    arrived = messages.unpack(messages.Act, messages.pack(changed(MESSAGES[5], input=numbers))).input
+    assert arrived.tobytes() == numbers.tobytes()
 
 
 @pytest.mark.parametrize("message", MESSAGES[:2], ids=name)
 def test_single_integrators_are_told_no_motion(message):
-    assert messages.unpack(type(message), messages.pack(message._replace(motion=None))).motion is None
+    assert messages.unpack(type(message), messages.pack(changed(message, motion=None))).motion is None
 
 
 def test_a_whole_number_will_do_for_a_number():
-    arrived = messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {"psi": 1}))
+    arrived = messages.unpack(messages.Act, msgpack.packb(plain(MESSAGES[5]) | {"psi": 1}))
     assert type(arrived.psi) is float
 
 
@@ -145,53 +163,70 @@ def test_a_whole_number_will_do_for_a_number():
 
 @pytest.mark.parametrize(("message", "field"), FIELDS)
 def test_a_missing_field_is_named(message, field):
-    plain = {name: value for name, value in message._asdict().items() if name != field}
-    with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*unknown \[\], missing \['{field}'\]") as error:
-        messages.unpack(type(message), msgpack.packb(plain))
+    rest = {name: value for name, value in plain(message).items() if name != field}
+    if field == "phase":  # which one message has, and need not say
+        return
+    with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*missing required field `{field}`") as error:
+        messages.unpack(type(message), msgpack.packb(rest))
     assert "docs/protocol.md" in str(error.value)
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_an_unknown_field_is_named(message):
-    data = msgpack.packb(message._asdict() | {"colour": "red"})
-    with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*unknown \['colour'\], missing \[\]"):
+    data = msgpack.packb(plain(message) | {"colour": "red"})
+    with pytest.raises(WireError, match=rf"^{type(message).__name__}: .*unknown field `colour`"):
         messages.unpack(type(message), data)
 
 
 @pytest.mark.parametrize(("message", "field"), FIELDS)
-def test_a_field_of_the_wrong_type_is_named_with_what_came(message, field):
+def test_a_field_of_the_wrong_type_is_named(message, field):
     wrong = "lunch" if field in {"payload", "sighting", "reports"} else {"lunch": 1}
-    data = msgpack.packb(message._asdict() | {field: wrong})
-    with pytest.raises(WireError, match=rf"^{type(message).__name__}: {field}: expected .*lunch"):
+    data = msgpack.packb(plain(message) | {field: wrong})
+    with pytest.raises(WireError, match=rf"^{type(message).__name__}: {field}: "):
         messages.unpack(type(message), data)
 
 
 @pytest.mark.parametrize(
-    ("field", "wrong", "match"),
+    ("field", "wrong", "says"),
     [
-        ("k", 7.0, "Act: k: expected an integer, got 7.0"),
-        ("k", "7", "Act: k: expected an integer, got '7'"),
-        ("k", True, "Act: k: expected an integer, got True"),
-        ("psi", None, "Act: psi: expected a number, got None"),
-        ("psi", True, "Act: psi: expected a number, got True"),
-        ("input", 1.0, "Act: input: expected a list, got 1.0"),
+        ("k", 7.0, "k: expected `int`, got `float`"),
+        ("k", "7", "k: expected `int`, got `str`"),
+        ("k", True, "k: expected `int`, got `bool`"),
+        ("psi", None, "psi: expected `float`, got `None`"),
+        ("psi", True, "psi: expected `float`, got `bool`"),
+        ("input", ["x", {}], "input: expected a nested list of float64, or one, got ['x', {}]"),
+        (
+            "input",
+            [[1.0], [1.0, 2.0]],
+            "input: expected a rectangular list of float64, got [[1.0], [1.0, 2.0]]",
+        ),
+        ("known", [1], "known: expected a nested list of bool, or one, got [1]"),
+        ("known", ["yes"], "known: expected a nested list of bool, or one, got ['yes']"),
+        ("covariance", [None], "covariance: expected a nested list of float64, or one, got [None]"),
     ],
 )
-def test_no_type_is_taken_for_another(field, wrong, match):
-    with pytest.raises(WireError, match=match):
-        messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {field: wrong}))
+def test_no_type_is_taken_for_another(field, wrong, says):
+    data = msgpack.packb(plain(MESSAGES[5]) | {field: wrong})
+    with pytest.raises(WireError, match=re.escape(f"Act: {says}")):
+        messages.unpack(messages.Act, data)
+
+
+def test_numbers_that_an_array_cannot_hold_are_refused():
+    for wrong in ([[300]], [[-1]], [[0.5]]):
+        with pytest.raises(WireError, match="uint8"):
+            messages.unpack(messages.Journal, msgpack.packb(plain(MESSAGES[6]) | {"fates": wrong}))
 
 
 def test_an_overlong_value_is_shortened_in_the_message():
-    with pytest.raises(WireError, match="Act: k") as error:
-        messages.unpack(messages.Act, msgpack.packb(MESSAGES[5]._asdict() | {"k": "x" * 10_000}))
+    with pytest.raises(WireError, match=r"Act: .*input") as error:
+        messages.unpack(messages.Act, msgpack.packb(plain(MESSAGES[5]) | {"input": ["x" * 10_000]}))
     assert len(str(error.value)) < 200
 
 
-@pytest.mark.parametrize("plain", [None, 3, "sense", [1, 2], []])
-def test_what_is_no_map_is_refused(plain):
-    with pytest.raises(WireError, match=r"Act: expected a map \(Act\)"):
-        messages.unpack(messages.Act, msgpack.packb(plain))
+@pytest.mark.parametrize("other", [None, 3, "sense", [1, 2], []])
+def test_what_is_no_map_is_refused(other):
+    with pytest.raises(WireError, match="Act: expected `object`"):
+        messages.unpack(messages.Act, msgpack.packb(other))
 
 
 @pytest.mark.parametrize(
@@ -211,19 +246,19 @@ def test_what_is_no_map_is_refused(plain):
     "read", [lambda data: messages.unpack(messages.Act, data), messages.unpack_inbox], ids=["unpack", "inbox"]
 )
 def test_malformed_bytes_are_refused(read, data):
-    with pytest.raises(WireError, match="not MessagePack"):
+    with pytest.raises(WireError, match=r"docs/protocol\.md"):
         read(data)
 
 
 @pytest.mark.parametrize("phase", [None, "lunch", 3, True, [], {}, ["sense"]], ids=repr)
-def test_an_inbox_of_no_phase_is_refused_with_the_phases_there_are(phase):
-    with pytest.raises(WireError, match=r"phase among .*sense.*exchange.*end"):
+def test_an_inbox_of_no_phase_is_refused(phase):
+    with pytest.raises(WireError, match=r"^an inbox: (phase: |.*`phase`)"):
         messages.unpack_inbox(msgpack.packb({"k": 1, "src": "netem", "seq": 0, "phase": phase}))
 
 
 def test_an_inbox_with_the_fields_of_another_phase_is_refused():
-    with pytest.raises(WireError, match=r"^ExchangeInbox: .*missing \['messages'\]"):
-        messages.unpack_inbox(msgpack.packb(MESSAGES[1]._asdict() | {"phase": "exchange"}))
+    with pytest.raises(WireError, match=r"^an inbox: .*unknown field `clock`"):
+        messages.unpack_inbox(msgpack.packb(plain(MESSAGES[1]) | {"phase": "exchange"}))
 
 
 PLAIN = st.recursive(
@@ -249,34 +284,30 @@ def test_whatever_else_comes_is_refused_as_a_wire_error(data):
 @settings(max_examples=150, deadline=None)
 @given(message=st.sampled_from(MESSAGES), value=PLAIN, number=st.integers(0, 7))
 def test_any_value_of_any_field_is_read_as_it_came_or_refused_by_the_name_of_the_field(message, value, number):
-    field = message._fields[number % len(message._fields)]
-    plain, refused = message._asdict() | {field: value}, ""
+    field = message.__struct_fields__[number % len(message.__struct_fields__)]
+    said, refused = plain(message) | {field: value}, ""
     try:
-        arrived = messages.unpack(type(message), msgpack.packb(plain))
+        arrived = messages.unpack(type(message), msgpack.packb(said))
     except WireError as error:
         refused = str(error)
     if refused:
-        assert refused.startswith(f"{name(message)}: {field}")
+        assert re.match(rf"{name(message)}: {field}\b", refused)
     else:
-        np.testing.assert_equal(arrived._asdict(), plain)
+        np.testing.assert_equal(plain(arrived), said)
 
 
 # ---- relaying
 
 
-def test_an_exchange_inbox_holds_the_maps_that_were_broadcast():
-    said = [messages.Broadcast(7, src, "theta", 7, {"local": np.eye(2) * src, "feasible": True}) for src in (1, 2)]
-    inbox = messages.unpack_inbox(messages.pack_exchange(7, 15, [messages.pack(broadcast) for broadcast in said]))
-    assert inbox == messages.ExchangeInbox(
-        k=7,
-        src="netem",
-        seq=15,
-        phase=Phase.EXCHANGE,
-        messages=[
-            {"k": 7, "src": 1, "channel": "theta", "seq": 7, "payload": {"local": [[1, 0], [0, 1]], "feasible": True}},
-            {"k": 7, "src": 2, "channel": "theta", "seq": 7, "payload": {"local": [[2, 0], [0, 2]], "feasible": True}},
-        ],
+def broadcast(src):
+    return messages.Broadcast(
+        k=7, src=src, channel="theta", seq=7, payload={"local": np.eye(2) * src, "feasible": True}
     )
+
+
+def test_an_exchange_inbox_holds_what_was_broadcast():
+    inbox = messages.unpack_inbox(messages.pack_exchange(7, 15, [messages.pack(broadcast(src)) for src in (1, 2)]))
+    same(inbox, messages.ExchangeInbox(k=7, src="netem", seq=15, messages=[broadcast(1), broadcast(2)]))
 
 
 @pytest.mark.parametrize("number", [0, 1, 15, 16, 70_000])
@@ -284,13 +315,12 @@ def test_an_exchange_inbox_relays_any_number_of_broadcasts_byte_for_byte(number)
     said = msgpack.packb({"payload": {"x": 1.5}, "seq": 0, "k": 7, "src": 1, "channel": "x"}, use_single_float=True)
     data = messages.pack_exchange(7, 0, [said] * number)
     assert data.endswith(said * number)
-    assert messages.unpack_inbox(data).messages == [msgpack.unpackb(said)] * number
+    assert messages.unpack_inbox(data).messages == [messages.unpack_relayed(said)] * number
 
 
 def test_an_exchange_inbox_equals_one_packed_at_once():
-    said = messages.pack(MESSAGES[2])
-    at_once = messages.ExchangeInbox(7, "netem", 15, Phase.EXCHANGE, [MESSAGES[2]._asdict()])
-    assert messages.pack_exchange(7, 15, [said]) == messages.pack(at_once)
+    at_once = messages.ExchangeInbox(k=7, src="netem", seq=15, messages=[broadcast(1)])
+    assert messages.pack_exchange(7, 15, [messages.pack(broadcast(1))]) == messages.pack(at_once)
 
 
 # ---- briefs
@@ -346,6 +376,10 @@ MEDIUM = MediumBrief(
 )
 
 
+def links(**wrong):
+    return {"links": {"agents": 2, "src": [1], "dst": [1], "swarm": 2} | wrong}
+
+
 AGENT = AgentBrief(
     run="r1",
     login=Login("tcp/127.0.0.1:7447", "agent-2", "secret"),
@@ -364,7 +398,7 @@ AGENT = AgentBrief(
 
 
 def plain_of(brief):
-    return msgpack.unpackb(msgpack.packb(brief, default=plainly))
+    return msgpack.unpackb(msgpack.packb(to_plain(brief)))
 
 
 @pytest.mark.parametrize(
@@ -427,66 +461,57 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
 @pytest.mark.parametrize(
     ("wrong", "match"),
     [
-        ({"seed": "1"}, "^seed: expected an integer, got '1'"),
-        ({"login": 3}, r"^login: expected a map \(Login\), got 3"),
-        ({"login": {"endpoint": "tcp/x", "name": "netem"}}, r"^login: Login has .*missing \['password'\]"),
-        ({"channels": ["sense", 3]}, r"^channels\[\]: expected a text, got 3"),
+        ({"seed": "1"}, "seed: expected `int`, got `str`"),
+        ({"login": 3}, "login: expected `object`, got `int`"),
+        ({"login": {"endpoint": "tcp/x", "name": "netem"}}, "login: object missing required field `password`"),
+        ({"channels": ["sense", 3]}, "channels[1]: expected `str`, got `int`"),
+        (links(src=[[1], [2, 3]]), "links.src: expected a rectangular list of int64, got [[1], [2, 3]]"),
+        (links(src={}), "links.src: expected a nested list of int64, or one, got {}"),
+        (links(src=[1.7]), "links.src: expected a nested list of int64, or one, got [1.7]"),
+        (links(src=["2"]), "links.src: expected a nested list of int64, or one, got ['2']"),
+        (links(src=[True]), "links.src: expected a nested list of int64, or one, got [True]"),
+        (links(src=[2**64 - 1]), "links.src: expected a nested list of int64, or one, got [18446744073709551615]"),
+        ({"positioned": [1, 0, 2]}, "positioned: expected a nested list of bool, or one, got [1, 0, 2]"),
+        ({"positioned": ["no"]}, "positioned: expected a nested list of bool, or one, got ['no']"),
         (
-            {"links": {"agents": 2, "src": [[1], [2, 3]], "dst": [1], "swarm": 2}},
-            r"^links\.src: expected a rectangular list of int64",
-        ),
-        ({"links": {"agents": 2, "src": {}, "dst": [1], "swarm": 2}}, r"^links\.src: expected a nested list"),
-        ({"links": {"agents": 2, "src": [1.7], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*1\.7"),
-        ({"links": {"agents": 2, "src": ["2"], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*'2'"),
-        ({"links": {"agents": 2, "src": [True], "dst": [1], "swarm": 2}}, r"^links\.src: .*int64.*True"),
-        (
-            {"links": {"agents": 2, "src": [2**64 - 1], "dst": [1], "swarm": 2}},
-            r"^links\.src: .*int64.*18446744073709551615",
-        ),
-        ({"positioned": [1, 0, 2]}, r"^positioned: .*bool.*2"),
-        ({"positioned": ["no"]}, r"^positioned: .*bool.*'no'"),
-        (
-            {"profiles": [asdict(PROFILE), asdict(PROFILE) | {"duplicate": [None]}]},
-            r"^profiles\[\]\.duplicate: .*float64.*None",
+            {"profiles": [PROFILE, asdict(PROFILE) | {"duplicate": [None]}]},
+            "profiles[1].duplicate: expected a nested list of float64, or one, got [None]",
         ),
         (
             {"profiles": [asdict(PROFILE) | {"duplicate": ["1"]}]},
-            r"^profiles\[\]\.duplicate: .*float64.*'1'",
+            "profiles[0].duplicate: expected a nested list of float64, or one, got ['1']",
         ),
-        ({"profiles": asdict(PROFILE)}, r"^profiles: expected a list"),
+        ({"profiles": asdict(PROFILE)}, "profiles: expected `array`, got `object`"),
         (
             {"triggers": [{"level": 1.0, "above": 1, "ticks": 2}]},
-            r"^triggers\[\]\.above: expected true or false, got 1",
+            "triggers[0].above: expected `bool`, got `int`",
         ),
-        ({"triggers": [{"level": 1.0, "above": True}]}, r"^triggers\[\]: Trigger has .*missing \['ticks'\]"),
+        ({"triggers": [{"level": 1.0, "above": True}]}, "triggers[0]: object missing required field `ticks`"),
     ],
 )
 def test_what_does_not_fit_a_brief_is_named_by_its_path(wrong, match):
-    with pytest.raises(PlainError, match=match):
+    with pytest.raises(PlainError, match=rf"^MediumBrief: {re.escape(match)}"):
         from_plain(MediumBrief, plain_of(MEDIUM) | plain_of(wrong))
 
 
-def test_an_unknown_verb_of_a_fault_is_named_with_those_there_are():
-    plain = plain_of(MEDIUM)
-    plain["faults"][2]["verb"] = "explode"
-    with pytest.raises(PlainError, match=r"^faults\[\]\.verb: expected one of .*cut.*depart.* got 'explode'"):
-        from_plain(MediumBrief, plain)
+def test_an_unknown_verb_of_a_fault_is_named():
+    wrong = plain_of(MEDIUM)
+    wrong["faults"][2]["verb"] = "explode"
+    with pytest.raises(PlainError, match=re.escape("faults[2].verb: invalid enum value 'explode'")):
+        from_plain(MediumBrief, wrong)
 
 
-def test_an_unknown_word_in_a_brief_is_named_with_those_there_are():
-    with pytest.raises(PlainError, match=r"^leaders: expected one of \['pilot', 'distances'\], got 'chase'"):
+def test_an_unknown_word_in_a_brief_is_named():
+    with pytest.raises(PlainError, match=re.escape("leaders: invalid enum value 'chase'")):
         from_plain(AgentBrief, plain_of(AGENT) | {"leaders": "chase"})
 
 
 def test_what_has_no_plain_form_is_not_packed():
     with pytest.raises(TypeError, match="object has no plain form"):
-        messages.pack(MESSAGES[2]._replace(payload={"thing": object()}))
+        messages.pack(changed(MESSAGES[2], payload={"thing": object()}))
 
 
-def test_a_record_of_what_has_no_plain_form_is_refused_with_what_there_is():
-    # KeyError: NDArray[numpy.float64], on every Python for which NumPy defines NDArray by another means.
-    with pytest.raises(
-        TypeError, match=r"float32.* has no plain form: records are made of int, float, str, bool, .*float64"
-    ):
-        from_plain(NDArray[np.float32], [1.0])
+def test_a_record_of_what_has_no_plain_form_is_refused():
+    with pytest.raises(PlainError, match=r"complex.* has no plain form: records are made of numbers, texts"):
+        from_plain(complex, [1.0])
     assert from_plain(NDArray[np.float64], [1, 2]).dtype == np.float64

@@ -56,7 +56,8 @@ def moved(world, tick, position, flown, *faults):
 @pytest.fixture
 def world():
     return World(
-        seed=1,
+        run_seed=1,
+        swarm_seeds=None,
         dt=0.01,
         ticks=6000,
         order=1,

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
@@ -68,7 +69,8 @@ class Acts:
         if act.src != agent or act.k != tick or agent not in awaited:
             raise messages.WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
         self._streams.check(f"{agent} act", act.seq)
-        return act._replace(
+        return replace(
+            act,
             input=messages.numbers(act.input, self._whose[agent]["input"], (self._dimension,)),
             known=self._edges(agent, "known", act.known, (None,), "b"),
             estimate=self._edges(agent, "estimate", act.estimate, (None, self._rows["estimate"])),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,8 +99,8 @@ class ZenohCarrier:
 
     def end(self) -> None:
         """The run is over: tell the medium."""
-        ticks, number = self._world.ticks, self._numbers.next("sense")
-        self._sense.say(messages.pack(messages.Sense(ticks, WORLD, number, True, [], [], None, None, [])))
+        nothing = np.empty((0, self._world.formation.dimension))
+        self._say(self._world.ticks, last=True, measured=nothing, position=nothing)
 
     def _move_processes(self, tick: int) -> None:
         timeline = self.timeline
@@ -118,19 +118,48 @@ class ZenohCarrier:
             self._heard[agent] = 0
 
     def _publish(self, tick: int, scene: Scene, measured: Array) -> None:
-        number, motion = self._numbers.next("sense"), self._world.odometry(scene)
         fired, self._fired = list(self._fired), ()
+        self._say(
+            tick,
+            measured=measured,
+            position=scene.position,
+            motion=self._world.odometry(scene),
+            sightings=self._sightings(tick, scene),
+            fired=fired,
+        )
+
+    def _say(
+        self,
+        tick: int,
+        *,
+        measured: Array,
+        position: Array,
+        motion: Array | None = None,
+        sightings: list[messages.Sighted] | None = None,
+        fired: Sequence[int] = (),
+        last: bool = False,
+    ) -> None:
         sense = messages.Sense(
-            tick, WORLD, number, False, measured, scene.position, motion, self._sightings(tick, scene), fired
+            k=tick,
+            src=WORLD,
+            seq=self._numbers.next("sense"),
+            last=last,
+            measured=measured,
+            position=position,
+            motion=motion,
+            sightings=sightings,
+            fired=list(fired),
         )
         self._sense.say(messages.pack(sense))
 
-    def _sightings(self, tick: int, scene: Scene) -> list[dict[str, Any]] | None:
+    def _sightings(self, tick: int, scene: Scene) -> list[messages.Sighted] | None:
         sighting = self._world.sighting(tick, scene)
         if sighting is None:
             return None
-        agents = zip(*(field.tolist() for field in sighting), strict=True)
-        return [dict(zip(sighting._fields, said, strict=True)) for said in agents]
+        return [
+            messages.Sighted(position=position, done=bool(done), by=int(by), method=int(method))
+            for position, done, by, method in zip(*sighting, strict=True)
+        ]
 
     def _read_journal(self, tick: int) -> messages.Journal:
         self._supervisor.waits(tick, "its journal", lambda: (HUB,))
@@ -161,15 +190,12 @@ class ZenohCarrier:
 
 
 def _entry(journal: messages.Journal) -> Entry:
-    def rows(given: Any, width: int) -> Any:
-        return np.array(given, dtype=np.int64).reshape(-1, width)
-
     return Entry(
-        fates=np.array(journal.fates, dtype=np.uint8),
-        odd=rows(journal.odd, 5),
-        apart=rows(journal.apart, 4),
+        fates=journal.fates,
+        odd=journal.odd.reshape(-1, 5),
+        apart=journal.apart.reshape(-1, 4),
         late=journal.late,
-        dropped=rows(journal.dropped, 5),
-        released=rows(journal.released, 4),
+        dropped=journal.dropped.reshape(-1, 5),
+        released=journal.released.reshape(-1, 4),
         injected=journal.injected,
     )

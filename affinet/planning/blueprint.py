@@ -66,7 +66,8 @@ def world_of(given: Scenario, formation: Formation) -> World:
         When a covariance or a manoeuvre does not fit the formation.
     """
     return World(
-        seed=given.seed,
+        run_seed=given.seed,
+        swarm_seeds=None,
         dt=given.time.dt,
         ticks=given.time.ticks,
         order=given.dynamics.order,

@@ -139,7 +139,7 @@ class Access:
         """
         try:
             with Session(client(self.login, _CONNECT_S)) as session:
-                reply = session.ask(Keys(self.run).control, messages.pack_record(order), _PATIENCE_S)
+                reply = session.ask(Keys(self.run).control, messages.pack(order), _PATIENCE_S)
         except NotCarried as error:
             raise NotFlying(f"the run has ended, stands still, or refuses: {error}") from error
         return messages.unpack(Answer, reply)

@@ -44,7 +44,7 @@ def side_by_side(plan: Plan, seeds: Sequence[int]) -> Plan:
         plan,
         world=replace(
             world,
-            seed=np.repeat(np.array(seeds, dtype=np.uint64), size),
+            swarm_seeds=np.repeat(np.array(seeds, dtype=np.uint64), size),
             formation=_formation(world.formation, number),
             links=links,
             swarms=number,

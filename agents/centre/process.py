@@ -104,7 +104,13 @@ class CentreNode:
     def _tell(self, tick: int, told: CentreEstimate) -> None:
         for agent, voice in self._told.items():
             number = self._numbers.next(str(agent))
-            message = messages.Told(tick, CENTRE, number, told.relative[agent - 1], told.covariance[agent - 1])
+            message = messages.Told(
+                k=tick,
+                src=CENTRE,
+                seq=number,
+                relative=told.relative[agent - 1],
+                covariance=told.covariance[agent - 1],
+            )
             voice.say(messages.pack(message))
 
 

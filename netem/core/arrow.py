@@ -12,7 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.models.arrays import Integers, Mask
-from netem.core.plain import plainly
+from netem.core.plain import to_plain
 
 Names = Sequence[str] | NDArray[np.str_]
 
@@ -47,7 +47,7 @@ class Stream:
             column if isinstance(column, pa.Array) else pa.array(column, self._schema.field(name).type)
             for name, column in columns.items()
         ]
-        beside = None if note is None else {_NOTE: json.dumps(note, default=plainly)}
+        beside = None if note is None else {_NOTE: json.dumps(to_plain(note))}
         self._stream.write_batch(pa.record_batch(arrays, schema=self._schema), custom_metadata=beside)
 
     def close(self) -> None:

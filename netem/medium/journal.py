@@ -20,7 +20,7 @@ from netem.core import arrow
 from netem.core.arrow import NAMES, Stream, named, places
 from netem.core.channels import SENSE
 from netem.core.links import Links
-from netem.core.plain import from_plain, plainly
+from netem.core.plain import from_plain
 from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts
@@ -114,9 +114,7 @@ class Writer:
         parts = [rows for n, entry in enumerate(entries) for rows in self._of_tick(first + n, entry)]
         columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
         events = {
-            first + n: json.dumps(entry.injected, default=plainly)
-            for n, entry in enumerate(entries)
-            if entry.injected is not None
+            first + n: json.dumps(entry.injected) for n, entry in enumerate(entries) if entry.injected is not None
         }
         with system_errors.about(self._path):
             self._stream.write(self._table(_Rows(*columns), events), self.accounts)

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 
 import msgpack
 
-from netem.core.plain import from_plain, plainly
+from netem.core.plain import from_plain, to_plain
 from netem.processes.system_errors import said
 from netem.processes.user_code import UserCodeError
 
@@ -54,7 +54,7 @@ class _Doing(NamedTuple):
 
 def brief_bytes(brief: Any) -> bytes:
     """A brief as the launcher writes it to a child's standard input."""
-    packed: bytes = msgpack.packb(brief, default=plainly)
+    packed: bytes = msgpack.packb(to_plain(brief))
     return _LENGTH.pack(len(packed)) + packed
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Sequence
 
 from analysis.models.arrays import Array
+from netem.core.plain import shown
 from netem.wire import messages
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
@@ -49,7 +50,7 @@ class Broadcasts:
             raise messages.WireError(f"{whose}: {error}") from error
         if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
             raise messages.WireError(
-                f"{whose} in tick {tick}: it speaks as agent {said.src}, on {messages.shown(said.channel)}, of tick {said.k}; "
+                f"{whose} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
                 f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
             )
         self._streams.check(f"{said.src} {said.channel}", said.seq)

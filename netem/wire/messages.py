@@ -6,35 +6,42 @@ key, from 0). The maps are spelled out in docs/protocol.md; an agent needs nothi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from enum import StrEnum
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, TypeVar
 
-import msgpack
+import msgspec
 import numpy as np
 
 from analysis.models.arrays import Array, Integers, Mask
-from netem.core.plain import PlainError, from_plain, plainly
+from netem.core.plain import as_array, located, plainly, shown
 from netem.faults.control import Answer, Order
 from netem.medium.verdict import Fates
 
 T = TypeVar("T")
-Rows = list[Any]  # a nested list that is passed on as it came
 
 
 class WireError(ValueError):
     """A message that does not say what its key promises."""
 
 
-class Phase(StrEnum):
-    """Which part of a tick an inbox belongs to."""
-
-    SENSE = "sense"
-    EXCHANGE = "exchange"
-    END = "end"
+class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Named fields, each of its type: what is anything else is no message."""
 
 
-class Sense(NamedTuple):
+class Sighted(_Message, frozen=True, kw_only=True):
+    """What a detector says of a target: where it was when the detection began, shape (D,), in metres, if one is `done`.
+
+    `by` is the number of the method it was found by, `method` that of the method used from now on.
+    """
+
+    position: Array
+    done: bool
+    by: int
+    method: int
+
+
+class Sense(_Message, frozen=True, kw_only=True):
     """World to medium: the raw sensing of tick k; `last` says that the run is over and nothing was sensed.
 
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
@@ -47,37 +54,35 @@ class Sense(NamedTuple):
     src: str
     seq: int
     last: bool
-    measured: Array | Rows
-    position: Array | Rows
-    motion: Array | Rows | None
-    sightings: Rows | None
-    fired: Rows
+    measured: Array
+    position: Array
+    motion: Array | None
+    sightings: list[Sighted] | None
+    fired: list[int]
 
 
-class SenseInbox(NamedTuple):
+class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="sense"):
     """Medium to agent: the measurements of tick k that reached it.
 
     `clock` is what the agent's own clock says, in ticks; `neighbours` are the agents measured, shape (m,), `measured` their
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
     positioning, get it; `motion` its own velocity and higher derivatives, shape (m - 1, D), in metres per second, per second
     squared ..., if it integrates its input m > 1 times to a position; `sighting` what its detector says of a target, if there
-    is one: `position`, where it was when the detection began, in metres, if one is `done`, the number of the method it was
-    found `by`, and of the `method` that the detector uses from now on.
+    is one.
     """
 
     k: int
     src: str
     seq: int
-    phase: Phase
     clock: int
-    neighbours: Rows
-    measured: Rows
-    position: Rows | None
-    motion: Rows | None
-    sighting: dict[str, Any] | None
+    neighbours: list[int]
+    measured: Array
+    position: Array | None
+    motion: Array | None
+    sighting: Sighted | None
 
 
-class Broadcast(NamedTuple):
+class Broadcast(_Message, frozen=True, kw_only=True):
     """Agent to its neighbours, through the medium: named fields of numbers and nested lists."""
 
     k: int
@@ -87,29 +92,24 @@ class Broadcast(NamedTuple):
     payload: dict[str, Any]
 
 
-class ExchangeInbox(NamedTuple):
-    """Medium to agent: the broadcasts that arrive in the exchange of tick k, sorted by (k, src, channel).
-
-    They are plain maps with the fields of `Broadcast`, which the medium has read and checked before it passes them on.
-    """
+class ExchangeInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="exchange"):
+    """Medium to agent: the broadcasts that arrive in the exchange of tick k, sorted by (k, src, channel)."""
 
     k: int
     src: str
     seq: int
-    phase: Phase
-    messages: Rows
+    messages: list[Broadcast]
 
 
-class EndInbox(NamedTuple):
+class EndInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="end"):
     """Medium to agent: the run is over."""
 
     k: int
     src: str
     seq: int
-    phase: Phase
 
 
-class Act(NamedTuple):
+class Act(_Message, frozen=True, kw_only=True):
     """Agent to world: its control input, and what it believes.
 
     `input` is u_i, shape (D,), in metres per second, or per second squared of a double integrator; `estimate` the relative
@@ -123,17 +123,17 @@ class Act(NamedTuple):
     k: int
     src: int
     seq: int
-    input: Array | Rows
-    estimate: Array | Rows
-    known: Mask | Rows
-    covariance: Array | Rows
+    input: Array
+    estimate: Array
+    known: Mask
+    covariance: Array
     psi: float
     feasible: bool | None
     reports: dict[str, Any]
     heard: int
 
 
-class Told(NamedTuple):
+class Told(_Message, frozen=True, kw_only=True):
     """Centre to agent: its edges as the centralized filter sees them.
 
     `relative` has a row for each slot, shape (n, D), in metres, 0 in padding, `covariance` theirs, shape (n, D, D), in square
@@ -143,11 +143,11 @@ class Told(NamedTuple):
     k: int
     src: str
     seq: int
-    relative: Array | Rows
-    covariance: Array | Rows
+    relative: Array
+    covariance: Array
 
 
-class Journal(NamedTuple):
+class Journal(_Message, frozen=True, kw_only=True):
     """Medium to world: the verdicts of tick k.
 
     `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `odd` the messages
@@ -159,31 +159,34 @@ class Journal(NamedTuple):
     k: int
     src: str
     seq: int
-    fates: Fates | Rows
-    odd: Integers | Rows
-    apart: Integers | Rows
+    fates: Fates
+    odd: Integers
+    apart: Integers
     late: int
-    dropped: Integers | Rows
-    released: Integers | Rows
-    handed: Rows
-    injected: Rows | None
+    dropped: Integers
+    released: Integers
+    handed: list[int]
+    injected: list[Any] | None
 
 
-# One packer, used again and again: a new one takes and returns a quarter of a megabyte for every message.
-_PACKER = msgpack.Packer(default=plainly)
+class _Relayed(msgspec.Struct, frozen=True, kw_only=True, tag_field="phase", tag="exchange"):
+    """An `ExchangeInbox` around broadcasts that are packed already."""
+
+    k: int
+    src: str
+    seq: int
+    messages: list[msgspec.Raw]
+
+
+Inbox = SenseInbox | ExchangeInbox | EndInbox
+
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=plainly)
 _AS_IN_AN_INBOX = b"\x91\x91"  # a list in a list, as deep as the messages of an exchange
 
-INBOXES: dict[str, type[SenseInbox | ExchangeInbox | EndInbox]] = {
-    Phase.SENSE: SenseInbox,
-    Phase.EXCHANGE: ExchangeInbox,
-    Phase.END: EndInbox,
-}
 
-
-def pack(message: NamedTuple) -> bytes:
-    """A message as MessagePack."""
-    packed: bytes = _PACKER.pack(message._asdict())
-    return packed
+def pack(message: _Message | Order | Answer) -> bytes:
+    """A message, an order to the medium or its answer as MessagePack."""
+    return _ENCODER.encode(message)
 
 
 def unpack(kind: type[T], data: bytes) -> T:
@@ -194,7 +197,8 @@ def unpack(kind: type[T], data: bytes) -> T:
     WireError
         When it is no such message: which field, what was expected, what came.
     """
-    return _read(kind, _load(data))
+    read: T = _read(kind, kind.__name__, data)
+    return read
 
 
 def unpack_relayed(data: bytes) -> Broadcast:
@@ -205,8 +209,25 @@ def unpack_relayed(data: bytes) -> Broadcast:
     WireError
         When it is no broadcast, or nests too deep.
     """
-    ((plain,),) = _load(_AS_IN_AN_INBOX + data)
-    return _read(Broadcast, plain)
+    broadcasts: list[list[Broadcast]] = _read(list[list[Broadcast]], "Broadcast", _AS_IN_AN_INBOX + data, "$[0][0]")
+    return broadcasts[0][0]
+
+
+def unpack_inbox(data: bytes) -> Inbox:
+    """What the medium sent an agent, by its phase.
+
+    Raises
+    ------
+    WireError
+        When it is no inbox.
+    """
+    read: Inbox = _read(Inbox, "an inbox", data)
+    return read
+
+
+def pack_exchange(k: int, seq: int, broadcasts: Sequence[bytes]) -> bytes:
+    """An exchange inbox around broadcasts that are packed already: the medium relays what was said, byte for byte."""
+    return _ENCODER.encode(_Relayed(k=k, src="netem", seq=seq, messages=[msgspec.Raw(said) for said in broadcasts]))
 
 
 def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds: str = "iuf") -> Array:
@@ -228,12 +249,12 @@ def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds:
     WireError
         When it is something else.
     """
-    if isinstance(given, list) and not given and shape and not shape[0]:
-        return np.empty([length or 0 for length in shape])
     try:
         array = np.array(given)
     except (TypeError, ValueError, OverflowError, RecursionError):
         array = np.array(None)
+    if array.shape == (0,) and shape and not shape[0]:
+        return np.empty([length or 0 for length in shape])
     if not (shape is None or _fits(array.shape, shape)) or (array.dtype.kind not in kinds and array.size):
         what = "truths" if kinds == "b" else "numbers"
         of = "" if shape is None else f" of shape ({', '.join('any' if n is None else str(n) for n in shape)})"
@@ -241,65 +262,19 @@ def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds:
     return array
 
 
-def shown(given: Any) -> str:
-    """Whatever it is, in a few words."""
+@cache
+def _decoder(kind: Any) -> Any:
+    return msgspec.msgpack.Decoder(kind, dec_hook=as_array)
+
+
+def _read(kind: Any, name: str, data: bytes, root: str = "$") -> Any:
     try:
-        text = repr(given)
-    except RecursionError:
-        return f"a {type(given).__name__} that nests too deep"
-    return text if len(text) < 80 else text[:77] + "..."
-
-
-def unpack_inbox(data: bytes) -> SenseInbox | ExchangeInbox | EndInbox:
-    """What the medium sent an agent, by its phase.
-
-    Raises
-    ------
-    WireError
-        When it is no inbox.
-    """
-    plain = _load(data)
-    phase = plain.get("phase") if isinstance(plain, dict) else None
-    if not isinstance(phase, str) or phase not in INBOXES:
-        raise WireError(f"an inbox needs a phase among {list(INBOXES)}, got {phase!r} (see docs/protocol.md)")
-    return _read(INBOXES[phase], plain)
-
-
-def pack_exchange(k: int, seq: int, broadcasts: Sequence[bytes]) -> bytes:
-    """An exchange inbox around broadcasts that are packed already: the medium relays what was said, byte for byte."""
-    head: Mapping[str, Any] = {"k": k, "src": "netem", "seq": seq, "phase": Phase.EXCHANGE}
-    return b"".join(
-        [
-            _PACKER.pack_map_header(len(head) + 1),
-            *(_PACKER.pack(part) for item in head.items() for part in item),
-            _PACKER.pack("messages"),
-            _PACKER.pack_array_header(len(broadcasts)),
-            *broadcasts,
-        ]
-    )
-
-
-def pack_record(record: Order | Answer) -> bytes:
-    """An order to the medium, or its answer, as MessagePack."""
-    packed: bytes = _PACKER.pack(record)
-    return packed
-
-
-def _read(kind: type[T], plain: Any) -> T:
-    try:
-        return from_plain(kind, plain)
-    except PlainError as error:
-        raise WireError(f"{kind.__name__}: {error} (see docs/protocol.md)") from error
-    except RecursionError as error:
-        raise WireError(f"{kind.__name__}: it nests too deep (see docs/protocol.md)") from error
+        return _decoder(kind).decode(data)
+    except msgspec.ValidationError as error:
+        raise WireError(f"{name}: {located(error, root)} (see docs/protocol.md)") from error
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        raise WireError(f"{name}: not MessagePack: {error} (see docs/protocol.md)") from error
 
 
 def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
     return shape == wanted or (wanted[:1] == (None,) and len(shape) == len(wanted) and shape[1:] == wanted[1:])
-
-
-def _load(data: bytes) -> Any:
-    try:
-        return msgpack.unpackb(data)
-    except (ValueError, msgpack.UnpackException) as error:
-        raise WireError(f"not MessagePack: {error}") from error

@@ -4,6 +4,8 @@ import os
 import sys
 import time
 
+from msgspec.structs import replace
+
 from agents.process import AgentBrief, AgentNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
@@ -23,7 +25,7 @@ class Wayward(AgentNode):
         if inbox.k == TICK:
             match self.wrong:
                 case "loses":
-                    inbox = inbox._replace(messages=inbox.messages[1:])
+                    inbox = replace(inbox, messages=inbox.messages[1:])
                 case "skips":
                     self._numbers.next("act")
                 case "prints":

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array, Integers, Mask
@@ -58,8 +59,8 @@ class World:
 
     Parameters
     ----------
-    seed
-        Of the run, or of every agent's run, shape (N,).
+    run_seed, swarm_seeds
+        Of the run; and of every agent's run, shape (N,), where runs fly side by side.
     dt
         Tick, in seconds.
     ticks
@@ -82,7 +83,8 @@ class World:
         How many swarms fly side by side, each with its own disturbances.
     """
 
-    seed: Seed
+    run_seed: int
+    swarm_seeds: NDArray[np.uint64] | None
     dt: float
     ticks: int
     order: int
@@ -95,6 +97,11 @@ class World:
     start: Literal["targets", "origin"]
     spread: float
     swarms: int
+
+    @property
+    def seed(self) -> Seed:
+        """What all draws are made with."""
+        return self.run_seed if self.swarm_seeds is None else self.swarm_seeds
 
     def begin(self) -> Scene:
         """The scene in tick 0: everybody where the scatter puts it, at rest."""
