@@ -13,10 +13,8 @@ import zenoh
 from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Brief
-from agents.estimators.centralized import CentralizedFilter
 from agents.exchange import Heard
-from agents.loading import parameters
-from agents.loading.calling import Calling, load
+from agents.loading.choice import Choice
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Sighting
 from netem.core import channels
@@ -27,40 +25,6 @@ from netem.wire import messages
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
 from netem.wire.session import CENTRE, HUB, Login, await_subscribers, client
-
-
-@dataclass(frozen=True)
-class Choice:
-    """An algorithm to run.
-
-    Parameters
-    ----------
-    path
-        "module:Class".
-    parameters
-        Those of its parameters that were given, as a scenario says them.
-    folder
-        In which its module lies, if that is the user's own.
-    """
-
-    path: str
-    parameters: dict[str, Any]
-    folder: str | None = None
-
-    def build(self) -> Any:
-        """The algorithm.
-
-        Raises
-        ------
-        UserCodeError
-            When its module cannot be imported, or the algorithm not be made.
-        """
-        algorithm = load(self.path, self.folder)
-        with Calling(algorithm, "__init__"):
-            made = algorithm(**parameters.arguments(algorithm, self.parameters))
-        with Calling(algorithm, "__getattribute__"):
-            isinstance(made, CentralizedFilter)  # asks it for its class, which it may refuse to tell
-        return made
 
 
 @dataclass(frozen=True)
@@ -75,6 +39,8 @@ class AgentBrief:
         Its number, and the numbers of the agents in its neighbour slots.
     estimator, law, leaders, leader_gain, limit, reports, brief
         What `Agent` is made of.
+    hears_centre
+        Whether a centre tells it its edges.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
     """
@@ -90,6 +56,7 @@ class AgentBrief:
     limit: float | None
     reports: Mapping[str, tuple[int, ...]]
     brief: Brief
+    hears_centre: bool
     checkpoint: str | None
     remembers: bool
 
@@ -135,9 +102,8 @@ class AgentNode:
         spoken = sorted([channels.MEASUREMENT, *self._channels])
         self._broadcasts = {name: session.declare_publisher(keys.broadcast(self._number, name)) for name in spoken}
         self._act = session.declare_publisher(keys.act(self._number))
-        centralized = isinstance(self._agent.estimator, CentralizedFilter)
         ears: Any = zenoh.handlers.FifoChannel(64)
-        self._told = session.declare_subscriber(keys.told(self._number), ears) if centralized else None
+        self._told = session.declare_subscriber(keys.told(self._number), ears) if brief.hears_centre else None
         self._tellings = Sequences("the centre's")
 
     def await_everybody(self) -> None:
@@ -213,7 +179,7 @@ class AgentNode:
         if told.k != tick:
             raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
         fields = {name: np.array(getattr(told, name), dtype=np.float64) for name in ("relative", "covariance")}
-        return {channels.CENTRE: Heard(fields, np.ones(self._width, dtype=bool))}
+        return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
 
     def _gather(self, arrived: messages.Rows) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.

@@ -54,8 +54,12 @@ EXEMPT = {
         world.formation.manoeuvre.turned world.recording.stage.origin world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises analysis.models.cuts.smallest_cut
-        analysis.metrics.localization.step analysis.metrics.localization.rates analysis.claims.random_graphs.edges
+        analysis.models.jacobi.step analysis.models.jacobi.rates analysis.claims.random_graphs.edges
         analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
+        agents.algebra.stability.chain_step agents.algebra.stability.radius
+        agents.algebra.stability.stretch_eigenvalue agents.laws.heard_late.one_tick_radius
+        agents.loading.capabilities.step_matrix agents.swarm.SwarmBrief.follower_degree
+        agents.swarm.SwarmBrief.follower_stress agents.swarm.SwarmBrief.laplacian agents.swarm.SwarmBrief.process
     """,
     WRITTEN: """
         netem.medium.journal.Writer.write netem.medium.journal.Recorded.verdicts
@@ -72,17 +76,19 @@ EXEMPT = {
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
     """,
     SHAPES: """
-        agents.centre.filter.Centre.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
+        agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
         agents.algebra.kalman.motion agents.algebra.kalman.embedded agents.algebra.kalman.unknown
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PROTOCOL: """
-        agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
+        agents.estimators.base.Centre.step
+        agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance
     """,
     FLOWN: """
-        agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act
+        agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act agents.centre.checked.CheckedCentre.step
     """,
 }
 NAMES = [name for names in EXEMPT.values() for name in names.split()]
