@@ -19,6 +19,8 @@ class SwarmBrief:
     ----------
     dt, ticks
         Tick, in seconds, and how many of them the run has.
+    order
+        Of the bodies: how many times they integrate their input.
     late
         Whether all that agents say is heard ticks late: by next-tick exchange, or a delay of whole ticks for all messages.
     nominal
@@ -39,6 +41,7 @@ class SwarmBrief:
 
     dt: float
     ticks: int
+    order: int
     late: bool
     nominal: Array
     neighbours: Integers

@@ -72,6 +72,7 @@ def of_all(formation, **known):
     plain = {
         "dt": 0.1,
         "ticks": 100,
+        "order": 1,
         "late": False,
         "stress": np.zeros((agents, agents)),
         "sensor": Sensor("coordinates", 0.01 * np.eye(dimension)),

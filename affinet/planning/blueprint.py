@@ -172,6 +172,7 @@ def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
     return SwarmBrief(
         dt=first.dt,
         ticks=given.time.ticks,
+        order=first.order,
         late=given.time.exchange == "next-tick" or given.network.delay_ticks > 0,
         nominal=formation.nominal,
         neighbours=links.neighbours,

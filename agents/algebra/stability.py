@@ -18,7 +18,7 @@ def radius(matrix: Array) -> float:
 
 def settling_time(radius: float, dt: float) -> str:
     """How long what has this radius, below 1, takes to settle, in words; `dt` is the tick, in seconds."""
-    return f"settles to 1/e in {f'{-dt / log(np.array(radius)):.2f} s' if radius > 0.0 else 'one tick'}"
+    return f"settles to 1/e in {f'{-dt / log(radius):.2f} s' if radius > 0.0 else 'one tick'}"
 
 
 def chain_step(gains: Sequence[float], dt: float) -> Array:

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 import zenoh
 
+from agents.brief import DERIVATIVES
 from agents.centre.checked import CheckedCentre, centre_of
 from agents.estimators.base import CentreEstimate
 from agents.loading.choice import Choice
@@ -95,9 +96,9 @@ class CentreNode:
         return said
 
     def _input(self, agent: int, said: dict[str, Any]) -> Any:
-        return messages.numbers(
-            said.get("velocity"), f"agent {agent} on {INPUT!r}: 'velocity'", (self._swarm.dimension,)
-        )
+        name = DERIVATIVES[self._swarm.order - 1]
+        whose = f"agent {agent} on {INPUT!r}: {name!r}"
+        return messages.numbers(said.get(name), whose, (self._swarm.dimension,))
 
     def _measurements(self, said: dict[int, dict[str, Any]]) -> tuple[Any, Any]:
         agents, slots = self._swarm.neighbours.shape

@@ -43,7 +43,7 @@ class Centre(Protocol[State]):
         measured, seen
             Relative positions, shape (..., N, n, D), in metres, and which were made, shape (..., N, n).
         inputs
-            What the agents flew from the tick before, shape (..., N, D), in metres per second.
+            What the agents flew from the tick before, shape (..., N, D), in metres per second, or per second squared.
         """
 
 

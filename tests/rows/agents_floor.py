@@ -11,6 +11,7 @@ from agents import agent, estimate
 from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
+from agents.centre.checked import CheckedCentre
 from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
 from agents.estimators.centralized import SwarmFilter, Whole
@@ -75,10 +76,16 @@ CASES = {
         real(9),
     ),
     "agents.brief.Brief.degree": of(lambda stress: replace(BRIEF, stress=stress).degree, real(NEIGHBOURS)),
-    "agents.estimators.centralized.SwarmFilter.step": of(
-        lambda position, spread, measured, seen, flown: CENTRE.step(Whole(position, spread), measured, seen, flown),
-        *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
-    ),
+    **{
+        name: of(
+            lambda position, spread, *heard, centre=centre: centre.step(Whole(position, spread), *heard),
+            *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
+        )
+        for name, centre in (
+            ("agents.estimators.centralized.SwarmFilter.step", CENTRE),
+            ("agents.centre.checked.CheckedCentre.step", CheckedCentre(CENTRE, CENTRE.swarm)),
+        )
+    },
     "agents.laws.base.weighted": of(base.weighted, real(NEIGHBOURS), real(NEIGHBOURS, 2)),
     "agents.laws.base.stress_force": of(
         lambda stress, relative, known: base.stress_force(_brief(stress=stress), _estimate(relative, known)),
