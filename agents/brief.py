@@ -74,7 +74,7 @@ class Brief:
     target
         What there is to pursue, if anything.
     mission
-        The manoeuvre, for those who are told it: leaders, and everybody under feed-forward.
+        The manoeuvre, for those who are told it: leaders, and everybody where estimator or law want it.
     """
 
     dt: float

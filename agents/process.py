@@ -12,10 +12,8 @@ import numpy as np
 from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Brief
-from agents.estimators.centralized import CentralizedFilter
 from agents.exchange import Heard
-from agents.loading import parameters
-from agents.loading.calling import Calling, load
+from agents.loading.choice import Choice
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Sighting
 from netem.core import channels
@@ -30,40 +28,6 @@ from netem.wire.session import CENTRE, HUB, Login, client
 
 
 @dataclass(frozen=True)
-class Choice:
-    """An algorithm to run.
-
-    Parameters
-    ----------
-    path
-        "module:Class".
-    parameters
-        Those of its parameters that were given, as a scenario says them.
-    folder
-        In which its module lies, if that is the user's own.
-    """
-
-    path: str
-    parameters: dict[str, Any]
-    folder: str | None = None
-
-    def build(self) -> Any:
-        """The algorithm.
-
-        Raises
-        ------
-        UserCodeError
-            When its module cannot be imported, or the algorithm not be made.
-        """
-        algorithm = load(self.path, self.folder)
-        with Calling(algorithm, "__init__"):
-            made = algorithm(**parameters.arguments(algorithm, self.parameters))
-        with Calling(algorithm, "__getattribute__"):
-            isinstance(made, CentralizedFilter)  # asks it for its class, which it may refuse to tell
-        return made
-
-
-@dataclass(frozen=True)
 class AgentBrief:
     """All an agent process is told.
 
@@ -75,6 +39,8 @@ class AgentBrief:
         Its number, and the numbers of the agents in its neighbour slots.
     estimator, law, leaders, leader_gain, limit, reports, brief
         What `Agent` is made of.
+    hears_centre
+        Whether a centre tells it its edges.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
     """
@@ -90,6 +56,7 @@ class AgentBrief:
     limit: float | None
     reports: Mapping[str, tuple[int, ...]]
     brief: Brief
+    hears_centre: bool
     checkpoint: str | None
     remembers: bool
 
@@ -135,8 +102,7 @@ class AgentNode:
         spoken = sorted([channels.MEASUREMENT, *self._channels])
         self._broadcasts = {name: session.says(keys.broadcast(self._number, name)) for name in spoken}
         self._act = session.says(keys.act(self._number))
-        centralized = isinstance(self._agent.estimator, CentralizedFilter)
-        self._told = session.hears(keys.told(self._number), 64) if centralized else None
+        self._told = session.hears(keys.told(self._number), 64) if brief.hears_centre else None
         self._tellings = Sequences("the centre's")
 
     def await_everybody(self) -> None:
@@ -217,7 +183,7 @@ class AgentNode:
         if told.k != tick:
             raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
         fields = {"relative": told.relative, "covariance": told.covariance}
-        return {channels.CENTRE: Heard(fields, np.ones(self._width, dtype=bool))}
+        return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
 
     def _gather(self, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.

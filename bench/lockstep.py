@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.runtimes.launcher import Launcher
 from affinet.scenario import loading

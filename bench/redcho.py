@@ -13,7 +13,7 @@ import argparse
 
 import numpy as np
 
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.scenario import loading
 from affinet.studies.batch import fly_all
 from agents.algebra.redcho import Consensus
@@ -56,7 +56,7 @@ def _numbers(text: str) -> list[float]:
 def _flown(seconds: float, seed: int) -> tuple[Array, Integers]:
     """What every agent knows in every tick, with derivatives, shape (T, m + 1, N, C), and its neighbours (N, n)."""
     overrides = (f"time.dt={_TICK}", f"time.duration={seconds}", 'agents.parameters.target.fusion="none"')
-    flown = plan.make(loading.load("target", overrides))
+    flown = making.make(loading.load("target", overrides))
     (known,) = [fly_all(flown, [seed], 1).first["information"]]
     return np.moveaxis(known, 1, 2), flown.world.links.neighbours
 

@@ -5,6 +5,7 @@ import numpy as np
 from agents.brief import Brief, Own
 from agents.estimate import Estimate
 from agents.exchange import Heard
+from agents.swarm import SwarmBrief
 from analysis.models.sensor import Sensor
 from netem.core.channels import INPUT, THETA
 from netem.core.links import Links
@@ -62,6 +63,29 @@ def swarm(formation):
     links = Links.both_ways(formation.agents, formation.edges)
     relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
     return brief(np.where(links.present[..., None], relative, 0.0)), links
+
+
+def of_all(formation, **known):
+    """What is known of a swarm of this formation, where nothing disturbs it and everything arrives in time."""
+    links = Links.both_ways(formation.agents, formation.edges)
+    agents, dimension = formation.nominal.shape
+    plain = {
+        "dt": 0.1,
+        "ticks": 100,
+        "order": 1,
+        "late": False,
+        "stress": np.zeros((agents, agents)),
+        "sensor": Sensor("coordinates", 0.01 * np.eye(dimension)),
+        "correlation": np.eye(agents),
+        "displacement": np.zeros((dimension, dimension)),
+    }
+    return SwarmBrief(
+        nominal=formation.nominal,
+        neighbours=links.neighbours,
+        present=links.present,
+        leader=formation.is_leader,
+        **{**plain, **known},
+    )
 
 
 def hears(who, velocity=(0.0,), **fields):

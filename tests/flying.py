@@ -4,7 +4,7 @@ from functools import cache
 
 import pytest
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading

@@ -54,7 +54,6 @@ class Total(NamedTuple):
 class Own:
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = False
-    by_position: ClassVar[bool] = False
 
     def init(self, brief, batch):
         return Total(np.zeros((*batch, brief.dimension)))

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.scenario import loading
 from agents.agent import Agent, renew
 from agents.estimators.conral import ConsensusLocalization
@@ -102,7 +102,7 @@ def plans(tmp_path_factory):
     file = tmp_path_factory.mktemp("scenarios") / "space.toml"
     file.write_text(SPACE)
     return {
-        2: plan.make(
+        2: making.make(
             loading.load(
                 "hexa",
                 [
@@ -111,7 +111,7 @@ def plans(tmp_path_factory):
                 ],
             )
         ),
-        3: plan.make(loading.load(str(file))),
+        3: making.make(loading.load(str(file))),
     }
 
 

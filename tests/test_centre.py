@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from briefs import of_all
 from flying import PROCESSES, plan_of
 from scipy.linalg import block_diag
 
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario.sections import ScenarioError
 from affinet.studies.batch import fly_all
-from agents.centre.filter import Centre
+from agents.estimators.centralized import SwarmFilter
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
 from world.formation.nominal import PRESETS
@@ -22,16 +23,14 @@ RANGING = Sensor("range-bearing", np.diag([0.1, 0.3]) ** 2)
 
 
 def centre(rng, dimension=2, noise=1.0, reader=None):
-    size = HEXA.agents * dimension
-    root, sensor = rng.normal(size=(size, size)), rng.normal(size=(dimension, dimension))
-    return Centre(
-        dt=0.1,
-        neighbours=LINKS.neighbours,
-        present=LINKS.present,
+    between, sensor = rng.normal(size=(HEXA.agents, HEXA.agents)), rng.normal(size=(dimension, dimension))
+    swarm = of_all(
+        HEXA,
         sensor=reader or Sensor("coordinates", 0.01 * (sensor @ sensor.T + np.eye(dimension))),
-        process=noise * 1e-3 * root @ root.T,
-        prior_position=1.5,
+        correlation=noise * between @ between.T,
+        displacement=1e-3 * (sensor @ sensor.T + np.eye(dimension)),
     )
+    return SwarmFilter(swarm, prior_position=1.5)
 
 
 class Printed:
@@ -48,10 +47,10 @@ class Printed:
         self.covariance = filtered.prior_position**2 * self.lifted @ self.lifted.T
 
     def step(self, y, seen, u):
-        x = self.x + self.filtered.dt * self.lifted @ u.ravel()
-        covariance = self.covariance + self.lifted @ self.filtered.process @ self.lifted.T
-        H = np.eye(len(x))[np.repeat(seen, len(self.filtered.sensor.covariance))]
-        R = block_diag(*self.filtered.sensor.spread(y[seen]))
+        x = self.x + self.filtered.swarm.dt * self.lifted @ u.ravel()
+        covariance = self.covariance + self.lifted @ self.filtered.swarm.process @ self.lifted.T
+        H = np.eye(len(x))[np.repeat(seen, len(self.filtered.swarm.sensor.covariance))]
+        R = block_diag(*self.filtered.swarm.sensor.spread(y[seen]))
         K = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + R)
         self.x = x + K @ (y[seen].ravel() - H @ x)
         self.covariance = covariance - K @ H @ covariance

@@ -13,7 +13,7 @@ from agents.estimators.none import NoEstimator
 from agents.exchange import Heard
 from agents.laws.base import stress_force
 from agents.laws.leaders import pilot
-from agents.laws.single import ConstantVelocity, Static, VaryingVelocity, needs_mission
+from agents.laws.single import ConstantVelocity, Static, VaryingVelocity
 from analysis.models.affine import Manoeuvre
 from analysis.models.sensor import Sensor
 from netem.core.channels import INPUT
@@ -118,8 +118,8 @@ def test_feed_forward_needs_the_mission():
 
 def test_only_feed_forward_needs_the_mission():
     laws = [Static(), ConstantVelocity(), VaryingVelocity(), VaryingVelocity(source="estimated")]
-    assert not any(map(needs_mission, laws))
-    assert needs_mission(VaryingVelocity(source="feed-forward"))
+    assert not any(law.wants.mission for law in laws)
+    assert VaryingVelocity(source="feed-forward").wants.mission
 
 
 @pytest.fixture(scope="module")

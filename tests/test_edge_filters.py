@@ -9,7 +9,7 @@ from filterpy.kalman import KalmanFilter
 from flying import plan_of
 from offered import by_affinet
 
-from affinet.planning.plan import make
+from affinet.planning.making import make
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.run import rehearse
 from affinet.runtimes.side_by_side import side_by_side

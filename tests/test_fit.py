@@ -10,7 +10,7 @@ import pytest
 from flying import plan_of
 
 from affinet.cli import commands
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from world.books import history
@@ -89,7 +89,7 @@ def test_it_prints_overrides_that_fly(order, filters, flown, capsys):
     assert [line.split("=")[0] for line in lines] == [f"agents.parameters.{name}" for name in filters]
     for name in filters:
         given = loading.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"'])
-        estimator = plan.make(given).estimator.build()
+        estimator = making.make(given).estimator.build()
         if name == "silent-kf":
             assert estimator.coefficient == pytest.approx(model["coefficients"][0], rel=1e-5)
             assert estimator.sigma_u == pytest.approx(model["sigma_u"], rel=1e-5)
@@ -114,7 +114,7 @@ def test_overrides_of_small_and_large_inputs_fly_too(size, changed, capsys):
     assert commands.main(["fit", str(changed(lambda inputs: size * inputs))]) == 0
     lines = capsys.readouterr().out.splitlines()
     for name in ("edge-kf", "silent-kf"):
-        plan.make(loading.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"']))
+        making.make(loading.load("corridor", [*TINY, *lines, f'agents.estimator="{name}"']))
 
 
 def test_what_is_no_number_any_more_is_left_out(changed, flown):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flying import PROCESSES
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from netem.medium import journal

@@ -6,7 +6,7 @@ import pytest
 from flying import PROCESSES, plan_of
 
 from affinet.cli import commands
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.run import fly
 from netem.core.links import Links

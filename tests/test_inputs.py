@@ -7,7 +7,7 @@ import pytest
 from flying import PROCESSES
 
 from affinet.cli import commands
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError

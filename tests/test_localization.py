@@ -24,16 +24,9 @@ from agents.estimators.jor import JacobiOverRelaxation, Side
 from agents.exchange import Heard
 from analysis.claims import random_graphs
 from analysis.metrics import localization
-from analysis.metrics.localization import (
-    EdgeInformation,
-    centred,
-    centroid,
-    optimal,
-    ringing,
-    spectrum,
-    system,
-    weights,
-)
+from analysis.metrics.localization import centred, centroid, optimal, ringing
+from analysis.models import jacobi
+from analysis.models.jacobi import EdgeInformation, spectrum, system, weights
 from analysis.models.sensor import Sensor
 from netem.core.channels import PLACE
 from netem.core.links import Links
@@ -91,7 +84,7 @@ def edges_of(agents, made, dimension=2):
     information = np.zeros((agents, agents, dimension, dimension))
     for one in made:
         relative[one.i, one.j], information[one.i, one.j] = one.y, np.linalg.inv(one.covariance)
-    return localization.together(relative, information)
+    return jacobi.together(relative, information)
 
 
 def own_weights(agents, made, dimension=2):
@@ -266,7 +259,7 @@ def test_rates_are_the_spectral_radii_of_the_iteration():
             ones = np.tile(np.eye(2), (agents, 1))
             M_c = ones @ np.linalg.inv(sum(own)) @ np.concatenate(own, axis=1)
             kept = [row for row in range(2 * agents) if row // 2 != anchor]
-            found = localization.rates(edges, h, anchor)
+            found = jacobi.rates(edges, h, anchor)
             assert found.centroid == pytest.approx(radius(M - M_c), abs=1e-9)
             assert found.anchor == pytest.approx(radius(M[np.ix_(kept, kept)]), abs=1e-9)
 
@@ -319,12 +312,12 @@ def test_the_fastest_steps_are_those_of_section_v():
     for seed in range(20):
         edges = random_graphs.edges(seed, 6)
         values = np.sort(np.linalg.eigvals(dense(edges)).real)
-        smooth, fast = (localization.step(edges, kind) for kind in ("smooth", "fast"))
+        smooth, fast = (jacobi.step(edges, kind) for kind in ("smooth", "fast"))
         assert smooth == pytest.approx(1.0 / values[-1], rel=1e-9)
         assert fast == pytest.approx(2.0 / (values[2] + values[-1]), rel=1e-9)
         assert np.linalg.eigvals(iteration(edges, smooth)).real.min() == pytest.approx(0.0, abs=1e-9)
-        best = localization.rates(edges, fast, 0).centroid
-        assert all(localization.rates(edges, fast + off, 0).centroid > best for off in (-0.01, 0.01))
+        best = jacobi.rates(edges, fast, 0).centroid
+        assert all(jacobi.rates(edges, fast + off, 0).centroid > best for off in (-0.01, 0.01))
 
 
 # Ringing
@@ -574,7 +567,7 @@ def test_the_rate_is_the_one_that_is_told_before_the_flight():
     run = flown("time.duration=2")
     (told,) = (finding.says for finding in run.plan.findings if finding.check == "localization")
     off = localization.distance(run.arrays["place"], known(run))
-    rate = localization.rates(known(run), 0.49, 0).centroid
+    rate = jacobi.rates(known(run), 0.49, 0).centroid
     assert off[90] / off[60] == pytest.approx(rate**30, rel=0.05)
     # It is told from measurements without noise.
     assert float(told.split()[1]) == pytest.approx(rate, abs=0.03)
@@ -591,14 +584,14 @@ def test_the_check_tells_rates_and_the_fastest_steps_of_measurements_without_noi
     for anchor in ("false", "true"):
         plan = plan_of(NAME, *FOUR, f"agents.parameters.jor={{h=0.3,anchor={anchor}}}")
         (told,) = (finding for finding in plan.findings if finding.check == "localization")
-        rates = localization.rates(edges, 0.3, 2)  # agent 3 leads
+        rates = jacobi.rates(edges, 0.3, 2)  # agent 3 leads
         chosen = rates.anchor if anchor == "true" else rates.centroid
-        assert abs(rates.anchor - localization.rates(edges, 0.3, 0).anchor) > 1e-3
+        assert abs(rates.anchor - jacobi.rates(edges, 0.3, 0).anchor) > 1e-3
         assert told.level == "ok"
         assert told.says == (
             f"rate {chosen:.4f} a tick with h 0.3 (weighted centroid {rates.centroid:.4f}, agent 3 as the anchor "
-            f"{rates.anchor:.4f}); h {localization.step(edges, 'smooth'):.3f} is the fastest without ringing, "
-            f"{localization.step(edges, 'fast'):.3f} of all"
+            f"{rates.anchor:.4f}); h {jacobi.step(edges, 'smooth'):.3f} is the fastest without ringing, "
+            f"{jacobi.step(edges, 'fast'):.3f} of all"
         )
 
 

@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 from extremes import BASES, changed, numeric_fields, places
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading

@@ -17,8 +17,8 @@ from rich.console import Console
 from affinet.cli import progress, show
 from affinet.runtimes import directories, supervision
 from affinet.runtimes.run import fly
-from affinet.scenario.finding import Finding
 from analysis.figures import curves
+from analysis.models.finding import Finding
 from netem.wire import keys, session
 from netem.wire.keys import Keys
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, selectors
 from affinet.scenario.sections import ScenarioError

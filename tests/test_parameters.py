@@ -7,11 +7,11 @@ import msgpack
 import pytest
 from own_code import ESTIMATOR, broken, line_of, write
 
-from affinet.planning import plan, registry
+from affinet.planning import making, registry
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
-from agents.process import Choice
+from agents.loading.choice import Choice
 from netem.core.plain import from_plain, to_plain
 from netem.processes.user_code import UserCodeError
 
@@ -88,13 +88,13 @@ def given(name, values):
 
 def built(name, values):
     """The estimator as it flies in process, and as it flies in a process of its own."""
-    choice = plan.make(given(name, values)).estimator
+    choice = making.make(given(name, values)).estimator
     return choice.build(), from_plain(Choice, msgpack.unpackb(msgpack.packb(to_plain(choice)))).build()
 
 
 def refusal(name, values):
     with pytest.raises(ScenarioError) as caught:
-        plan.make(given(name, values))
+        making.make(given(name, values))
     return str(caught.value)
 
 
@@ -201,9 +201,9 @@ def test_the_parameters_there_are_are_listed(folder):
 def test_an_annotation_that_cannot_be_resolved_is_the_codes_own_fault(folder):
     text = broken(ESTIMATOR, ("class Own:\n", "class Own:\n    gain: 'Nowhere' = 1.0\n"))
     name = f"{write(folder, text)}:Own"
-    plan.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}")))  # not given, it need not be resolved
+    making.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}")))  # not given, it need not be resolved
     with pytest.raises(UserCodeError, match=rf"^{name}.__init__: NameError: name 'Nowhere' is not defined"):
-        plan.make(given(name, "gain=2.0"))
+        making.make(given(name, "gain=2.0"))
 
 
 def test_an_inherited_parameter_is_read_by_the_annotation_of_its_own_module(folder):
@@ -225,7 +225,7 @@ def test_an_error_of_another_kind_while_it_is_made_is_the_codes_own_fault(raised
     text = broken(ESTIMATOR, ("class Own:\n", post))
     name, line = write(folder, text), line_of(text, "raise ")
     with pytest.raises(UserCodeError, match=rf"^{name}:Own.__init__: {raised}: '?why'? \(.*{name}.py:{line}\)$"):
-        plan.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}:Own")))
+        making.make(loading.load("corridor", (*SIMPLE, f"agents.estimator={name}:Own")))
 
 
 # ---- where they are given
@@ -248,10 +248,10 @@ def test_a_table_in_quotes_is_read(header, folder):
     name = write(folder, FUTURE)
     file = folder / "own.toml"
     file.write_text(f"{WRITTEN}{header}\nneeded = 5\n".replace("NAME", name))
-    assert plan.make(loading.load(str(file))).estimator.build().needed == 5
+    assert making.make(loading.load(str(file))).estimator.build().needed == 5
     file.write_text(f"{WRITTEN}{header}\nneeded = 5\ngian = 5\n".replace("NAME", name))
     with pytest.raises(ScenarioError, match=rf"^own\.toml:12: agents\.parameters\.{name}:Own\.gian: unknown; did you"):
-        plan.make(loading.load(str(file)))
+        making.make(loading.load(str(file)))
 
 
 @pytest.mark.parametrize("key", ['"NAME:Own"', "'NAME:Own'", "NAME:Own"])
@@ -259,14 +259,14 @@ def test_an_override_in_quotes_is_read(key, folder):
     # Before: the quotes were taken for part of the name, and the parameters ignored.
     name = write(folder, FUTURE)
     overrides = (f"agents.parameters.{key}.needed=5".replace("NAME", name), f"agents.estimator={name}:Own")
-    assert plan.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
+    assert making.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
 
 
 def test_a_module_in_a_package_is_named_in_quotes(folder):
     (folder / "ownpackage").mkdir()
     (folder / "ownpackage" / "inner.py").write_text(FUTURE)
     overrides = ('agents.parameters."ownpackage.inner:Own".needed=5', "agents.estimator=ownpackage.inner:Own")
-    assert plan.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
+    assert making.make(loading.load("corridor", (*SIMPLE, *overrides))).estimator.build().needed == 5
 
 
 NOT_IN_USE = [
@@ -287,13 +287,13 @@ NOT_IN_USE = [
 @pytest.mark.parametrize(("override", "says"), NOT_IN_USE)
 def test_parameters_of_what_is_not_in_use_are_checked_too(override, says):
     with pytest.raises(ScenarioError) as caught:
-        plan.make(loading.load("corridor", (*SIMPLE, "agents.estimator=none", override)))
+        making.make(loading.load("corridor", (*SIMPLE, "agents.estimator=none", override)))
     assert says in str(caught.value)
 
 
 def test_parameters_of_what_is_not_in_use_may_be_given():
     given = ("agents.estimator=none", "agents.parameters.rkf.sigma_w=0.3", "agents.parameters.target.k=[1.0, 2.0]")
-    assert plan.make(loading.load("corridor", (*SIMPLE, *given))).estimator.parameters == {}
+    assert making.make(loading.load("corridor", (*SIMPLE, *given))).estimator.parameters == {}
 
 
 @pytest.mark.parametrize("group", [registry.ESTIMATORS, registry.LAWS])
@@ -311,10 +311,10 @@ def test_a_run_directory_has_them_as_they_were_given(folder, out):
     from affinet.runtimes.run import fly
 
     name = f"{write(folder, FUTURE)}:Own"
-    fly(plan.make(given(name, "needed=5, pair=[3, 4]")), "inprocess", out, lambda *_: None)
+    fly(making.make(given(name, "needed=5, pair=[3, 4]")), "inprocess", out, lambda *_: None)
     assert json.loads((out / "scenario.json").read_text())["agents"]["parameters"][name] == {
         "needed": 5,
         "pair": [3, 4],
     }
-    assert plan.make(loading.resolved(out)).estimator.build().pair == (3.0, 4)
-    assert rehearse(plan.make(loading.resolved(out))).outcome.verdict == "pass"
+    assert making.make(loading.resolved(out)).estimator.build().pair == (3.0, 4)
+    assert rehearse(making.make(loading.resolved(out))).outcome.verdict == "pass"

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from affinet.planning import plan, stability
+from affinet.planning import making
 from affinet.planning.plan import PlanError
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
+from agents.algebra import stability
 from agents.brief import Own
 from agents.estimate import Estimate
 from agents.exchange import Heard
+from agents.laws import heard_late
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.single import ConstantVelocity, Static, VaryingVelocity
 from world.formation.nominal import PRESETS
@@ -30,7 +32,7 @@ def no_process(monkeypatch):
 
 
 def make(name, *overrides):
-    return plan.make(loading.load(name, overrides))
+    return making.make(loading.load(name, overrides))
 
 
 def findings(made):
@@ -341,7 +343,7 @@ def test_the_step_matrix_is_one_tick_of_the_law(law, hovering):
     before = carried(law, offset, own, state)
     state, position, own = tick_of(hovering, law, state, nominal + offset, own)
     after = carried(law, position - nominal, own, state)
-    step = stability.step_matrix(law, *follower_block(hovering), 0.01)
+    step = law.step_matrix(*follower_block(hovering), 0.01)
     np.testing.assert_allclose(step @ np.concatenate([x[3:] for x in before]), np.concatenate([x[3:] for x in after]))
 
 
@@ -354,7 +356,7 @@ def test_a_formation_settles_when_the_radius_of_its_step_is_below_one(law, settl
         state, position, own = tick_of(hovering, law, state, position, own)
     off = np.abs(position - hovering.brief.nominal).max()
     assert off < 0.05 if settles else off > 1e3
-    assert (stability.radius(stability.step_matrix(law, *follower_block(hovering), 0.01)) < 1) == settles
+    assert (stability.radius(law.step_matrix(*follower_block(hovering), 0.01)) < 1) == settles
 
 
 @pytest.mark.parametrize(
@@ -370,7 +372,7 @@ def test_leaders_and_relaxation_decide_whether_velocities_heard_late_settle(lead
         state, position, own = tick_of(made, law, state, position, own)
     off = np.abs(position - made.brief.nominal).max()
     assert off < 0.05 if settles else off > 1e3
-    assert (stability.one_tick_radius(*follower_block(made), relaxation) < 1) == settles
+    assert (heard_late.one_tick_radius(*follower_block(made), relaxation) < 1) == settles
 
 
 @pytest.mark.parametrize("relaxation", [1.0, 0.9, 0.5])
@@ -388,8 +390,4 @@ def test_the_one_tick_radius_is_the_rate_of_the_iteration_of_inputs(idle, relaxa
         state, _, own = tick_of(made, law, state, made.brief.nominal, own)
         size.append(np.linalg.norm(own.input))
     rate = (size[399] / size[299]) ** (1 / 100)
-    assert rate == pytest.approx(stability.one_tick_radius(*follower_block(made), relaxation), abs=1e-4)
-
-
-def test_a_law_not_known_here_has_no_step():
-    assert stability.step_matrix(object(), np.eye(2), np.ones(2), 0.01) is None
+    assert rate == pytest.approx(heard_late.one_tick_radius(*follower_block(made), relaxation), abs=1e-4)

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from briefs import of_all
 from flying import plan_of
 from scripted import timeline
 
-from affinet.planning import checks
 from affinet.runtimes.run import rehearse
 from affinet.scenario.sections import ScenarioError
-from agents.estimators.none import NoEstimator
 from agents.estimators.target import TargetEstimator
 from analysis.models.information import position
+from world.formation.nominal import PRESETS
 
 NAME = "target"
 
@@ -98,11 +98,10 @@ def test_how_hard_redcho_switches_in_a_tick_is_told(given, switched, advised):
 
 def test_what_redcho_switches_is_of_the_order_of_the_target_and_of_no_other_fusion():
     third = TargetEstimator(theta=10.0, k=(24.0, 50.0, 35.0, 10.0), gamma=(1.0,) * 4)
-    (found,) = checks.chatter(third, 1e-6)
+    (found,) = third.checks(of_all(PRESETS["hexa10"], dt=1e-6))
     assert found.says == "REDCHO switches its highest derivative by 0.1 a tick (k_m theta^4 dt; 0.4 in paper 002)"
     for fusion in ("mean", "none"):
         assert noted("REDCHO", f'agents.parameters.target={{fusion="{fusion}"}}') == []
-    assert checks.chatter(NoEstimator(), 1.0) == []
 
 
 @pytest.mark.parametrize("late", ["network.delay_ticks=1", 'time.exchange="next-tick"'])

@@ -9,7 +9,7 @@ import pytest
 from briefs import hears
 from flying import plan_of
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.checks import leaders_apart
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse

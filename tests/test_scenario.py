@@ -5,7 +5,7 @@ from importlib.metadata import entry_points
 import numpy as np
 import pytest
 
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.scenario import loading, selectors
 from affinet.scenario.sections import ScenarioError
 from netem.core.links import Links
@@ -84,7 +84,7 @@ def file(tmp_path):
 
 @pytest.mark.parametrize("name", loading.shipped())
 def test_every_shipped_scenario_loads_and_can_fly(name):
-    made = plan.make(loading.load(name))
+    made = making.make(loading.load(name))
     assert made.scenario.description
     assert not any(finding.fatal for finding in made.findings)
 
@@ -95,7 +95,7 @@ def test_five_scenarios_are_shipped():
 
 def test_a_scenario_flies_as_it_is_written(file):
     file.write_text(GOOD)
-    made = plan.make(loading.load(str(file)))
+    made = making.make(loading.load(str(file)))
     links = made.world.links
     row = links.index[1, 2]
     assert (made.world.dt, made.world.ticks, made.world.seed) == (0.01, 100, 1)
@@ -135,7 +135,7 @@ def test_the_faults_of_the_network_fly_as_they_are_written(file):
         loss = 0.25
     """
     file.write_text(GOOD + more)
-    assert plan.make(loading.load(str(file))).faults[2:] == (
+    assert making.make(loading.load(str(file))).faults[2:] == (
         Fault(Verb.CUT, 60, None, pairs=((1, 2),), under_way=UnderWay.HOLD),
         Fault(Verb.PARTITION, 60, 70, groups=((1, 2), (3,)), under_way=UnderWay.DELIVER),
         Fault(Verb.LOSE, 20, None, pairs=((4, 2),), probability=0.25),
@@ -144,7 +144,7 @@ def test_the_faults_of_the_network_fly_as_they_are_written(file):
 
 def test_a_formation_of_ones_own_flies(file):
     file.write_text(GOOD.replace('preset = "zhao7"\n', OWN).replace("agents = [5]", "agents = [4]"))
-    formation = plan.make(loading.load(str(file))).world.formation
+    formation = making.make(loading.load(str(file))).world.formation
     assert formation.nominal.tolist() == [[0, 0], [1, 0], [0, 1], [1, 1]]
     assert formation.edges == ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
     assert formation.leaders == (1, 2, 3)
@@ -153,7 +153,7 @@ def test_a_formation_of_ones_own_flies(file):
 @pytest.mark.parametrize(("exchange", "least"), [("same-tick", 0), ("next-tick", 1)])
 def test_next_tick_exchange_delays_every_message_by_a_tick(file, exchange, least):
     file.write_text(GOOD)
-    (air,) = plan.make(loading.load(str(file), [f"time.exchange={exchange}"])).profiles
+    (air,) = making.make(loading.load(str(file), [f"time.exchange={exchange}"])).profiles
     assert air.least_delay == least
 
 
@@ -163,7 +163,7 @@ def test_an_agent_that_was_killed_twice_comes_back_at_its_restart(file):
             'verb = "cut"\nat = 0.1\nuntil = 0.3\nlinks = ["2->4", "1-2"]', 'verb = "kill"\nat = 0.1\nagents = [5]'
         )
     )
-    timeline = plan.make(loading.load(str(file))).timeline
+    timeline = making.make(loading.load(str(file))).timeline
     assert timeline.at(45).dead[4]
     assert not timeline.at(50).dead[4]
 
@@ -294,7 +294,7 @@ WRONG_OVERRIDES = [
 def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_right(file, override, key, remedy):
     file.write_text(GOOD)
     with pytest.raises(ScenarioError) as error:
-        plan.make(loading.load(str(file), [override]))
+        making.make(loading.load(str(file), [override]))
     (line,) = str(error.value).splitlines()
     assert line.startswith("--set")
     assert key in line
@@ -492,7 +492,7 @@ def test_what_is_wrong_in_a_file_is_one_line_that_says_the_file_the_key_and_what
     assert good in GOOD
     file.write_text(GOOD.replace(good, bad))
     with pytest.raises(ScenarioError) as error:
-        plan.make(loading.load(str(file)))
+        making.make(loading.load(str(file)))
     (line,) = str(error.value).splitlines()
     assert line.startswith("bad.toml:")
     assert f" {key}: " in line

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from test_runtimes import OCTAHEDRON
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario import verbs as verb_models

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
 from netem.faults.fault import Fault, UnderWay, Verb
@@ -37,7 +37,7 @@ def made(tmp_path):
     def make(*entries, head=HEAD):
         file = tmp_path / "told.toml"
         file.write_text(head + "".join(f"[[timeline]]\n{keys.strip()}\n" for keys in entries))
-        return plan.make(loading.load(str(file)))
+        return making.make(loading.load(str(file)))
 
     return make
 

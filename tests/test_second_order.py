@@ -7,7 +7,7 @@ import pytest
 from briefs import BRIEF, ESTIMATE, FORCE
 from flying import plan_of
 
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
@@ -18,7 +18,7 @@ from agents.exchange import Heard
 from agents.laws.base import stress_force
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.leaders import pilot_of_accelerations, saturated
-from agents.laws.single import Static, needs_mission
+from agents.laws.single import Static
 from analysis.models.affine import Manoeuvre
 from netem.core.channels import INPUT
 from netem.processes.user_code import UserCodeError
@@ -153,8 +153,8 @@ def test_relaxation_mixes_the_law_with_the_acceleration_now_flying():
 
 @LAWS
 def test_followers_need_no_mission(law):
-    assert not needs_mission(law)
-    assert not needs_mission(replace(law, source="estimated"))
+    assert not law.wants.mission
+    assert not replace(law, source="estimated").wants.mission
 
 
 # ---- the pilot
@@ -309,7 +309,7 @@ def test_the_limit_shortens_the_inputs_of_leaders_and_followers(law, octa10):
 
 
 def make(name, *overrides):
-    return plan.make(loading.load(name, overrides))
+    return making.make(loading.load(name, overrides))
 
 
 @pytest.mark.parametrize("law", ["static", "constant-velocity", "varying-velocity"])

@@ -6,7 +6,7 @@ from extremes import BASES
 from flying import plan_of
 from scripted import timeline
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading

@@ -14,7 +14,7 @@ from flying import PROCESSES
 from own_code import ESTIMATOR, LAW, broken, line_of, write
 
 from affinet.cli.commands import main
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
@@ -36,7 +36,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def made(key, name, *overrides):
-    return plan.make(loading.load("corridor", (*SIMPLE, f'agents.{key}="{name}:Own"', *overrides)))
+    return making.make(loading.load("corridor", (*SIMPLE, f'agents.{key}="{name}:Own"', *overrides)))
 
 
 def refused(key, name, *overrides):
@@ -386,7 +386,6 @@ LACKING += [
     pytest.param("law", broken(LAW, (ORDER, "")), "has no 'order': 1 if it steers velocities, 2 if acc", id="order"),
     pytest.param("law", broken(LAW, (ORDER, ORDER.replace("1", "7"))), "'order' is 7: 1 if it steers", id="order-7"),
     pytest.param("law", broken(LAW, ("by_stress", "stress")), "has no 'by_stress': whether it weighs", id="by-stress"),
-    pytest.param("law", broken(LAW, ("by_position", "at")), "has no 'by_position': whether it needs", id="by-position"),
 ]
 
 
@@ -449,7 +448,7 @@ PATHS = [
 def test_a_path_that_leads_nowhere_is_a_problem_of_the_scenario(path, says, folder):
     name = write(folder, ESTIMATOR)
     with pytest.raises(ScenarioError) as caught:
-        plan.make(loading.load("corridor", [*SIMPLE, f'agents.estimator="{path.replace("NAME", name)}"']))
+        making.make(loading.load("corridor", [*SIMPLE, f'agents.estimator="{path.replace("NAME", name)}"']))
     assert f"agents.estimator: {says.replace('NAME', name)}" in str(caught.value)
 
 
@@ -509,7 +508,7 @@ def test_a_module_called_like_a_package_of_ours_is_to_be_renamed(package, folder
     assert main(["check", "corridor", "--estimator", f"{package}:Own"]) == 2
     file = folder / f"{package}.py"
     assert f"{file} is called like a package of affinet's own: rename it" in capsys.readouterr().err
-    assert rehearse(plan.make(loading.load("corridor", SIMPLE))).outcome.verdict == "pass"
+    assert rehearse(making.make(loading.load("corridor", SIMPLE))).outcome.verdict == "pass"
 
 
 SLEEPER = "import sys\nimport threading\n\nthreading.Thread(target=threading.Event().wait).start()"
@@ -754,7 +753,7 @@ CHECKERS = [
 
 @pytest.mark.parametrize(("checker", "says"), CHECKERS, ids=[says for _, says in CHECKERS])
 def test_a_checker_that_fails_is_named_with_file_and_line(checker, says):
-    evidence = rehearse(plan.make(loading.load("corridor", SHORT)))
+    evidence = rehearse(making.make(loading.load("corridor", SHORT)))
     with pytest.raises(UserCodeError) as caught:
         checker(evidence)
     assert str(caught.value).startswith(says)

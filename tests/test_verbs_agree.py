@@ -5,7 +5,7 @@ import pytest
 from flying import PROCESSES, plan_of
 from scripted import timeline
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly
 from affinet.scenario import verbs
 from netem.medium import journal

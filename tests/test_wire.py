@@ -13,7 +13,8 @@ from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief, Choice
+from agents.loading.choice import Choice
+from agents.process import AgentBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
@@ -391,6 +392,7 @@ AGENT = AgentBrief(
     leader_gain=1.0,
     limit=3.0,
     brief=BRIEF,
+    hears_centre=True,
     reports={"place": (3,)},
     checkpoint="/tmp/agent-2.npz",
     remembers=True,

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel, TypeAdapter
 
 from affinet.cli.commands import main
-from affinet.planning import plan
+from affinet.planning import making
 from affinet.scenario import forms, loading
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.words import one_line, shown
@@ -23,7 +23,7 @@ def refused(*overrides):
     """What is said of the corridor with these overrides."""
     flown = "target" if "parameters.target" in overrides[0] else "corridor"
     with pytest.raises(ScenarioError) as error:
-        plan.make(loading.load(flown, overrides))
+        making.make(loading.load(flown, overrides))
     (line,) = str(error.value).splitlines()
     assert not RAW.search(line)
     return line.removeprefix("--set: ")

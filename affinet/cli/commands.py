@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from affinet.cli import options, show, terminal
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
@@ -29,11 +29,11 @@ from affinet.runtimes.interruption import Interrupted
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import loading
-from affinet.scenario.finding import Finding
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.words import among, one_line
 from affinet.studies import fit
 from affinet.verdicts import compare
+from analysis.models.finding import Finding
 from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
 from netem.processes.user_code import UserCodeError

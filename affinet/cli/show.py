@@ -14,8 +14,8 @@ from rich.text import Text
 
 from affinet.cli.progress import Bar
 from affinet.planning.plan import Plan
-from affinet.scenario.finding import Finding
 from affinet.verdicts.outcome import Outcome
+from analysis.models.finding import Finding
 from netem.faults.control import Answer
 
 if TYPE_CHECKING:

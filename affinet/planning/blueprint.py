@@ -11,6 +11,7 @@ import numpy as np
 from affinet.scenario import sections, selectors
 from affinet.scenario.sections import Scenario, ScenarioError
 from agents.brief import Brief
+from agents.swarm import SwarmBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Target
@@ -163,6 +164,25 @@ def brief_of(world: World, L: Array) -> Brief:
         leader=formation.is_leader,
         target=None if world.pursuit is None else world.pursuit.target,
         mission=world.manoeuvre,
+    )
+
+
+def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
+    """The swarm as a whole, from the world of its first tick and the stress matrix L, shape (N, N)."""
+    formation, links, disturbance = first.formation, first.links, first.disturbance
+    return SwarmBrief(
+        dt=first.dt,
+        ticks=given.time.ticks,
+        order=first.order,
+        late=given.time.exchange == "next-tick" or given.network.delay_ticks > 0,
+        nominal=formation.nominal,
+        neighbours=links.neighbours,
+        present=links.present,
+        leader=formation.is_leader,
+        stress=L,
+        sensor=first.sensor,
+        correlation=disturbance.between(formation.nominal),
+        displacement=disturbance.covariance,
     )
 
 

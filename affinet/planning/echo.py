@@ -9,7 +9,7 @@ import numpy as np
 
 from affinet.planning.link_classes import SCHEDULES, LinkClass
 from affinet.scenario import profiles
-from affinet.scenario.finding import Finding
+from analysis.models.finding import Finding
 from netem.core.links import Links
 from netem.impairments import delay, schedule
 from netem.impairments.chain import all_together

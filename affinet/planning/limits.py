@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.link_classes import LinkClass
-from affinet.scenario.finding import Finding
 from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
 from affinet.scenario.units import LARGEST, SMALLEST
+from analysis.models.finding import Finding
 from netem.core.links import Links
 from world.books.history import History
 from world.formation.nominal import Formation

@@ -12,11 +12,11 @@ from affinet.planning import limits, recordings
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
-from affinet.scenario.finding import Finding
 from affinet.scenario.profiles import LinkProfile
 from affinet.scenario.sections import NetworkSection, Scenario, ScenarioError, TimeSection, said_at
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.finding import Finding
 from netem.core import channels
 from netem.core.links import Links
 from netem.impairments import reach, trace

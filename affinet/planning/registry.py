@@ -16,8 +16,8 @@ from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from agents.loading import parameters
 from agents.loading.calling import Calling, NoSuchAlgorithm, load, name_of
+from agents.loading.choice import Choice
 from agents.loading.parameters import ParameterError
-from agents.process import Choice
 from netem.processes.user_code import UserCodeError, definition, text_of
 
 ESTIMATORS = "affinet.estimators"

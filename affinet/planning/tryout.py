@@ -8,6 +8,8 @@ import numpy as np
 
 from affinet.scenario.sections import ScenarioError
 from agents.agent import Agent, AgentAction
+from agents.brief import Brief
+from agents.centre.checked import CheckedCentre
 from agents.exchange import Heard
 from analysis.models.arrays import Mask
 from analysis.models.pursuit import Sighting
@@ -18,8 +20,10 @@ _LONGEST_NAME = 100  # of a file in an archive
 _NOT_FOR_A_FILE = frozenset({"file", "allow_pickle"})  # parameters of what writes arrays.npz
 
 
-def silent_tick(agents: Agent) -> Mapping[str, tuple[int, ...]]:
+def silent_tick(agents: Agent, centre: CheckedCentre | None) -> Mapping[str, tuple[int, ...]]:
     """All agents as one batch, as in process: what they report, and the shape of each for one agent.
+
+    The centre has its tick too, where there is one.
 
     Raises
     ------
@@ -29,7 +33,7 @@ def silent_tick(agents: Agent) -> Mapping[str, tuple[int, ...]]:
         When a report has a name that every run has already.
     """
     batch = agents.brief.present.shape[:1]
-    action = _tick(agents, batch, positioned=True)
+    action = _tick(agents, batch, None if centre is None else _told(centre, agents.brief), positioned=True)
     reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
     if taken := sorted(reports.keys() & (TAKEN | _NOT_FOR_A_FILE)):
         said = f"the estimator reports {', '.join(taken)}, which every run has already: give it another name"
@@ -43,20 +47,35 @@ def silent_tick(agents: Agent) -> Mapping[str, tuple[int, ...]]:
     return reports
 
 
-def alone(agent: Callable[[int], Agent], positioned: Mask) -> None:
+def alone(agent: Callable[[int], Agent], positioned: Mask, told_mission: Mask, centre: CheckedCentre | None) -> None:
     """One agent of each kind by itself, as in a process of its own: with no leading axes, and no more than it is told.
+
+    Kinds differ in whether they are told where they are, and the manoeuvre, shapes (N,).
 
     Raises
     ------
     UserCodeError
         When estimator or law fail, or return what they should not.
     """
-    agents = [agent(row) for row in sorted({int(np.argmax(positioned)), int(np.argmin(positioned))})]
-    for one in agents:
-        _tick(one, (), positioned=bool(positioned[0]) if len(agents) == 1 else one is agents[0])
+    _, firsts = np.unique(np.stack([positioned, told_mission]), axis=1, return_index=True)
+    for row in sorted(firsts.tolist()):
+        one = agent(row)
+        _tick(one, (), None if centre is None else _nothing_told(one.brief), positioned=bool(positioned[row]))
 
 
-def _tick(agents: Agent, batch: tuple[int, ...], *, positioned: bool) -> AgentAction:
+def _told(centre: CheckedCentre, brief: Brief) -> Heard:
+    """What the centre of all these agents tells when nothing is measured."""
+    still = np.zeros_like(brief.nominal)
+    _, told = centre.step(centre.begin(()), np.zeros_like(brief.relative), np.zeros_like(brief.present), still)
+    return Heard(told._asdict(), brief.present)
+
+
+def _nothing_told(brief: Brief) -> Heard:
+    unseen = np.zeros_like(brief.relative)
+    return Heard({"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}, brief.present)
+
+
+def _tick(agents: Agent, batch: tuple[int, ...], told: Heard | None, *, positioned: bool) -> AgentAction:
     brief = agents.brief
     nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
     motion = np.repeat(nowhere[..., None, :], agents.law.order - 1, axis=-2) if agents.law.order > 1 else None
@@ -65,11 +84,9 @@ def _tick(agents: Agent, batch: tuple[int, ...], *, positioned: bool) -> AgentAc
         channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
         for channel, fields in agents.channels().items()
     }
-    unseen = np.zeros_like(brief.relative)
-    told = {"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}
     sighting = None
     if brief.target is not None:
         sighting = Sighting(nowhere, np.zeros(batch, dtype=bool), *np.zeros((2, *batch), dtype=np.int64))
-    heard = {**silence, channels.CENTRE: Heard(told, nobody)}
+    heard = silence if told is None else {**silence, channels.CENTRE: told}
     _, action = agents.act(state, 0, heard, nowhere if positioned else None, motion, sighting)
     return action

@@ -10,7 +10,7 @@ import numpy as np
 from affinet.planning.plan import Plan
 from agents.agent import AgentAction, AgentState, renew
 from agents.brief import Reading
-from agents.centre.filter import Centre
+from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
@@ -109,13 +109,13 @@ class ArrayCarrier:
             return renew(self._state, self._fresh, np.isin(self._numbers, [*cold]))
         return self._state
 
-    def _from_the_centre(self, centre: Centre, measured: Array, seen: Mask, inputs: Array) -> Heard:
+    def _from_the_centre(self, centre: CheckedCentre, measured: Array, seen: Mask, inputs: Array) -> Heard:
         def of_swarms(array: Any) -> Any:
-            return array.reshape(self._world.swarms, len(centre.neighbours), *array.shape[1:])
+            return array.reshape(self._world.swarms, centre.swarm.agents, *array.shape[1:])
 
         self._whole, told = centre.step(self._whole, of_swarms(measured), of_swarms(seen), of_swarms(inputs))
         fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in told._asdict().items()}
-        return Heard(fields, seen)
+        return Heard(fields, self._links.present)
 
     def _reading(self, tick: int) -> Reading:
         """What the clocks say; one reading for all, where they agree, spares looking up the manoeuvre for each."""

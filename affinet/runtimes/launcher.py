@@ -17,7 +17,6 @@ from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
 from affinet.runtimes.supervision import ProcessGroup, module
 from affinet.runtimes.told import Event
-from agents.centre.filter import Centre
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief
 from netem.medium.medium import JOURNAL
@@ -130,7 +129,7 @@ class Launcher:
         group.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
         if self._plan.centre:
             login = self._logins[CENTRE]
-            group.start("centre", module("agents.centre.process"), self._centre_brief(self._plan.centre, login))
+            group.start("centre", module("agents.centre.process"), self._centre_brief(login))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(group, number)
         group.await_ready(group.children)
@@ -232,8 +231,8 @@ class Launcher:
             batch=self._plan.books(self._viewer).batch,
         )
 
-    def _centre_brief(self, centre: Centre, login: Login) -> CentreBrief:
-        return CentreBrief(self._run, login, self._plan.world.ticks, centre)
+    def _centre_brief(self, login: Login) -> CentreBrief:
+        return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm)
 
     def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
         plan, row = self._plan, number - 1
@@ -250,6 +249,7 @@ class Launcher:
             limit=plan.scenario.agents.limit,
             reports=plan.reports,
             brief=plan.brief_of(row),
+            hears_centre=plan.centre is not None,
             checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
             remembers=remembers,
         )

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from affinet.scenario.finding import Finding
 from affinet.scenario.sections import Scenario, ScenarioError
 from agents.loading import modules
+from analysis.models.finding import Finding
 from netem.medium.medium import JOURNAL
 
 FOLDER = "inputs"  # in a run directory

@@ -13,9 +13,10 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.inprocess import BatchTick, InProcessSwarm
 from affinet.runtimes.side_by_side import side_by_side
 from analysis.metrics import consistency, errors
-from analysis.metrics.localization import EdgeInformation, centroid, distance, ringing, weights
+from analysis.metrics.localization import centroid, distance, ringing
 from analysis.models.arrays import Array, Mask
 from analysis.models.information import position, reported
+from analysis.models.jacobi import EdgeInformation, weights
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from world.books.edges import of_swarms

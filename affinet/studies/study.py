@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.scenario import files
 from affinet.scenario import loading as scenarios

@@ -11,7 +11,7 @@ from random import Random
 from hypothesis import HealthCheck, Phase, find, reject, settings
 from hypothesis.errors import NoSuchExample
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse
 from affinet.scenario.loading import extended

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.runtimes.run import Runtime, evidence, fly, rehearse
 from affinet.scenario import loading as scenarios

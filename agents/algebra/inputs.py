@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.exchange import Heard
+from agents.swarm import SwarmBrief
 from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array
+from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
 _ROUNDING = 1e-9  # of the root of a random walk
@@ -79,6 +81,14 @@ def refuse_growing(coefficients: Sequence[float]) -> None:
     roots = np.abs(np.roots([1.0, *(-a for a in coefficients)]))
     if roots.max(initial=0.0) > 1.0 + _ROUNDING:
         raise ValueError(f"inputs with the coefficients {list(coefficients)} grow without end; give smaller ones")
+
+
+def in_time(swarm: SwarmBrief) -> list[Finding]:
+    """What there is to say of inputs that are heard late, and taken for those of the tick."""
+    if not swarm.late:
+        return []
+    says = "inputs are heard ticks late, and taken for those of this tick: the filters will be too sure of themselves"
+    return [Finding("inputs", "note", says)]
 
 
 def refuse_accelerations(said: Heard) -> None:

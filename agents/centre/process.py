@@ -1,17 +1,23 @@
-"""The centralized filter as a process (`python -m agents.centre.process`): it hears all agents, and tells each its edges."""
+"""A centre as a process (`python -m agents.centre.process`): it hears all agents, and tells each its edges."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
-from agents.centre.filter import Centre, CentreEstimate
+from agents.brief import DERIVATIVES
+from agents.centre.checked import CheckedCentre, centre_of
+from agents.estimators.base import CentreEstimate
+from agents.loading.choice import Choice
+from agents.swarm import SwarmBrief
 from netem.core.channels import INPUT, MEASUREMENT
 from netem.core.clock import Clock, Lockstep
+from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor, called
+from netem.processes.user_code import UserCodeError
 from netem.wire import messages
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
@@ -28,29 +34,28 @@ class CentreBrief:
     ----------
     run, login
         Where it connects, and as whom.
-    ticks
-        How many there are.
-    centre
-        The filter.
+    estimator
+        Whose centre it is.
+    swarm
+        What that is made for.
     """
 
     run: str
     login: Login
-    ticks: int
-    centre: Centre
+    estimator: Choice
+    swarm: SwarmBrief
 
 
 class CentreNode:
     """The centre on the network."""
 
-    def __init__(self, session: Session, supervisor: Supervisor, brief: CentreBrief) -> None:
-        self._supervisor, self._brief, self._centre = supervisor, brief, brief.centre
-        keys, self._agents = Keys(brief.run), range(1, len(brief.centre.neighbours) + 1)
+    def __init__(self, session: Session, supervisor: Supervisor, brief: CentreBrief, centre: CheckedCentre) -> None:
+        self._supervisor, self._swarm, self._centre = supervisor, brief.swarm, centre
+        keys, self._agents = Keys(brief.run), range(1, brief.swarm.agents + 1)
         self._ears = {channel: session.hears(keys.broadcast("*", channel), 4096) for channel in (MEASUREMENT, INPUT)}
         self._told = {agent: session.says(keys.told(agent)) for agent in self._agents}
         self._reader, self._numbers = Broadcasts(keys, self._agents, (MEASUREMENT, INPUT)), Numbering()
-        self._dimension = len(brief.centre.process) // len(brief.centre.neighbours)
-        slots = zip(brief.centre.neighbours.tolist(), brief.centre.present.tolist(), strict=True)
+        slots = zip(brief.swarm.neighbours.tolist(), brief.swarm.present.tolist(), strict=True)
         self._slots = [
             {number + 1: slot for slot, (number, real) in enumerate(zip(row, there, strict=True)) if real}
             for row, there in slots
@@ -68,7 +73,11 @@ class CentreNode:
             measured, seen = self._measurements(said[MEASUREMENT])
             inputs = np.array([self._input(agent, said[INPUT][agent]) for agent in self._agents])
             self._supervisor.works(tick)
-            state, told = self._centre.step(state, measured, seen, inputs)
+            try:
+                state, told = self._centre.step(state, measured, seen, inputs)
+            except UserCodeError as error:
+                error.tick = tick
+                raise
             self._tell(tick, told)
 
     def _hear(self, channel: str, tick: int) -> dict[int, dict[str, Any]]:
@@ -83,11 +92,13 @@ class CentreNode:
         return said
 
     def _input(self, agent: int, said: dict[str, Any]) -> Any:
-        return messages.numbers(said.get("velocity"), f"agent {agent} on {INPUT!r}: 'velocity'", (self._dimension,))
+        name = DERIVATIVES[self._swarm.order - 1]
+        whose = f"agent {agent} on {INPUT!r}: {name!r}"
+        return messages.numbers(said.get(name), whose, (self._swarm.dimension,))
 
     def _measurements(self, said: dict[int, dict[str, Any]]) -> tuple[Any, Any]:
-        agents, slots = self._centre.neighbours.shape
-        measured = np.zeros((agents, slots, self._dimension))
+        agents, slots = self._swarm.neighbours.shape
+        measured = np.zeros((agents, slots, self._swarm.dimension))
         seen = np.zeros((agents, slots), dtype=bool)
         for agent, observed in said.items():
             whose, slots_of = f"agent {agent} on {MEASUREMENT!r}", self._slots[agent - 1]
@@ -97,7 +108,9 @@ class CentreNode:
                     f"{whose}: 'neighbours': it has none called {strangers} (see docs/protocol.md)"
                 )
             rows = [slots_of[neighbour] for neighbour in whom]
-            given = messages.numbers(observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._dimension))
+            given = messages.numbers(
+                observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._swarm.dimension)
+            )
             measured[agent - 1, rows], seen[agent - 1, rows] = given, True
         return measured, seen
 
@@ -118,15 +131,22 @@ def _silent(agents: range, said: dict[int, Any]) -> list[str]:
     return [called(agent) for agent in sorted(set(agents) - set(said))]
 
 
-def main() -> None:
-    """Estimate until the run is over."""
+def main() -> NoReturn:
+    """Estimate until the run is over; the process ends here, whatever threads the user's own code has started."""
+    leave(status_of(_estimate))
+
+
+def _estimate() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(CentreBrief)
     with supervisor.confessing(), Session(client(brief.login)) as session:
-        listener = CentreNode(session, supervisor, brief)
+        centre = centre_of(brief.estimator.build(), brief.swarm)
+        if centre is None:
+            raise RuntimeError(f"{brief.estimator.path} wanted a centre when it was planned, and now wants none")
+        listener = CentreNode(session, supervisor, brief, centre)
         listener.await_everybody()
         supervisor.tell("ready")
-        listener.run(Lockstep(brief.ticks))
+        listener.run(Lockstep(brief.swarm.ticks))
         supervisor.tell("done")
 
 

@@ -1,9 +1,14 @@
-"""An agent's end of the centralized filter: it takes its edges as the centre tells them (`agents/centre/filter.py`)."""
+"""The centralized filter (paper 001, (9a)-(9g); paper 004, Algorithm 6): one Kalman filter that hears everything.
+
+It is the clairvoyant the others are measured against. It follows the agents' positions from an origin that nobody knows, (6)
+and (8) before they are multiplied by B^T: the edges it tells, B^T z, are those of (9), from a state a sixth of the size.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +16,10 @@ import numpy as np
 from agents.algebra.inputs import refuse_accelerations
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Centre, CentreEstimate, Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
+from agents.swarm import SwarmBrief
+from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from netem.core.channels import CENTRE, INPUT
 
@@ -21,8 +28,15 @@ class Stateless(NamedTuple):
     """It remembers nothing: the centre does."""
 
 
+class Whole(NamedTuple):
+    """What it believes of all agents: positions (..., N, D), and their covariance (..., N D, N D)."""
+
+    position: Array
+    covariance: Array
+
+
 @dataclass(frozen=True)
-class CentralizedFilter:
+class CentralizedFilter(Estimator[Stateless]):
     """CRKF, or C-Edge-KF: a process of its own hears all measurements and inputs, past the medium, and tells everybody.
 
     Parameters
@@ -66,3 +80,80 @@ class CentralizedFilter:
         told = heard[CENTRE].fields
         known = np.broadcast_to(brief.present, told["relative"].shape[:-1])
         return state, Estimate(told["relative"], known, told["covariance"], no_indicator(known))
+
+    def centre(self, swarm: SwarmBrief) -> Centre[Whole]:
+        """One filter for all agents."""
+        return SwarmFilter(swarm, self.prior_position)
+
+
+@dataclass(frozen=True)
+class SwarmFilter(Centre[Whole]):
+    """One Kalman filter for a swarm.
+
+    Parameters
+    ----------
+    swarm
+        What it is made for.
+    prior_position
+        Standard deviation of an agent's initial position, per axis, in metres.
+    """
+
+    swarm: SwarmBrief
+    prior_position: float
+
+    def begin(self, batch: tuple[int, ...]) -> Whole:
+        """Everybody at the same place, as far as is known (9a)-(9b)."""
+        agents, dimension = self.swarm.agents, self.swarm.dimension
+        prior = self.prior_position * self.prior_position * np.eye(agents * dimension)
+        return Whole(np.zeros((*batch, agents, dimension)), np.broadcast_to(prior, (*batch, *prior.shape)).copy())
+
+    def step(self, state: Whole, measured: Array, seen: Mask, inputs: Array) -> tuple[Whole, CentreEstimate]:
+        """Predict all agents by their inputs (9c)-(9d), and correct them by every measurement (9e)-(9g)."""
+        agents, dimension = state.position.shape[-2:]
+        position = state.position + self.swarm.dt * inputs
+        covariance = state.covariance + self.swarm.process
+        precision = np.where(seen[..., None, None], np.linalg.inv(self.swarm.sensor.spread(measured)), 0.0)
+        surprise = product(precision, (measured - self._edges(position))[..., None])
+        pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))
+        information = self._information(precision)
+        solved = np.linalg.solve(np.eye(agents * dimension) + product(covariance, information), covariance)
+        corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
+        moved = product(corrected, pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
+        whole = Whole(position + moved.reshape(position.shape), corrected)
+        return whole, CentreEstimate(self._edges(whole.position), self._spread(corrected, agents, dimension))
+
+    def _information(self, precision: Array) -> Array:
+        """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""
+        agents, dimension = self.swarm.agents, precision.shape[-1]
+        batch = precision.shape[:-4]
+        pairs = product(self._pairs, precision.reshape(*batch, -1, dimension * dimension))
+        blocks = pairs.reshape(*batch, agents, agents, dimension, dimension)
+        return np.swapaxes(blocks, -3, -2).reshape(*batch, agents * dimension, agents * dimension)
+
+    def _edges(self, position: Array) -> Array:
+        relative: Array = position[..., :, None, :] - position[..., self.swarm.neighbours, :]
+        return np.where(self.swarm.present[..., None], relative, 0.0)
+
+    def _spread(self, covariance: Array, agents: int, dimension: int) -> Array:
+        blocks = covariance.reshape(*covariance.shape[:-2], agents, dimension, agents, dimension)
+        blocks = np.swapaxes(blocks, -3, -2)
+        own, theirs = np.arange(agents)[:, None], self.swarm.neighbours
+        mine, others = blocks[..., own, own, :, :], blocks[..., theirs, theirs, :, :]
+        spread = mine + others - blocks[..., own, theirs, :, :] - blocks[..., theirs, own, :, :]
+        return np.where(self.swarm.present[..., None, None], spread, 0.0)
+
+    @cached_property
+    def _incidence(self) -> Array:
+        """B, shape (N, N n): +1 for who looks, -1 for who is looked at, 0 for padding."""
+        agents, slots = self.swarm.neighbours.shape
+        own, edges = np.repeat(np.arange(agents), slots), np.arange(agents * slots)
+        B = np.zeros((agents, agents * slots))
+        B[own, edges] = 1.0
+        B[self.swarm.neighbours.ravel(), edges] -= 1.0
+        return B * self.swarm.present.ravel()
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """What an edge adds to the information of each pair of agents, shape (N N, N n)."""
+        B = self._incidence
+        return (B[:, None, :] * B[None, :, :]).reshape(-1, B.shape[-1])

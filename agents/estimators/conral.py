@@ -10,7 +10,7 @@ of rotations is none; the map in use, and in the indicator, is the nearest that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,9 +20,12 @@ from agents.algebra import geometry
 from agents.algebra.constraints import MAPS, Constraint
 from agents.brief import Brief, Own
 from agents.estimate import Estimate
+from agents.estimators.base import Estimator
 from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
 from agents.exchange import Channels, Field, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from netem.core.channels import THETA
 
 
@@ -38,7 +41,7 @@ class Agreement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ConsensusLocalization:
+class ConsensusLocalization(Estimator[Agreement]):
     """conRAL: the measurements, and Theta_i^con p_ij in place of the missing ones.
 
     Parameters
@@ -94,6 +97,19 @@ class ConsensusLocalization:
         shape = self._in_use(consensus)
         covariance = state.covariance if maps.linear else self._covariance(shape, brief)
         return state._replace(consensus=consensus), complete(brief, state.perceived, shape, covariance, psi)
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether the consensus (14) converges on the graph."""
+        laplacian = swarm.laplacian
+        bound = 2.0 / (np.linalg.eigvalsh(laplacian)[-1] + np.diag(laplacian).max() + 1.0)
+        if self.epsilon <= 0.0:
+            says = f"epsilon {self.epsilon:g}: nothing is agreed on; give one above 0, below {bound:.4f}"
+        elif self.epsilon < bound:
+            says = f"epsilon {self.epsilon:g} is below the bound {bound:.4f} of (14) on this graph"
+            return [Finding("consensus", "ok", says)]
+        else:
+            says = f"epsilon {self.epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges"
+        return [Finding("consensus", "error", says)]
 
     def _covariance(self, shape: geometry.Fit, brief: Brief) -> Array:
         return MAPS[self.constraint].covariance(shape, brief.relative, brief.sensor.common)

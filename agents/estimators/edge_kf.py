@@ -17,9 +17,11 @@ from agents.algebra.blocks import diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from netem.core.channels import INPUT
 
 
@@ -34,7 +36,7 @@ class EdgeStates(NamedTuple):
 
 
 @dataclass(frozen=True)
-class EdgeKalmanFilter:
+class EdgeKalmanFilter(Estimator[EdgeStates]):
     """One filter an edge, predicted by communicated inputs.
 
     Parameters
@@ -96,6 +98,10 @@ class EdgeKalmanFilter:
             filters[0], np.broadcast_to(brief.present, state.seen.shape), filters[1], no_indicator(state.seen)
         )
         return state._replace(mean=filters[0], covariance=filters[1], flown=flown), estimate
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether inputs are heard in the tick they are of."""
+        return inputs.in_time(swarm)
 
 
 def of_edges(brief: Brief) -> Array:

@@ -6,7 +6,7 @@ neighbours' perceived shapes disagree.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -22,7 +22,9 @@ from agents.estimators.conral import Agreement, ConsensusLocalization
 from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Channels, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 
 
 class Fusion(NamedTuple):
@@ -33,7 +35,7 @@ class Fusion(NamedTuple):
 
 
 @dataclass(frozen=True)
-class GeometryAwareFilter(EdgeFilters):
+class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
     """GA-RKF: RKF with the observation model (6).
 
     Parameters
@@ -82,6 +84,10 @@ class GeometryAwareFilter(EdgeFilters):
         usable = seen | (observed.known & trusted[..., None])
         tracks = self.advance(brief, state.tracks, observed.relative, R, usable)
         return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)._replace(feasible=observed.feasible)
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Those of the geometry."""
+        return self._shaper.checks(swarm)
 
     @cached_property
     def _shaper(self) -> Estimator[Any]:

@@ -18,7 +18,7 @@ from agents.algebra import kalman
 from agents.algebra.small import determinant, inverse
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
@@ -39,7 +39,7 @@ class Modes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class InteractingMultipleModel:
+class InteractingMultipleModel(Estimator[Modes]):
     """IMM over constant acceleration, constant velocity and a random walk, in this order.
 
     Parameters

@@ -17,10 +17,12 @@ from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from netem.core.channels import INPUT
 
 
@@ -35,7 +37,7 @@ class Joint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class JointEdgeFilter:
+class JointEdgeFilter(Estimator[Joint]):
     """JRKF, or J-Edge-KF.
 
     Parameters
@@ -93,6 +95,10 @@ class JointEdgeFilter:
         known = np.broadcast_to(brief.present, state.seen.shape)
         estimate = Estimate(mean, known, diagonal_blocks(covariance, brief.dimension), no_indicator(state.seen))
         return state._replace(mean=mean, covariance=covariance, flown=flown), estimate
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether inputs are heard in the tick they are of."""
+        return inputs.in_time(swarm)
 
 
 def corrected(mean: Array, covariance: Array, measured: Array, R: Array, seen: Mask) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ neighbours, as last heard, say that it is; a message that is lost or late leaves
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,9 +16,13 @@ from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_edges
+from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
+from agents.swarm import SwarmBrief
+from analysis.models import jacobi
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from netem.core.channels import PLACE
 
 
@@ -40,7 +44,7 @@ class Belief(NamedTuple):
 
 
 @dataclass(frozen=True)
-class JacobiOverRelaxation:
+class JacobiOverRelaxation(Estimator[Belief]):
     """JOR (11)-(13).
 
     Parameters
@@ -107,6 +111,21 @@ class JacobiOverRelaxation:
         )
         return Belief(place, theirs, told, state.own, other), no_edges(counts, brief.dimension, {PLACE: place})
 
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """How fast it comes to its answer, from measurements as they would be without noise."""
+        leaders = np.flatnonzero(swarm.leader)
+        if self.anchor and len(leaders) != 1:
+            says = f"with an anchor exactly one agent leads: formation.leaders has {len(leaders)}"
+            return [Finding("localization", "error", says)]
+        known, anchor = _noiseless(swarm), int(leaders[0]) if len(leaders) == 1 else 0
+        found = jacobi.rates(known, self.h, anchor)
+        says = (
+            f"rate {found.anchor if self.anchor else found.centroid:.4f} a tick with h {self.h:g} (weighted centroid "
+            f"{found.centroid:.4f}, agent {anchor + 1} as the anchor {found.anchor:.4f}); "
+            f"h {jacobi.step(known, 'smooth'):.3f} is the fastest without ringing, {jacobi.step(known, 'fast'):.3f} of all"
+        )
+        return [Finding("localization", "ok", says)]
+
     def _moved(self, brief: Brief, place: Array, theirs: Array, information: Array, pull: Array, counts: Mask) -> Array:
         own = sum_over(information, -3)
         drawn = product(information, theirs[..., None])[..., 0] + np.where(counts[..., None], pull, 0.0)
@@ -116,6 +135,16 @@ class JacobiOverRelaxation:
         fixed = np.logical_and(brief.leader, self.anchor)
         stepped = (1.0 - self.h) * place + self.h * toward
         return np.where((anybody & ~fixed)[..., None], stepped, place)
+
+
+def _noiseless(swarm: SwarmBrief) -> jacobi.EdgeInformation:
+    own, slots = np.nonzero(swarm.present)
+    edges = own, swarm.neighbours[own, slots]
+    relative = np.zeros((swarm.agents, swarm.agents, swarm.dimension))
+    relative[edges] = swarm.nominal[edges[0]] - swarm.nominal[edges[1]]
+    information = np.zeros((*relative.shape, swarm.dimension))
+    information[edges] = np.linalg.inv(swarm.sensor.spread(relative[edges]))
+    return jacobi.together(relative, information)
 
 
 def _first(side: Side, measured: Array, seen: Mask) -> Side:

@@ -12,7 +12,7 @@ from agents.algebra import kalman
 from agents.algebra.geometry import identity
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.arrays import Array, Mask
 
@@ -25,7 +25,7 @@ class Recent(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MinimumMeanSquareError:
+class MinimumMeanSquareError(Estimator[Recent]):
     """Each tick's measurement, drawn toward the last estimate, which begins at zero; an edge not measured stays as it was.
 
     Parameters

@@ -10,6 +10,7 @@ import numpy as np
 
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
+from agents.estimators.base import Estimator
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.arrays import Array, Mask
 
@@ -22,7 +23,7 @@ class LastMeasured(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NoEstimator:
+class NoEstimator(Estimator[LastMeasured]):
     """The measurements themselves."""
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002

@@ -12,6 +12,7 @@ from agents.algebra import geometry
 from agents.algebra.constraints import MAPS, Constraint
 from agents.brief import Brief, Own
 from agents.estimate import Estimate
+from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
 from analysis.models.arrays import Array, Mask
 from netem.core.channels import THETA
@@ -26,7 +27,7 @@ class Perceived(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RelativeAffineLocalization:
+class RelativeAffineLocalization(Estimator[Perceived]):
     """RAL: the measurements, and Theta_i p_ij in place of the missing ones.
 
     The printed Algorithm 2 replaces the measured edges instead; the input would then be Theta_i sum_j l_ij p_ij = 0 and the

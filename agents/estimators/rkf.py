@@ -14,7 +14,7 @@ import numpy as np
 from agents.algebra import kalman
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.arrays import Array, Mask
 
@@ -79,7 +79,7 @@ class EdgeFilters:
 
 
 @dataclass(frozen=True)
-class RelativeKalmanFilter(EdgeFilters):
+class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
     """RKF: correct the edges that are measured, propagate the others."""
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002

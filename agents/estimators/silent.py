@@ -7,7 +7,7 @@ general form: for inputs of variance R_u(0), W = R_u(1) (R_u(0) + Sigma_u)^-1, w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,11 +18,13 @@ from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import refuse_negative
+from agents.estimators.base import Estimator, refuse_negative
 from agents.estimators.edge_kf import of_edges
 from agents.exchange import Channels, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from netem.core.channels import INPUT
 
 
@@ -47,7 +49,7 @@ class Silent(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SilentEdgeFilter:
+class SilentEdgeFilter(Estimator[Silent]):
     """One filter an edge, predicted by what the neighbour is believed to fly.
 
     Parameters
@@ -125,6 +127,15 @@ class SilentEdgeFilter:
             mean, np.broadcast_to(brief.present, state.seen.shape), covariance, no_indicator(state.seen)
         )
         return state._replace(past=newer), estimate
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether the window fits into the run."""
+        if self.window < swarm.ticks:
+            return []
+        says = (
+            f"a window of {self.window} ticks is never full in a run of {swarm.ticks}; give at most {swarm.ticks - 1}"
+        )
+        return [Finding("window", "error", says)]
 
     def _neighbours(self, brief: Brief, past: Past) -> tuple[Array, Array]:
         """What the neighbours fly, shape (..., n, D), and its covariance; at rest with R_u(0) while the past is too short."""

@@ -17,17 +17,22 @@ from agents.algebra.prediction import Prediction, carried, predicted
 from agents.algebra.redcho import Consensus
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_edges
+from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
+from agents.swarm import SwarmBrief
 from analysis.models import jets
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import whole_power
+from analysis.models.finding import Finding
 from analysis.models.information import numbers, packed, position_jet, unpacked
 from analysis.models.pursuit import Target, diffusion, transition
 from analysis.models.unsuited import Unsuited
 from netem.core.channels import TARGET
 
 _SUREST, _LEAST_SURE = 1e-3, 1e3  # standard deviations whose information can be inverted side by side
+_SMALL_CHATTER = 1.0
+_FORGOTTEN = 2.0  # an Euler step of -gamma diverges from here on
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
 
@@ -61,7 +66,7 @@ class Track(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TargetEstimator:
+class TargetEstimator(Estimator[Track]):
     """An estimate of the target and its derivatives, by itself or with the neighbours.
 
     Parameters
@@ -183,6 +188,35 @@ class TargetEstimator:
             "fused": np.moveaxis(fused, 0, -2),
         }
         return state, no_edges(brief.present, brief.dimension, reports)
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether information is heard in time, and how REDCHO comes along with the tick."""
+        found = []
+        if swarm.late and self.fusion != "none":
+            says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
+            found.append(Finding("information", "note", says))
+        if self.fusion == "redcho":
+            found += [self._chatter(swarm.dt), *self._forgetting(swarm.dt)]
+        return found
+
+    def _chatter(self, dt: float) -> Finding:
+        """How hard REDCHO's sign switches in a tick (errata of paper 002)."""
+        order = len(self.k) - 1
+        switched = self.k[order] * whole_power(self.theta, order + 1) * dt
+        what = f"k_m theta^{order + 1} dt; 0.4 in paper 002"
+        own = "" if self.derivatives == "own" or switched < _SMALL_CHATTER else "; take the agents' own derivatives"
+        says = f"REDCHO switches its highest derivative by {switched:.3g} a tick ({what}){own}"
+        return Finding("REDCHO", "note", says)
+
+    def _forgetting(self, dt: float) -> list[Finding]:
+        """Whether a tick is short enough for REDCHO to forget what it has gathered, by gamma."""
+        fastest, bound = max(self.gamma), _FORGOTTEN / dt
+        if fastest * dt < _FORGOTTEN:
+            return []
+        says = (
+            f"gamma {fastest:g} 1/s is not below the bound {bound:g} at dt {dt:g} s: REDCHO diverges; lower it, or dt"
+        )
+        return [Finding("REDCHO", "error", says)]
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
         """The information found together, jets (m + 1, ..., C) like the agent's own."""

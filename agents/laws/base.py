@@ -1,10 +1,12 @@
 """What a control law is, and the stress force that all laws of a formation steer by.
 
-A law is a frozen dataclass of its gains, with two pure methods over arrays with any leading axes.
+A law is a frozen dataclass of its gains, with two pure methods over arrays with any leading axes. What else it may say has
+defaults, which hold for laws that are no subclass too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -12,8 +14,11 @@ import numpy as np
 from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
+from agents.swarm import SwarmBrief
+from agents.wants import Wants
 from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array
+from analysis.models.finding import Finding
 
 State = TypeVar("State")
 
@@ -22,12 +27,10 @@ class Law(Protocol[State]):
     """A control law for followers.
 
     `order` is that of the bodies it steers, by a velocity (1), an acceleration (2) or a higher derivative; `by_stress` says
-    whether it weighs the edges by the stress of the formation, which then must have one; `by_position` whether it needs the
-    agent's own position.
+    whether it weighs the edges by the stress of the formation, which then must have one.
     """
 
     by_stress: ClassVar[bool]
-    by_position: ClassVar[bool]
 
     @property
     def order(self) -> int:
@@ -43,6 +46,41 @@ class Law(Protocol[State]):
 
         `inputs` is what the neighbours said of theirs.
         """
+
+    @property
+    def wants(self) -> Wants:
+        """What it wants beyond what every agent gets; nothing by default."""
+        return Wants()
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:  # noqa: ARG002
+        """What it finds of a swarm that is to fly it; an error refuses the scenario. Nothing by default."""
+        return []
+
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array | None:  # noqa: ARG002
+        """One tick of the followers under a law that weighs edges by the stress; None, the default, where nobody knows it.
+
+        With perfect estimates and leaders at rest the followers are a linear system per axis, which has to settle.
+
+        Parameters
+        ----------
+        stress
+            Follower block L_ff of the stress matrix, shape (F, F).
+        degree
+            gamma_i = sum_j l_ij of the followers, shape (F,).
+        dt
+            Tick, in seconds.
+
+        Returns
+        -------
+        Array or None
+            Step of the state the law has, shape (S, S): positions, and velocities, its integral or its last input.
+        """
+        return None
+
+    @property
+    def step_gain(self) -> float | None:
+        """The gain on the stress force that decides on the step, per second; None, the default, where no single one does."""
+        return None
 
 
 class Nothing(NamedTuple):

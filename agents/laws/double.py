@@ -6,6 +6,7 @@ relative positions drive. A neighbour's velocity is what it communicated last, o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -14,8 +15,11 @@ import numpy as np
 from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
-from agents.laws.base import stress_force, weighted
+from agents.laws import heard_late
+from agents.laws.base import Law, stress_force, weighted
+from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
+from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
 Source = Literal["communicated", "estimated"]
@@ -30,12 +34,11 @@ class LastSaid(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Damped:
+class _Damped(Law[LastSaid]):
     """What both laws share: the pull of the estimated edges, damped by how the neighbours' velocities differ from one's own."""
 
     order: ClassVar[int] = 2
     by_stress: ClassVar[bool] = True
-    by_position: ClassVar[bool] = False
     position_gain: float
     velocity_gain: float
     source: Source = "communicated"
@@ -81,6 +84,13 @@ class DoubleConstantVelocity(_Damped):
         said = _hear(state, inputs)
         return said, -self._pull(brief, own, estimate, said)
 
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array:  # noqa: ARG002
+        """Of positions and velocities."""
+        identity = np.eye(len(stress))
+        pull = np.block([-self.position_gain * stress, -self.velocity_gain * stress])
+        coasting = np.block([[identity, dt * identity], [0.0 * identity, identity]])
+        return np.asarray(coasting + _integrated(pull, dt), dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class DoubleVaryingVelocity(_Damped):
@@ -120,6 +130,17 @@ class DoubleVaryingVelocity(_Damped):
         law = (accelerations - self._pull(brief, own, estimate, said)) / brief.degree[..., None]
         return said, (1.0 - self.relaxation) * own.input + self.relaxation * law
 
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether accelerations that are heard one tick late settle."""
+        return [heard_late.finding(self, swarm, "accelerations")]
+
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array:
+        """Of positions, velocities and the last input."""
+        identity, share = np.eye(len(stress)), self.relaxation * stress / degree[:, None]
+        law_of_state = np.block([-self.position_gain * share, -self.velocity_gain * share, identity - share])
+        moves = np.block([[identity, dt * identity, 0.0 * identity], [0.0 * identity, identity, 0.0 * identity]])
+        return np.vstack([moves + _integrated(law_of_state, dt), law_of_state])
+
 
 def _hear(state: LastSaid, inputs: Heard) -> LastSaid:
     fresh = inputs.fresh[..., None]
@@ -128,6 +149,11 @@ def _hear(state: LastSaid, inputs: Heard) -> LastSaid:
         np.where(fresh, inputs.fields["acceleration"], state.acceleration),
         state.ever | inputs.fresh,
     )
+
+
+def _integrated(acceleration: Array, dt: float) -> Array:
+    """What accelerations, rows (F, S) over the state, do to positions and velocities in a tick, shape (2 F, S)."""
+    return np.vstack([0.5 * dt * dt * acceleration, dt * acceleration])
 
 
 def _closing(brief: Brief, source: Source, own: Own, estimate: Estimate, heard: LastSaid) -> Array:

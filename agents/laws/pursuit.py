@@ -9,16 +9,20 @@ from typing import ClassVar
 
 import numpy as np
 
+from agents.algebra import stability
 from agents.brief import DERIVATIVES, Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
-from agents.laws.base import Nothing
+from agents.laws.base import Law, Nothing
+from agents.swarm import SwarmBrief
+from agents.wants import Wants
 from analysis.models.arrays import Array
+from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
 
 @dataclass(frozen=True)
-class Pursuit:
+class Pursuit(Law[Nothing]):
     """u_i = p_i,m - sum_mu kappa_mu (x_i^(mu) - p_i,mu), with p_i,0 + d_i for mu = 0: a place about the target.
 
     The place d_i is the nominal position; p_i,mu are what the estimator reports as `reference`: position and derivatives.
@@ -31,7 +35,7 @@ class Pursuit:
     """
 
     by_stress: ClassVar[bool] = False
-    by_position: ClassVar[bool] = True
+    wants: ClassVar[Wants] = Wants(position=True)
     kappa: Sequence[float] = (1.0, 2.0)
 
     def __post_init__(self) -> None:
@@ -67,6 +71,15 @@ class Pursuit:
         reference, flown = self._reference(estimate), self._flown(brief, own)
         pulls = [kappa * (flown[mu] - reference[..., mu, :]) for mu, kappa in enumerate(self.kappa)]
         return state, reduce(np.subtract, pulls, reference[..., self.order, :])
+
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether a tick is short enough for the pull toward the reference."""
+        radius, gains = stability.radius(stability.chain_step(self.kappa, swarm.dt)), list(self.kappa)
+        if radius < 1.0:
+            settles = stability.settling_time(radius, swarm.dt)
+            return [Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {swarm.dt:g} s, kappa {gains}: {settles}")]
+        too_long = f"the step is too long for kappa {gains}; lower it, or dt"
+        return [Finding("step", "error", f"radius {radius:.4g} >= 1 at dt {swarm.dt:g} s: {too_long}")]
 
     def _flown(self, brief: Brief, own: Own) -> list[Array]:
         """Own position less that of the place, and its derivatives."""

@@ -6,16 +6,21 @@ sum_j l_ij zhat_ij over the edges for which there is an estimate; an edge withou
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
+from agents.laws import heard_late
 from agents.laws.base import Law, Nothing, stress_force, weighted
+from agents.swarm import SwarmBrief
+from agents.wants import Wants
 from analysis.models.arrays import Array
+from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
 
@@ -32,12 +37,11 @@ class LastHeard(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rest:
+class Rest(Law[Nothing]):
     """u_i = 0: agents that stay where they are, to find out where that is."""
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = False
-    by_position: ClassVar[bool] = False
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
         """Nothing to remember."""
@@ -57,7 +61,7 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class Static:
+class Static(Law[Nothing]):
     """u_i = -alpha sum_j l_ij zhat_ij (Table II, static leaders).
 
     Parameters
@@ -68,7 +72,6 @@ class Static:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
-    by_position: ClassVar[bool] = False
     alpha: float = 10.0
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Nothing:  # noqa: ARG002
@@ -87,9 +90,18 @@ class Static:
         """Fall toward the formation."""
         return state, -self.alpha * stress_force(brief, estimate)
 
+    @property
+    def step_gain(self) -> float:
+        """Alpha."""
+        return self.alpha
+
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array:  # noqa: ARG002
+        """Of positions."""
+        return np.asarray(np.eye(len(stress)) - dt * self.alpha * stress, dtype=np.float64)
+
 
 @dataclass(frozen=True)
-class ConstantVelocity:
+class ConstantVelocity(Law[Integral]):
     """u_i,k = -alpha sum_j l_ij zhat_ij,k - eta sum_t sum_j l_ij zhat_ij,t (Table II, constant-velocity leaders).
 
     Parameters
@@ -102,7 +114,6 @@ class ConstantVelocity:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
-    by_position: ClassVar[bool] = False
     alpha: float = 10.0
     eta: float = 0.1
 
@@ -124,9 +135,19 @@ class ConstantVelocity:
         total = state.force + force
         return Integral(total), -self.alpha * force - self.eta * total
 
+    @property
+    def step_gain(self) -> float:
+        """Alpha."""
+        return self.alpha
+
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array:  # noqa: ARG002
+        """Of positions and the integral."""
+        identity, at_once = np.eye(len(stress)), self.alpha + self.eta
+        return np.block([[identity - dt * at_once * stress, -dt * self.eta * identity], [stress, identity]])
+
 
 @dataclass(frozen=True)
-class VaryingVelocity:
+class VaryingVelocity(Law[LastHeard]):
     """u_i = -(1 / gamma_i) sum_j l_ij (alpha zhat_ij - zdot_j), gamma_i = sum_j l_ij (Table II, varying-velocity leaders).
 
     The law needs the neighbours' current velocities, which is an algebraic loop; over a network it becomes an iteration
@@ -145,7 +166,6 @@ class VaryingVelocity:
 
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = True
-    by_position: ClassVar[bool] = False
     alpha: float = 1.0
     source: Literal["communicated", "estimated", "feed-forward"] = "communicated"
     relaxation: float = 1.0
@@ -175,7 +195,27 @@ class VaryingVelocity:
         of_edges = tick if isinstance(tick, int) else tick[..., None]
         return brief.mission.velocity(of_edges, brief.nominal[..., None, :] - brief.relative, brief.dt)
 
+    @property
+    def wants(self) -> Wants:
+        """The manoeuvre, to feed it forward."""
+        return Wants(mission=self.source == "feed-forward")
 
-def needs_mission(law: Law[Any]) -> bool:
-    """Whether the law makes followers use the manoeuvre."""
-    return isinstance(law, VaryingVelocity) and law.source == "feed-forward"
+    def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
+        """Whether velocities that are heard one tick late settle."""
+        if self.source == "feed-forward":
+            return [Finding("one-tick radius", "ok", "velocities are fed forward: no loop through the network")]
+        return [heard_late.finding(self, swarm, "velocities", ", or feed velocities forward")]
+
+    @property
+    def step_gain(self) -> float:
+        """Alpha."""
+        return self.alpha
+
+    def step_matrix(self, stress: Array, degree: Array, dt: float) -> Array:
+        """Of positions and the last input."""
+        identity, share = np.eye(len(stress)), stress / degree[:, None]
+        held = (1.0 - self.relaxation) * identity
+        if self.source != "feed-forward":
+            held = held + self.relaxation * (identity - share)
+        pull = -self.relaxation * self.alpha * share
+        return np.block([[identity + dt * pull, dt * held], [pull, held]])

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import pdist, squareform
 
-from analysis.metrics import localization
-from analysis.metrics.localization import EdgeInformation
+from analysis.models import jacobi
 from analysis.models.arrays import Array
+from analysis.models.jacobi import EdgeInformation
 from analysis.models.sensor import Sensor
 
 _SIDE, _REACH = 10.0, 4.0  # m
@@ -36,11 +36,11 @@ def edges(seed: int, agents: int) -> EdgeInformation:
     relative = position[:, None] - position[None]
     said = _SENSOR.measured(relative, rng.normal(size=relative.shape) * np.sqrt(np.diagonal(_SENSOR.covariance)))
     spread = np.where(measured[..., None, None], _SENSOR.spread(said), np.eye(2))
-    return localization.together(said, np.where(measured[..., None, None], np.linalg.inv(spread), 0.0))
+    return jacobi.together(said, np.where(measured[..., None, None], np.linalg.inv(spread), 0.0))
 
 
 @cache  # a study judges them, and draws them
 def rates(number: int, agents: int, h: float) -> Array:
     """Convergence rates with the weighted centroid and with agent 1 as the anchor, on so many graphs, shape (number, 2)."""
-    found = [localization.rates(edges(seed, agents), h, anchor=0) for seed in range(number)]
+    found = [jacobi.rates(edges(seed, agents), h, anchor=0) for seed in range(number)]
     return np.array(found, dtype=np.float64)

@@ -1,18 +1,20 @@
 """`agents`: what estimators and laws are made of. They themselves fly in test_bits.py."""
 
 from dataclasses import replace
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
-from briefs import BRIEF
+from briefs import BRIEF, of_all
 
 from agents import agent, estimate
 from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
-from agents.centre.filter import Centre, Whole
+from agents.centre.checked import CheckedCentre
 from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
+from agents.estimators.centralized import SwarmFilter, Whole
 from agents.estimators.none import LastMeasured
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Heard
@@ -21,6 +23,7 @@ from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
 from rows.case import covariance, of, real, share, truth, whole
+from world.formation.nominal import Formation
 
 NEIGHBOURS = 9  # sums of more than eight numbers take another path
 MAPS = {
@@ -33,9 +36,9 @@ TARGET = Target(3, 0.7, np.array([3, 5]), np.array([0.1, 0.2]))
 CONSENSUS = redcho.Consensus(3, 14.0, (6.0, 11.0, 6.0, 1.0), (1.0, 2.0, 1.5, 1.0))
 MANOEUVRE = Manoeuvre(*(np.random.default_rng(6).normal(size=(20, *size)) for size in ((2, 2), (2,))))
 NOISE = np.array([[0.02, 0.01], [0.01, 0.03]])
-CENTRE = Centre(
-    *(0.013, np.array([[j for j in range(5) if j != i] for i in range(5)]), np.ones((5, 4), dtype=bool)),
-    *(Sensor("coordinates", NOISE), 0.1 * np.eye(10), 1.0),
+FIVE = Formation(np.random.default_rng(8).normal(size=(5, 2)), tuple(combinations(range(1, 6), 2)), ())
+CENTRE = SwarmFilter(
+    of_all(FIVE, dt=0.013, sensor=Sensor("coordinates", NOISE), displacement=0.1 * np.eye(2)), prior_position=1.0
 )
 FILTERS = EdgeFilters()
 F, Q = kalman.motion("constant-velocity", 2, 0.013, 0.7)
@@ -73,10 +76,16 @@ CASES = {
         real(9),
     ),
     "agents.brief.Brief.degree": of(lambda stress: replace(BRIEF, stress=stress).degree, real(NEIGHBOURS)),
-    "agents.centre.filter.Centre.step": of(
-        lambda position, spread, measured, seen, flown: CENTRE.step(Whole(position, spread), measured, seen, flown),
-        *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
-    ),
+    **{
+        name: of(
+            lambda position, spread, *heard, centre=centre: centre.step(Whole(position, spread), *heard),
+            *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
+        )
+        for name, centre in (
+            ("agents.estimators.centralized.SwarmFilter.step", CENTRE),
+            ("agents.centre.checked.CheckedCentre.step", CheckedCentre(CENTRE, CENTRE.swarm)),
+        )
+    },
     "agents.laws.base.weighted": of(base.weighted, real(NEIGHBOURS), real(NEIGHBOURS, 2)),
     "agents.laws.base.stress_force": of(
         lambda stress, relative, known: base.stress_force(_brief(stress=stress), _estimate(relative, known)),

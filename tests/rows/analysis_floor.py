@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.metrics import consistency, errors, indicator, localization
-from analysis.models import affine, algebra, elementary, graph, information, jets, pursuit, sensor
+from analysis.models import affine, algebra, elementary, graph, information, jacobi, jets, pursuit, sensor
 from rows.case import covariance, of, real, share, truth, whole
 
 MANY = 500  # numbers that round apart once in a thousand times
@@ -20,7 +20,7 @@ SENSORS = {
 
 
 def _edges(information, relative):
-    return localization.together(relative, information)
+    return jacobi.together(relative, information)
 
 
 def _of_edges(function):
@@ -103,11 +103,11 @@ CASES = {
     "analysis.models.information.position_jet": of(
         information.position_jet, covariance(4, 3, 3, axis=1), real(4, 3, 2, axis=1), out=1
     ),
-    "analysis.metrics.localization.together": of(_edges, covariance(5, 5, 2, 2), real(5, 5, 2)),
-    "analysis.metrics.localization.weights": _of_edges(localization.weights),
-    "analysis.metrics.localization.system": _of_edges(localization.system),
+    "analysis.models.jacobi.together": of(_edges, covariance(5, 5, 2, 2), real(5, 5, 2)),
+    "analysis.models.jacobi.weights": _of_edges(jacobi.weights),
+    "analysis.models.jacobi.system": _of_edges(jacobi.system),
     "analysis.metrics.localization.optimal": _of_edges(localization.optimal),
-    "analysis.metrics.localization.spectrum": _of_edges(localization.spectrum),
+    "analysis.models.jacobi.spectrum": _of_edges(jacobi.spectrum),
     "analysis.metrics.localization.centred": of(localization.centred, real(9, 2), covariance(9, 2, 2)),
     "analysis.metrics.localization.centroid": of(localization.centroid, real(9, 2), covariance(9, 2, 2)),
     **{

@@ -38,7 +38,7 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
-        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.read world.acts.Acts.beliefs
+        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         analysis.models.sensor.Sensor.common
     """,
@@ -57,8 +57,12 @@ EXEMPT = {
         world.formation.manoeuvre.turned world.recording.stage.origin world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises analysis.models.cuts.smallest_cut
-        analysis.metrics.localization.step analysis.metrics.localization.rates analysis.claims.random_graphs.edges
+        analysis.models.jacobi.step analysis.models.jacobi.rates analysis.claims.random_graphs.edges
         analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
+        agents.algebra.stability.chain_step agents.algebra.stability.radius
+        agents.algebra.stability.stretch_eigenvalue agents.laws.heard_late.one_tick_radius
+        agents.loading.capabilities.step_matrix agents.swarm.SwarmBrief.follower_degree
+        agents.swarm.SwarmBrief.follower_stress agents.swarm.SwarmBrief.laplacian agents.swarm.SwarmBrief.process
     """,
     WRITTEN: """
         netem.medium.journal.Writer.enter netem.medium.in_flight.Entry.dropped_by_fate
@@ -76,12 +80,14 @@ EXEMPT = {
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
     """,
     SHAPES: """
-        agents.centre.filter.Centre.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
+        agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
         agents.algebra.kalman.motion agents.algebra.kalman.embedded agents.algebra.kalman.unknown
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PROTOCOL: """
-        agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
+        agents.estimators.base.Centre.step
+        agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance world.flight.Acted.input
         world.flight.Carrier.carry

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.metrics import localization
+from analysis.models import jacobi
 from analysis.models.arrays import Array, Mask
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
@@ -62,7 +62,7 @@ class FirstMeasurements:
         self.measured = np.where(new[..., None], measured, self.measured)
         self.seen = self.seen | delivered
 
-    def edges(self) -> localization.EdgeInformation:
+    def edges(self) -> jacobi.EdgeInformation:
         """Each edge, as both its ends know it."""
         agents, (rows, columns) = self.links.agents, (self.links.dst - 1, self.links.src - 1)
         dimension = self.measured.shape[-1]
@@ -71,4 +71,4 @@ class FirstMeasurements:
         spread = np.where(self.seen[..., None, None], self.sensor.spread(self.measured), np.eye(dimension))
         information = np.zeros((*self.batch, agents, agents, dimension, dimension))
         information[..., rows, columns, :, :] = np.where(self.seen[..., None, None], np.linalg.inv(spread), 0.0)
-        return localization.together(relative, information)
+        return jacobi.together(relative, information)

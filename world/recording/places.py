@@ -7,6 +7,7 @@ import rerun as rr
 
 from analysis.metrics import localization
 from analysis.models.arrays import Array
+from analysis.models.jacobi import weights
 from netem.core.channels import PLACE
 from netem.faults.timeline import Timeline
 from world.books.history import Moments
@@ -51,7 +52,7 @@ class Places:
             self._first.tick(timeline, tick, measured, fates)
         place, position = moments.reports[PLACE][kept], moments.position[kept] - self._origin
         edges = self._first.edges()
-        here = localization.centroid(position, localization.weights(edges))[:, None]
+        here = localization.centroid(position, weights(edges))[:, None]
         best = localization.optimal(edges) + here
         points(self._stream, "swarm/place", time, localization.beside(place, edges) + here)
         points(self._stream, "swarm/optimal", time, best)

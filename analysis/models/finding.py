@@ -10,7 +10,17 @@ Level = Literal["ok", "note", "error"]
 
 @dataclass(frozen=True)
 class Finding:
-    """The outcome of one check."""
+    """The outcome of one check.
+
+    Parameters
+    ----------
+    check
+        What was checked, in a word or two.
+    level
+        "ok"; "note", for what to know of; or "error": then the scenario does not fly.
+    says
+        What was found, and the way out.
+    """
 
     check: str
     level: Level
