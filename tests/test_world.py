@@ -126,7 +126,7 @@ def test_noise_is_the_same_in_whatever_order_the_ticks_are_asked_for(world):
 
 
 def test_another_seed_is_another_noise(world):
-    assert not np.isclose(noise_of(world, [0]), noise_of(replace(world, seed=2), [0])).any()
+    assert not np.isclose(noise_of(world, [0]), noise_of(replace(world, run_seed=2), [0])).any()
 
 
 def test_step_integrates_the_velocity(world):
@@ -243,7 +243,7 @@ def test_disturbance_of_an_agent_is_the_same_whatever_other_agents_exist(world):
 
 def test_leaders_start_on_their_targets_and_followers_about_theirs(world):
     flying = replace(world, manoeuvre=corridor(np.arange(6001) * 0.01), spread=0.5)
-    starts = np.array([replace(flying, seed=seed).begin().position for seed in range(500)])
+    starts = np.array([replace(flying, run_seed=seed).begin().position for seed in range(500)])
     offset = starts - flying.target(0)
     np.testing.assert_array_equal(offset[:, :3], 0.0)
     assert offset[:, 3:].std() == pytest.approx(0.5, rel=0.05)
