@@ -527,7 +527,7 @@ def test_a_thread_that_a_module_starts_keeps_no_process(arguments, folder):
     name = write(folder, broken(ESTIMATOR, ("import sys", SLEEPER)))
     verb, *options = arguments
     settings = [option for override in SIMPLE for option in ("--set", override)]
-    program = [sys.executable, "-c", "from affinet.cli.commands import command; command()", verb, "corridor", *options]
+    program = [sys.executable, "-m", "affinet", verb, "corridor", *options]
     done = subprocess.run(
         [*program, "--estimator", f"{name}:Own", *settings], check=False, capture_output=True, timeout=300
     )
