@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 PACKAGE = "affinet"
 ROOMS = ("agents", "analysis", "netem", "world")
-_FROM = re.compile(rb"from[ \t]+")
+_FROM = re.compile(rb"from[ \t]+(?=\w)")
 
 
 class CannotBeLaid(ValueError):

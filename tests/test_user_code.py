@@ -361,7 +361,7 @@ def test_a_missing_method_is_named(method, folder):
 
 STUB = (
     ("class Own", "class Own(Estimator)"),
-    ("import sys", "import sys\nfrom agents.estimators.base import Estimator"),
+    ("import sys", "import sys\nfrom affinet import Estimator"),
 )
 ABSTRACT = (
     ("import sys", "import abc"),
@@ -742,7 +742,7 @@ def raising(run):
 
 CHECKERS = [
     (Checker("mine", raising), "mine: KeyError: 'no such' ("),
-    (Checker("mine", lambda _: None), "mine: must return a Finding, got None ("),  # type: ignore[return-value]
+    (Checker("mine", lambda _: None), "mine: must return a CheckResult, got None ("),  # type: ignore[return-value]
     (Checker("mine", raising) & Checker("other", raising), "mine: KeyError: 'no such' ("),
     (always(raising), "always: KeyError: 'no such' ("),
     # Before: AttributeErrors of ours, or a pass for a signal of another length.

@@ -81,7 +81,9 @@ def built(folder: Path) -> Path:
     _run([uv(), "build", "--quiet", "--wheel", "--out-dir", folder / "repository", ROOT])
     _run([uv(), "build", "--quiet", "--out-dir", folder / "sdist", ROOT])
     (wheel,), (other,) = (sorted((folder / name).glob("*.whl")) for name in ("repository", "sdist"))
-    one, two = ({name: archive.read(name) for name in archive.namelist()} for archive in map(zipfile.ZipFile, (wheel, other)))
+    one, two = (
+        {name: archive.read(name) for name in archive.namelist()} for archive in map(zipfile.ZipFile, (wheel, other))
+    )
     if differ := sorted(name for name in one.keys() | two.keys() if one.get(name) != two.get(name)):
         raise Failed(f"built from the sdist the wheel has other files: {', '.join(differ)}")
     return wheel
@@ -93,8 +95,21 @@ def installed(wheel: Path, folder: Path) -> Path:
     exported = [uv(), "export", "--quiet", "--frozen", "--no-hashes", "--no-emit-project", "--group", "test"]
     lock.write_text(_run([*exported, "--project", ROOT]))
     _run([uv(), "venv", "--quiet", "--python", sys.executable, environment])
-    wanted = [wheel, "openai-agents", "pytest", "pytest-timeout"]
-    _run([uv(), "pip", "install", "--quiet", "--compile-bytecode", "--python", environment, "--constraint", lock, *wanted])
+    wanted: list[str | Path] = [wheel, "openai-agents", "pytest", "pytest-timeout"]
+    _run(
+        [
+            uv(),
+            "pip",
+            "install",
+            "--quiet",
+            "--compile-bytecode",
+            "--python",
+            environment,
+            "--constraint",
+            lock,
+            *wanted,
+        ]
+    )
     return environment / "bin"
 
 
@@ -113,7 +128,9 @@ def project(folder: Path, digest: str) -> Path:
 
 def estimator() -> str:
     """That of docs/estimators.md."""
-    (code,) = re.findall(r"```python\n(# held\.py.*?)```", (ROOT / "docs" / "estimators.md").read_text(), flags=re.DOTALL)
+    (code,) = re.findall(
+        r"```python\n(# held\.py.*?)```", (ROOT / "docs" / "estimators.md").read_text(), flags=re.DOTALL
+    )
     return str(code)
 
 
