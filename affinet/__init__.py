@@ -96,7 +96,7 @@ __all__ = sorted([*_MODULE_OF, *_MODULES, "__version__"])
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
-def __getattr__(name: str) -> Any:
+def _looked_up(name: str) -> Any:
     __tracebackhide__ = True
     if name not in __all__:
         raise AttributeError(f"module 'affinet' has no attribute {name!r}")
@@ -120,3 +120,7 @@ def _imported(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return list(__all__)
+
+
+if not TYPE_CHECKING:
+    __getattr__ = _looked_up  # type checkers would take any name for one that is there

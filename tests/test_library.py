@@ -26,7 +26,7 @@ NAMES = sorted(affinet.__all__)
 
 def test_what_type_checkers_see_is_what_there_is():
     tree = ast.parse((ROOT / "affinet" / "__init__.py").read_text())
-    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
+    block, _ = (node for node in tree.body if isinstance(node, ast.If))
     imported = [
         (node.module, alias.name) for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names
     ]

@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from flying import PROCESSES
 from own_code import ESTIMATOR, LAW, broken, line_of, write
 
+import agents
 from affinet.cli.commands import main
 from affinet.planning import plan
 from affinet.runtimes.run import fly, rehearse
@@ -509,6 +511,12 @@ def test_a_module_called_like_a_package_of_ours_is_to_be_renamed(package, folder
     assert main(["check", "corridor", "--estimator", f"{package}:Own"]) == 2
     file = folder / f"{package}.py"
     assert f"{file} is called like a package of affinet's own: rename it" in capsys.readouterr().err
+
+
+def test_a_scenario_beside_affinets_own_packages_may_name_what_is_in_them():
+    beside = Path(agents.__file__).parents[1]
+    given = ("agents.estimator=agents.estimators.rkf:RelativeKalmanFilter", *SIMPLE)
+    assert plan.make(loading.load("corridor", given, beside)).estimator.folder == str(beside)
     assert rehearse(plan.make(loading.load("corridor", SIMPLE))).outcome.verdict == "pass"
 
 

@@ -25,6 +25,7 @@ TAKEN = ("agents", "analysis", "netem", "world")  # by the project
 SHORT = ("--duration", "0.5", "--set", "record.enabled=false")
 
 OWN = 'WHOSE = "the project"\n'
+FAILS = "def measured(array):\n    raise ZeroDivisionError(array.shape)\n"
 TEST = """\
 import agents
 import analysis
@@ -121,6 +122,12 @@ def project(folder: Path, digest: str) -> Path:
     (home / "agents" / "held.py").write_text(estimator())
     for name in TAKEN[1:]:
         (home / f"{name}.py").write_text(OWN)
+    with (home / "world.py").open("a") as file:
+        file.write(FAILS)
+    helped = estimator().replace(
+        "np.where(seen[..., None], measured,", "np.where(seen[..., None], world.measured(measured),"
+    )
+    (home / "agents" / "helped.py").write_text(f"import world\n{helped}")
     (home / "test_swarm.py").write_text(TEST.replace("DIGEST", digest))
     (home / "program.py").write_text(PROGRAM)
     return home
@@ -162,6 +169,9 @@ def tried(wheel: Path, folder: Path) -> None:
     versions = {_run([*one, "--version"], home) for one in (command, module)}
     if versions != {f"affinet {wheel.name.split('-')[1]}\n"}:
         raise Failed(f"--version says {versions}")
+    failing = _run([*command, "check", "corridor", "--estimator", "agents.helped:HoldLast"], home, status=3)
+    if f"({home / 'world.py'}:3)" not in failing:
+        raise Failed(f"what failed in line 3 of the user's world.py is said as {failing}")
     for runtime in ("inprocess", "processes"):
         same(shipped, digest(command, runtime, "ga-rkf", home), f"affinet run, {runtime}")
         same(own, digest(module, runtime, "agents.held:HoldLast", home), f"python -m affinet run, {runtime}")
@@ -184,15 +194,15 @@ def _digest(said: str) -> str:
     return str(json.loads(said.splitlines()[-1])["digest"])
 
 
-def _run(command: Sequence[str | Path], folder: Path = ROOT) -> str:
-    """What a command prints."""
+def _run(command: Sequence[str | Path], folder: Path = ROOT, status: int = 0) -> str:
+    """What a command prints; with another exit status than this it failed."""
     told = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     told["UV_PYTHON_DOWNLOADS"] = "never"
     done = subprocess.run(command, cwd=folder, env=told, capture_output=True, text=True, check=False)
-    if done.returncode:
+    if done.returncode != status:
         shown = " ".join(map(str, command))
         raise Failed(f"{shown}: exit status {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
+    return done.stdout if status == 0 else done.stderr
 
 
 def main(arguments: Sequence[str]) -> int:
