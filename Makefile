@@ -4,7 +4,7 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test test-all test-pythons lint types imports bench clean
+.PHONY: demo test test-all test-pythons test-wheel lint types imports bench clean
 
 demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
@@ -17,6 +17,9 @@ test-all: lint types imports ## and the slow proofs
 
 test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every Python from 3.11 on that is found
 	$(BIN)/python tests/programs/pythons.py
+
+test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose modules are called like the rooms
+	$(BIN)/python tests/programs/wheel.py
 
 lint: $(READY)
 	$(BIN)/ruff check

@@ -55,7 +55,7 @@ class Run:
 
     def __init__(self, folder: Path, scenario: str) -> None:
         self._folder, self.out = folder, folder / "run"
-        command = [sys.executable, "-m", "affinet.cli.commands", "run", scenario, "--json", "--out", str(self.out)]
+        command = [sys.executable, "-m", "affinet", "run", scenario, "--json", "--out", str(self.out)]
         with (folder / "said").open("w") as said, (folder / "complained").open("w") as complained:
             # The run's temporary directory is in its processes' environment: that tells them from all others.
             environment = os.environ | {"TMPDIR": str(folder)}

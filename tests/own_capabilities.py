@@ -6,12 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.estimate import Estimate, no_indicator
-from agents.estimators.base import CentreEstimate
-from agents.estimators.centralized import SwarmFilter
-from agents.swarm import SwarmBrief
-from analysis.models.algebra import sum_over
-from analysis.models.finding import Finding
+from affinet import CentreEstimate, Estimate, Finding, SwarmBrief, SwarmFilter, algebra, no_indicator
 
 
 class Nothing(NamedTuple):
@@ -33,7 +28,7 @@ class Blended:
     def step(self, state, measured, seen, inputs):
         position = state.position + self.swarm.dt * inputs
         off = np.where(seen[..., None], measured - self._edges(position), 0.0)
-        position = position + self.gain * sum_over(off, -2) / np.maximum(seen.sum(axis=-1), 1)[..., None]
+        position = position + self.gain * algebra.sum_over(off, -2) / np.maximum(seen.sum(axis=-1), 1)[..., None]
         relative = self._edges(position)
         square = (*relative.shape, self.swarm.dimension)
         estimate = CentreEstimate(relative, np.broadcast_to(np.eye(self.swarm.dimension), square).copy())
@@ -77,9 +72,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.laws.base import stress_force
-from agents.wants import Wants
-from analysis.models.finding import Finding
+from affinet import Finding, Wants, stress_force
 
 
 class Nothing(NamedTuple):

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.estimate import Estimate, no_indicator
-from agents.exchange import Field
+from affinet import Estimate, Field, no_indicator
 
 
 class Last(NamedTuple):

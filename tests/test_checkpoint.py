@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 from offered import by_affinet
+from own_code import ESTIMATOR
 
 from affinet.scenario.sections import INTEGRATORS
 from agents import checkpoint
@@ -171,12 +172,11 @@ def test_a_death_while_the_first_is_written_leaves_none(two_states, tmp_path, mo
 
 def test_estimators_of_other_packages_are_not_tested_as_ours(tmp_path):
     # Every package that offers one made tests of ours fail.
-    module = "from agents.estimators.none import NoEstimator\n"
-    (tmp_path / "stranger.py").write_text(module)
+    (tmp_path / "stranger.py").write_text(ESTIMATOR)
     metadata = tmp_path / "stranger-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: stranger\nVersion: 1.0\n")
-    offers = "".join(f"[affinet.{what}]\nstranger = stranger:NoEstimator\n" for what in ("estimators", "controllers"))
+    offers = "".join(f"[affinet.{what}]\nstranger = stranger:Own\n" for what in ("estimators", "controllers"))
     (metadata / "entry_points.txt").write_text(offers)
     program = (
         "from affinet.planning.registry import ESTIMATORS, LAWS, names\n"

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def affinet(*arguments, cwd=ROOT):
-    command = [sys.executable, "-m", "affinet.cli.commands", *arguments]
+    command = [sys.executable, "-m", "affinet", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 

@@ -34,7 +34,7 @@ class Running:
             [
                 sys.executable,
                 "-m",
-                "affinet.cli.commands",
+                "affinet",
                 "run",
                 str(self.scenario),
                 "--duration",

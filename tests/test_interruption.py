@@ -42,7 +42,7 @@ def interrupted(number, runtime, out, private, monkeypatch, again=False):
     command = [
         sys.executable,
         "-m",
-        "affinet.cli.commands",
+        "affinet",
         "run",
         "corridor",
         "--duration",

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 from matplotlib.figure import Figure
+from own_code import ESTIMATOR
 from rerun.chunk import RrdReader
 from rich.console import Console
 
@@ -42,13 +43,13 @@ def test_processes_fly_in_any_directory_with_any_search_path_and_temporary_folde
     folder, temporary = tmp_path / "a:b", tmp_path / f"t#{'x' * 100}?"
     folder.mkdir()
     temporary.mkdir()
-    (folder / "named_oddly.py").write_text("from agents.estimators.none import NoEstimator as Mine\n")
+    (folder / "named_oddly.py").write_text(ESTIMATOR)
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-    plan = plan_of("corridor", *SHORT, 'agents.estimator="named_oddly:Mine"')
+    plan = plan_of("corridor", *SHORT, 'agents.estimator="named_oddly:Own"')
     done = fly(plan, "processes", tmp_path / "a*#?$\nb", lambda *_: None)
     assert (done.verdict, done.reasons) == ("pass", ())
-    assert done.digest == digest_of("corridor", *SHORT, 'agents.estimator="none"')
+    assert done.digest == digest_of("corridor", *SHORT, 'agents.estimator="named_oddly:Own"')
 
 
 def test_the_name_of_a_run_on_the_air_is_its_own_and_nothing_a_user_wrote():

@@ -29,7 +29,7 @@ def tested(pytester):
     """Runs pytest on the text of a test file, in this process."""
 
     def run(text, *options):
-        pytester.makepyfile("from affinet.verdicts.checkers import bounded, recovers\nimport pytest\n" + text)
+        pytester.makepyfile("from affinet import bounded, recovers\nimport pytest\n" + text)
         return pytester.runpytest_inprocess(f"--basetemp={pytester.path / 'base'}", *options)
 
     return run

@@ -19,7 +19,7 @@ RUN = ("run", "corridor", "--runtime", "inprocess", *COARSE)
 
 
 def affinet(*arguments, cwd, environment=os.environ, **streams):
-    command = [sys.executable, "-m", "affinet.cli.commands", *arguments]
+    command = [sys.executable, "-m", "affinet", *arguments]
     return subprocess.run(command, cwd=cwd, env=environment, check=False, **streams)
 
 
@@ -87,7 +87,7 @@ def test_a_full_disk_under_the_streams_is_said_in_a_line(arguments, complaints, 
 
 def test_closed_streams_are_not_taken_for_files_of_the_run(tmp_path):
     # The recording became descriptor 1 or 2, and the run was bad input.
-    command = [sys.executable, "-m", "affinet.cli.commands", *RUN, "--out", "run"]
+    command = [sys.executable, "-m", "affinet", *RUN, "--out", "run"]
     done = subprocess.run(["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *command], cwd=tmp_path, check=False)
     assert done.returncode == 0
     assert (tmp_path / "run" / RECORDING).exists()

@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from flying import PROCESSES
 from own_code import ESTIMATOR, LAW, broken, line_of, write
 
+import agents
 from affinet.cli.commands import main
 from affinet.planning import making
 from affinet.runtimes.run import fly, rehearse
@@ -361,7 +363,7 @@ def test_a_missing_method_is_named(method, folder):
 
 STUB = (
     ("class Own", "class Own(Estimator)"),
-    ("import sys", "import sys\nfrom agents.estimators.base import Estimator"),
+    ("import sys", "import sys\nfrom affinet import Estimator"),
 )
 ABSTRACT = (
     ("import sys", "import abc"),
@@ -508,6 +510,12 @@ def test_a_module_called_like_a_package_of_ours_is_to_be_renamed(package, folder
     assert main(["check", "corridor", "--estimator", f"{package}:Own"]) == 2
     file = folder / f"{package}.py"
     assert f"{file} is called like a package of affinet's own: rename it" in capsys.readouterr().err
+
+
+def test_a_scenario_beside_affinets_own_packages_may_name_what_is_in_them():
+    beside = Path(agents.__file__).parents[1]
+    given = ("agents.estimator=agents.estimators.rkf:RelativeKalmanFilter", *SIMPLE)
+    assert making.make(loading.load("corridor", given, beside)).estimator.folder == str(beside)
     assert rehearse(making.make(loading.load("corridor", SIMPLE))).outcome.verdict == "pass"
 
 
@@ -526,7 +534,7 @@ def test_a_thread_that_a_module_starts_keeps_no_process(arguments, folder):
     name = write(folder, broken(ESTIMATOR, ("import sys", SLEEPER)))
     verb, *options = arguments
     settings = [option for override in SIMPLE for option in ("--set", override)]
-    program = [sys.executable, "-c", "from affinet.cli.commands import command; command()", verb, "corridor", *options]
+    program = [sys.executable, "-m", "affinet", verb, "corridor", *options]
     done = subprocess.run(
         [*program, "--estimator", f"{name}:Own", *settings], check=False, capture_output=True, timeout=300
     )
@@ -741,7 +749,7 @@ def raising(run):
 
 CHECKERS = [
     (Checker("mine", raising), "mine: KeyError: 'no such' ("),
-    (Checker("mine", lambda _: None), "mine: must return a Finding, got None ("),  # type: ignore[return-value]
+    (Checker("mine", lambda _: None), "mine: must return a CheckResult, got None ("),  # type: ignore[return-value]
     (Checker("mine", raising) & Checker("other", raising), "mine: KeyError: 'no such' ("),
     (always(raising), "always: KeyError: 'no such' ("),
     # Before: AttributeErrors of ours, or a pass for a signal of another length.

@@ -328,6 +328,3 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "fit": _fit,
     "inject": _inject,
 }
-
-if __name__ == "__main__":
-    command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib.metadata import version
 from pathlib import Path
 
 from affinet.scenario import files, loading
@@ -13,6 +14,7 @@ def parser() -> argparse.ArgumentParser:
     whole = argparse.ArgumentParser(
         prog="affinet", description="Fly a swarm of agents through a network that loses, delays and cuts."
     )
+    whole.add_argument("--version", action="version", version=f"affinet {version('affinet')}")
     commands = whole.add_subparsers(required=True, dest="command", metavar="COMMAND")
     run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
     check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")

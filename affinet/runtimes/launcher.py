@@ -11,12 +11,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import agents
+import netem
+import world
 from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
 from affinet.runtimes.supervision import ProcessGroup, module
 from affinet.runtimes.told import Event
+from agents.centre import process as centre_process
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief
 from netem.medium.medium import JOURNAL
@@ -125,11 +129,11 @@ class Launcher:
     def _start(self, group: ProcessGroup) -> None:
         private = self._private
         self._logins = self._make_logins(private)
-        group.start("world", module("world"), self._world_brief(self._logins[WORLD]))
-        group.start("netem", module("netem"), self._medium_brief(self._logins[HUB], private / "users"))
+        group.start("world", module(world.__name__), self._world_brief(self._logins[WORLD]))
+        group.start("netem", module(netem.__name__), self._medium_brief(self._logins[HUB], private / "users"))
         if self._plan.centre:
             login = self._logins[CENTRE]
-            group.start("centre", module("agents.centre.process"), self._centre_brief(login))
+            group.start("centre", module(centre_process.__name__), self._centre_brief(login))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(group, number)
         group.await_ready(group.children)
@@ -196,7 +200,7 @@ class Launcher:
 
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
-        program = self._programs.get(number) or module("agents")
+        program = self._programs.get(number) or module(agents.__name__)
         self._agents[number] = group.start("agent", program, self._agent_brief(number, login, remembers), number)
         return self._agents[number]
 

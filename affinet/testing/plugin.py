@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from affinet import rooms
+
 if TYPE_CHECKING:
     from affinet.testing.swarm import SwarmRuns
 
@@ -75,6 +77,10 @@ def _right(name: str) -> str:
 @pytest.fixture
 def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SwarmRuns]:
     """Builds runs: `swarm("corridor").fault("cut", links=["6-7"], at=2).fly().check(bounded(1.0))`."""
+    try:
+        rooms.refuse_shadows()
+    except rooms.RoomShadowed as error:
+        pytest.fail(str(error), pytrace=False)
     from affinet.testing.swarm import SwarmRuns
 
     mark = request.node.get_closest_marker(_RUNTIME)

@@ -30,6 +30,11 @@ class Broken(AssertionError):
 class FlownRun(Evidence):
     """A run that was flown: its arrays, and its faults with what they touched."""
 
+    @classmethod
+    def of(cls, evidence: Evidence) -> FlownRun:
+        """The run that left this evidence."""
+        return cls(evidence.plan, evidence.arrays, evidence.outcome)
+
     def check(self, *checkers: Checker) -> FlownRun:
         """Nothing if every checker passes; one that is vacuous proves nothing, and fails.
 
@@ -43,6 +48,23 @@ class FlownRun(Evidence):
         if wrong := [finding for finding in findings if finding.verdict != "pass"]:
             raise Broken("\n".join(map(str, wrong)))
         return self
+
+
+def flown(plan: Plan, runtime: Runtime, out: Path) -> FlownRun:
+    """Fly a plan into a run directory.
+
+    Raises
+    ------
+    Broken
+        When an estimator or a law does something wrong, or the run leaves no arrays: why.
+    """
+    done = fly(plan, runtime, out, lambda *_: None)
+    landed = evidence(plan, done)
+    if done.user_code:
+        raise Broken("; ".join(done.reasons))
+    if landed is None:
+        raise Broken(f"the run left nothing: {'; '.join(done.reasons)}")
+    return FlownRun.of(landed)
 
 
 @dataclass(frozen=True)
@@ -144,18 +166,11 @@ class SwarmRuns:
     def _launch(self, plan: Plan) -> FlownRun:
         if self.runtime == "inprocess":
             self._flown.append((plan, None))
-            rehearsed = rehearse(plan)
-            return FlownRun(plan, rehearsed.arrays, rehearsed.outcome)
+            return FlownRun.of(rehearse(plan))
         self._rooms.append(self._room())
         out = self._rooms[-1] / "run"
         self._flown.append((plan, out))
-        done = fly(plan, "processes", out, lambda *_: None)
-        landed = evidence(plan, done)
-        if done.user_code:
-            raise Broken("; ".join(done.reasons))
-        if landed is None:
-            raise Broken(f"the run left nothing: {'; '.join(done.reasons)}")
-        return FlownRun(plan, landed.arrays, done)
+        return flown(plan, "processes", out)
 
     def _recorded(self, plan: Plan) -> Path:
         out = self._room() / "run"

@@ -70,7 +70,7 @@ class Checker:
         with np.errstate(over="ignore", invalid="ignore"), Calling(self.check, self.name):  # a run may have diverged
             found = self.check(evidence)
             if not isinstance(found, CheckResult):
-                raise WrongReturn(f"must return a Finding, got {kind(found)}")
+                raise WrongReturn(f"must return a CheckResult, got {kind(found)}")
         return found
 
     def __and__(self, other: Checker) -> Checker:

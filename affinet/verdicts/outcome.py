@@ -24,8 +24,8 @@ from netem.processes import system_errors
 from world.books import history
 from world.books.history import Arrays, digest
 
-_SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, _SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
+SUMMARY = "summary.json"
+_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
 
 Verdict = Literal["pass", "fail", "vacuous"]
 
@@ -89,7 +89,7 @@ class Outcome:
         OSError
             When it cannot be written.
         """
-        path = Path(self.out) / _SUMMARY
+        path = Path(self.out) / SUMMARY
         with system_errors.about(path):
             path.write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
 

@@ -16,8 +16,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-_OURS = frozenset({"affinet", "agents", "world", "netem", "analysis"})
-_HOME = Path(__file__).parents[1]
+from netem.processes.user_code import OURS
+
+_HOME = Path(__file__).parents[__name__.count(".")]  # in which our packages lie
 
 
 class NameTaken(ValueError):
@@ -123,7 +124,7 @@ _SHELVES = _Shelves()
 
 
 def _refuse_to_replace_ours(top: str, folder: str | None) -> None:
-    if folder is None or top not in _OURS or Path(folder).resolve() == _HOME.resolve():
+    if folder is None or top not in OURS or Path(folder).resolve() == _HOME.resolve():
         return
     package = Path(folder) / top
     file = package if package.is_dir() else package.with_suffix(".py")

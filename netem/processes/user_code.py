@@ -9,6 +9,10 @@ import traceback
 from types import TracebackType
 from typing import Any, NamedTuple
 
+# The packages at the top that affinet is made of: one in a wheel, which has its rooms within; in a checkout they lie beside it.
+OURS = frozenset(
+    {"affinet"} if __name__.startswith("affinet.") else {"affinet", "agents", "world", "netem", "analysis"}
+)
 _LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
 _LONGEST = 400
 _RAISE = opcode.opmap["RAISE_VARARGS"]
@@ -122,7 +126,7 @@ def _steps(trace: TracebackType | None) -> list[_Step]:
 
 
 def _is_ours(step: _Step) -> bool:
-    return step.package in {"affinet", "agents", "world", "netem", "analysis"}
+    return step.package in OURS
 
 
 def _is_installed(step: _Step) -> bool:

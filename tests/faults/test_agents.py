@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from affinet.verdicts.checkers import agreement, always, bounded, collision_free, error_below, recovers
+from affinet import agreement, always, bounded, collision_free, error_below, recovers
 
 COARSE = "time.dt=0.05"
 FILTER_ALONE = "agents.estimator=rkf"

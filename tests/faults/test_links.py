@@ -2,7 +2,7 @@
 
 import pytest
 
-from affinet.verdicts.checkers import (
+from affinet import (
     agreement,
     always,
     bounded,
