@@ -91,7 +91,7 @@ def test_an_estimator_too_can_want_its_position(folder):
     wants = broken(
         CENTRALIZED,
         ("    def channels", "    wants = Wants(position=True)\n\n    def channels"),
-        ("from agents.swarm", "from agents.wants import Wants\nfrom agents.swarm"),
+        ("import numpy as np\n", "import numpy as np\n\nfrom affinet import Wants\n"),
         ("        told = heard", "        own.position + 1.0\n        told = heard"),
     )
     assert plan_of(*estimates(write(folder, wants)), *STILL).positioned.all()
@@ -150,7 +150,7 @@ def test_with_a_centre_nobody_can_be_killed_or_paused(verb, folder):
 
 WANTING = (
     ("    by_stress", "    wants = Wants(WHAT=True)\n    by_stress"),
-    ("import numpy as np\n", "import numpy as np\n\nfrom agents.wants import Wants\n"),
+    ("import numpy as np\n", "import numpy as np\n\nfrom affinet import Wants\n"),
 )
 
 
@@ -297,7 +297,9 @@ def test_no_room_but_their_own_names_an_estimator_or_a_law():
     files = [
         file for room in ("affinet", "agents", "world", "netem", "analysis") for file in (ROOT / room).rglob("*.py")
     ]
-    others = [file for file in files if file.parent not in (ROOT / "agents" / "estimators", ROOT / "agents" / "laws")]
+    own = (ROOT / "agents" / "estimators", ROOT / "agents" / "laws")
+    face = ROOT / "affinet" / "__init__.py"  # offers what a user's own centre is made of, and decides nothing
+    others = [file for file in files if file.parent not in own and file != face]
     assert len(others) > 200
     assert {str(file): found for file in others if (found := [*named(file.read_text())])} == {}
 
