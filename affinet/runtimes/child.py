@@ -46,6 +46,8 @@ class Child:
         Whether its death is in the script, or the run is over.
     killed
         Whether the script had it killed.
+    confessed
+        Whether it said why it goes down.
     is_ready, is_done
         Whether it has told so.
     doing, beat_s
@@ -60,6 +62,7 @@ class Child:
     log: Path
     expected_to_die: bool = False
     killed: bool = False
+    confessed: bool = False
     is_ready: bool = False
     is_done: bool = False
     rss_mb: float = 0.0
@@ -180,6 +183,7 @@ class Child:
             event = read(self.role, line)
         except NotItsOwn as error:
             raise RunFailed(f"{self.who}: {error} (docs/protocol.md)") from error
+        self.confessed = event["event"] in ("failed", "user-code")
         match event["event"]:
             case "failed":
                 raise RunFailed(f"{self.name}: {printable(event['reason'])[:_LONGEST_REASON]}")

@@ -254,7 +254,8 @@ class ProcessGroup:
         # The world goes first: it has a recording to close.
         alive = [child for child in self.children if child.process.poll() is None]
         for child in sorted(alive, key=lambda child: child.role != "world"):
-            child.process.terminate()
+            if not child.confessed:  # who has is leaving, and its log is to say of what
+                child.process.terminate()
             child.resume()  # one that is stopped could not hear that it has to leave
         deadline = time.monotonic() + _GRACE_S
         for child in alive:
