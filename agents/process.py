@@ -15,11 +15,10 @@ from agents.agent import Agent, AgentState
 from agents.brief import Brief
 from agents.estimators.centralized import CentralizedFilter
 from agents.exchange import Heard
-from agents.loading import parameters
-from agents.loading.calling import Calling, load
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Sighting
 from netem.core import channels
+from netem.loading.choice import Choice
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
@@ -27,40 +26,6 @@ from netem.wire import messages
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
 from netem.wire.session import CENTRE, HUB, Login, await_subscribers, client
-
-
-@dataclass(frozen=True)
-class Choice:
-    """An algorithm to run.
-
-    Parameters
-    ----------
-    path
-        "module:Class".
-    parameters
-        Those of its parameters that were given, as a scenario says them.
-    folder
-        In which its module lies, if that is the user's own.
-    """
-
-    path: str
-    parameters: dict[str, Any]
-    folder: str | None = None
-
-    def build(self) -> Any:
-        """The algorithm.
-
-        Raises
-        ------
-        UserCodeError
-            When its module cannot be imported, or the algorithm not be made.
-        """
-        algorithm = load(self.path, self.folder)
-        with Calling(algorithm, "__init__"):
-            made = algorithm(**parameters.arguments(algorithm, self.parameters))
-        with Calling(algorithm, "__getattribute__"):
-            isinstance(made, CentralizedFilter)  # asks it for its class, which it may refuse to tell
-        return made
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief, Choice
+from agents.process import AgentBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
@@ -20,6 +20,7 @@ from netem.core.plain import PlainError, from_plain, plainly
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
 from netem.impairments.delay import DelayLaw
+from netem.loading.choice import Choice
 from netem.process import MediumBrief
 from netem.wire import messages
 from netem.wire.messages import Phase, WireError

@@ -25,8 +25,6 @@ from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.jor import JacobiOverRelaxation
 from agents.laws.base import Law
 from agents.laws.single import needs_mission
-from agents.loading.calling import Calling, name_of
-from agents.process import Choice
 from analysis.models.arrays import Array, Mask
 from analysis.models.information import reported
 from analysis.models.unsuited import Unsuited
@@ -36,6 +34,8 @@ from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
 from netem.impairments.profile import Profile
+from netem.loading.calling import Calling, name_of
+from netem.loading.choice import Choice
 from netem.medium.medium import Verdicted, recorded
 from netem.processes.user_code import UserCodeError, definition
 from world.brief import RecordOptions

@@ -14,10 +14,10 @@ from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import among
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
-from agents.loading import parameters
-from agents.loading.calling import Calling, NoSuchAlgorithm, load, name_of
-from agents.loading.parameters import ParameterError
-from agents.process import Choice
+from netem.loading import parameters
+from netem.loading.calling import Calling, NoSuchAlgorithm, load, name_of
+from netem.loading.choice import Choice
+from netem.loading.parameters import ParameterError
 from netem.processes.user_code import UserCodeError, definition, text_of
 
 ESTIMATORS = "affinet.estimators"

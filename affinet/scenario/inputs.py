@@ -17,7 +17,7 @@ from typing import Any
 
 from affinet.scenario.finding import Finding
 from affinet.scenario.sections import Scenario, ScenarioError
-from agents.loading import modules
+from netem.loading import modules
 
 FOLDER = "inputs"  # in a run directory
 SCENARIO = "scenario.json"  # in a run directory, as resolved

@@ -9,12 +9,12 @@ import numpy as np
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Verdict
-from agents.loading.calling import Calling
-from agents.loading.returned import WrongReturn, shown
 from analysis.metrics import consistency, localization
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
 from netem.faults.fault import Fault, Verb
+from netem.loading.calling import Calling
+from netem.loading.returned import WrongReturn, shown
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
 

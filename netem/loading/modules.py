@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any
 
 _OURS = frozenset({"affinet", "agents", "world", "netem", "analysis"})
-_HOME = Path(__file__).parents[1]
+_HOME = Path(__file__).parents[2]
 
 
 class NameTaken(ValueError):
