@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from affinet.planning import checks, limits, network, recordings, registry, script, tryout
+from affinet.planning import checks, limits, network, own_losses, recordings, registry, script, tryout
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, world_of
 from affinet.scenario import inputs, loading, sections
 from affinet.scenario.finding import Finding
@@ -221,6 +221,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
 
 def _make(given: Scenario) -> Plan:
     registry.check_parameters(given.agents.parameters, given.own_modules)
+    own_losses.check(given.network.profiles, given.own_modules)
     formation = formation_of(given)
     estimator = _choice(given, registry.ESTIMATORS, "estimator", given.agents.estimator)
     law = _choice(given, registry.LAWS, "law", given.agents.law)

@@ -51,7 +51,7 @@ _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 _MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "centre": {**_OF_ALL, "done": {}},
-    "netem": {**_OF_ALL, "done": {"in_flight": _is_count}},
+    "netem": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {"in_flight": _is_count}},
     "world": {
         **_OF_ALL,
         "tick": {"k": _is_count, "error": _is_number},

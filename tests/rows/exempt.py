@@ -18,7 +18,8 @@ EXEMPT = {
         netem.medium.medium.Medium.bit_draws netem.medium.medium.Medium.bias netem.impairments.rate.Rate.begin
         netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.jamming.Zone.jammed
         netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
-        netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
+        netem.medium.own_losses.OwnLosses.lost netem.medium.by_tick.ImpairmentsByTick.at
+        netem.medium.by_tick.ImpairmentsByTick.draw
         netem.core.draws.DrawnAhead.at
     """,
     WHOLE: """
@@ -77,6 +78,7 @@ EXEMPT = {
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PROTOCOL: """
+        netem.impairments.own.Loss.lost
         agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance
