@@ -98,7 +98,8 @@ class Agent:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
 
         The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
-        (..., m - 1, D) of integrators of an order m above 1.
+        (..., m - 1, D) of integrators of an order m above 1. Bodies that measure a velocity where they are steered by one tell
+        what they measure: it is not what they were told.
         """
         with Calling(self.estimator, "sense"):
             told = self.estimator.sense(self.brief, state.estimator, measured, seen)
@@ -106,7 +107,8 @@ class Agent:
             returned.state(state.estimator, estimator, seen.shape[:-1])
             returned.said(self._spoken, said, seen.shape[:-1])
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
-        return state._replace(estimator=estimator), {INPUT: dict(zip(DERIVATIVES, moves, strict=False)), **said}
+        moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
+        return state._replace(estimator=estimator), {INPUT: moving, **said}
 
     def act(
         self,

@@ -115,6 +115,11 @@ BASES: dict[str, dict[str, Any]] = {
         "sensing": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
         "dynamics": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
     },
+    "unicycles": {
+        **_FLOWN,
+        "dynamics": {"model": "unicycle", "ahead": 0.3},
+        "agents": {"estimator": "rkf", "law": "static"},
+    },
     "polar": {
         **_FLOWN,
         "sensing": {"sigma_range": 0.1, "sigma_bearing": 0.01},

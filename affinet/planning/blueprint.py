@@ -17,6 +17,7 @@ from analysis.models.pursuit import Target
 from netem.core.links import Links
 from world.formation import manoeuvre
 from world.formation.nominal import PRESETS, Formation
+from world.physics.bodies import BodyModel
 from world.physics.disturbance import Disturbance, Kernel
 from world.physics.target import MovingTarget
 from world.physics.world import World
@@ -69,7 +70,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         seed=given.seed,
         dt=given.time.dt,
         ticks=given.time.ticks,
-        order=given.dynamics.order,
+        body=_body(given, formation.dimension),
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
@@ -80,6 +81,16 @@ def world_of(given: Scenario, formation: Formation) -> World:
         spread=given.formation.spread,
         swarms=1,
     )
+
+
+def _body(given: Scenario, dimension: int) -> BodyModel:
+    body = given.dynamics.body
+    if dimension not in (flown_in := body.build().dimensions):
+        said = " or ".join(map(str, flown_in))
+        raise ScenarioError(
+            f"dynamics.model: a {body.model} moves in {said} dimensions, and the formation has {dimension}"
+        )
+    return body
 
 
 def _disturbance(given: Scenario, dimension: int) -> Disturbance:

@@ -159,7 +159,9 @@ class InProcessSwarm:
         self._air, delivery = self._medium.deliver(air, tick, verdicts)
         heard = {name: self._hear(name, delivery) for name in self._fields}
         if self._centre:
-            heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
+            heard[channels.CENTRE] = self._from_the_centre(
+                self._centre, measured, seen, said[channels.INPUT]["velocity"]
+            )
         sighting = self._plan.world.sighting(tick, scene)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
         if now.idle.any():

@@ -30,6 +30,7 @@ from affinet.scenario.verbs import AnyEvent, Links
 from affinet.scenario.words import among
 from analysis.models.sensor import Sensor
 from world.formation.nominal import PRESETS
+from world.physics.bodies import BodyModel
 
 Matrix = list[list[Finite]]
 
@@ -176,15 +177,19 @@ class KernelSection(Section):
 
 Integrator = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"]
 INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
+# The keys of each kind of body beside those that all have.
+_OF_BODIES: dict[str, tuple[str, ...]] = {"unicycle": ("ahead",)}
 
 
 class DynamicsSection(Section):
     """What the bodies are, and what displaces them in a tick: a standard deviation per axis, in metres, or a covariance, in m2.
 
-    `kernel` correlates agents, `persistence` successive ticks.
+    `kernel` correlates agents, `persistence` successive ticks. A unicycle is steered by a point so many metres `ahead` of its
+    wheels.
     """
 
-    model: Integrator = "single-integrator"
+    model: Integrator | Literal["unicycle"] = "single-integrator"
+    ahead: Positive | None = None
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
     kernel: KernelSection | None = None
@@ -196,10 +201,26 @@ class DynamicsSection(Section):
             raise ValueError("give disturbance (m) or covariance (m2), not both")
         return self
 
+    @model_validator(mode="after")
+    def _of_its_body(self) -> DynamicsSection:
+        for model, keys in _OF_BODIES.items():
+            for key in keys:
+                if (getattr(self, key) is None) == (self.model == model):
+                    missing = f"a {model} needs {key} (m)"
+                    raise ValueError(
+                        missing if self.model == model else f"{key} is of a {model}, not of a {self.model}"
+                    )
+        return self
+
+    @property
+    def body(self) -> BodyModel:
+        """What the bodies are."""
+        return BodyModel(self.model, {key: getattr(self, key) for key in _OF_BODIES.get(self.model, ())})
+
     @property
     def order(self) -> int:
         """How often the input is integrated to a position."""
-        return 1 + INTEGRATORS.index(self.model)
+        return self.body.build().order
 
 
 class TargetSection(Section):

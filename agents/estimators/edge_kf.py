@@ -88,7 +88,7 @@ class EdgeKalmanFilter:
         """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g)."""
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
-        mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
+        mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = state.covariance + of_edges(brief) + brief.dt * brief.dt * doubt
         R = brief.sensor.spread(state.measured)
         filters = kalman.correct(mean, covariance, state.measured, R, state.seen)

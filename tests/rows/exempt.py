@@ -38,6 +38,8 @@ EXEMPT = {
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.read world.acts.Acts.beliefs
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
+        world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
+        world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
         analysis.models.sensor.Sensor.common
     """,
     ONE_WORLD: """
@@ -78,7 +80,8 @@ EXEMPT = {
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PROTOCOL: """
-        netem.impairments.own.Loss.lost
+        netem.impairments.own.Loss.lost world.physics.bodies.Body.rest world.physics.bodies.Body.coasting
+        world.physics.bodies.Body.moved
         agents.laws.base.Law.command agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance
