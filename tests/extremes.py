@@ -125,6 +125,11 @@ BASES: dict[str, dict[str, Any]] = {
         "sensing": {"sigma_range": 0.1, "sigma_bearing": 0.01},
         "agents": {"estimator": "rkf", "law": "static"},
     },
+    "directions": {
+        **_FLOWN,
+        "sensing": {"sigma_direction": 0.01},
+        "agents": {"estimator": "edge-kf", "law": "static"},
+    },
     "line-of-sight": {
         **_FLOWN,
         "sensing": {"sigma_along": 0.1, "sigma_across": 0.1},

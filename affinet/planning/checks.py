@@ -158,7 +158,10 @@ def not_rigid(why: str) -> Finding:
 
 def localization_step(world: World, estimator: JacobiOverRelaxation) -> Finding:
     """How fast localization comes to its answer, from measurements as they would be without noise."""
-    known = FirstMeasurements(world.links, world.sensor, ())
+    if not world.sensor.says_positions:
+        says = "agents find out where they are from positions of each other, and the sensor says directions alone"
+        return Finding("localization", "error", says)
+    known = FirstMeasurements(world.links, world.sensor, (), world.formation.dimension)
     known.take(sensors.relative(world.formation.nominal, world.links), np.ones(len(world.links), dtype=bool))
     edges, leaders = known.edges(), world.formation.leaders
     if estimator.anchor and len(leaders) != 1:

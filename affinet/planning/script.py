@@ -206,6 +206,10 @@ def _shapes(draft: _Draft, number: int, entry: Any, key: str) -> list[Fault]:
         case verbs.Degrade():
             number_of = _profile(draft, entry.profile, f"{key}.profile")
             return [Fault(verb, 0, None, pairs=on(), profile=number_of, profile_name=entry.profile)]
+        case verbs.Bias() | verbs.Outlier() if draft.given.sensing.sigma_direction is not None:
+            raise ScenarioError(
+                f"{key}: {verb} is in metres, and sensors here say directions; let them freeze, or drop out"
+            )
         case verbs.Bias():
             return [Fault(verb, 0, None, pairs=on(), vector=vector("by"))]
         case verbs.Outlier():

@@ -140,7 +140,8 @@ class SensingSection(Section):
     """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
     Or those of a range, in metres, and of a bearing, in radians (in three dimensions azimuth and elevation); or those along and
-    across the line of sight, as shares of the distance. It makes `samples` of them in a tick, and reports their mean.
+    across the line of sight, as shares of the distance. Or that of a direction, in radians, of a sensor that says no distance.
+    It makes `samples` of them in a tick, and reports their mean.
     """
 
     samples: Steps = 1
@@ -150,6 +151,7 @@ class SensingSection(Section):
     sigma_bearing: Bearing | None = None
     sigma_along: ShareOfDistance | None = None
     sigma_across: ShareOfDistance | None = None
+    sigma_direction: Bearing | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> SensingSection:
@@ -157,10 +159,11 @@ class SensingSection(Section):
             raise ValueError("sigma_range (m) and sigma_bearing (rad) go together")
         if (self.sigma_along is None) != (self.sigma_across is None):
             raise ValueError("sigma_along and sigma_across (shares of the distance) go together")
-        if sum(given is not None for given in (self.sigma, self.covariance, self.sigma_range, self.sigma_along)) != 1:
+        kinds = (self.sigma, self.covariance, self.sigma_range, self.sigma_along, self.sigma_direction)
+        if sum(given is not None for given in kinds) != 1:
             raise ValueError(
                 "give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad), "
-                "or sigma_along and sigma_across (shares of the distance)"
+                "or sigma_along and sigma_across (shares of the distance), or sigma_direction (rad)"
             )
         if self.sigma == 0.0:
             raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
@@ -350,6 +353,8 @@ def sensor(sensing: SensingSection, dimension: int) -> Sensor:
     if sensing.sigma_along is not None and sensing.sigma_across is not None:
         deviations = np.array([sensing.sigma_along] + [sensing.sigma_across] * (dimension - 1))
         return Sensor("line-of-sight", np.diag(deviations**2) / sensing.samples)
+    if sensing.sigma_direction is not None:
+        return Sensor("direction", sensing.sigma_direction**2 * np.eye(dimension - 1) / sensing.samples)
     R = _covariance("sensing", sensing.sigma, sensing.covariance, dimension)
     return Sensor("coordinates", R / sensing.samples)
 

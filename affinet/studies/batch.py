@@ -155,7 +155,7 @@ class _Places:
     def __init__(self, plan: Plan, runs: int) -> None:
         self._wanted = channels.PLACE in plan.reports
         self._runs = runs
-        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
+        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,), plan.world.formation.dimension)
         self._kept: list[Array] = []
         self._recent: list[Array] = []
         self._since = 0

@@ -42,6 +42,7 @@ class CentralizedFilter:
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Stateless:  # noqa: ARG002
         """Nothing to remember."""
+        brief.sensor.require_positions()  # the centre measures by it
         return Stateless()
 
     def sense(

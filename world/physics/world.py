@@ -110,7 +110,7 @@ class World:
             position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
         still, rest = np.zeros_like(position), self._body.rest(position)
         chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
-        seen = sensors.relative(position, self.links)
+        seen = self.sensor.exact(sensors.relative(position, self.links))
         return Scene(position, rest.derivatives, seen, still, chase, rest.pose)
 
     def target(self, tick: int | Integers) -> Array:
@@ -131,11 +131,11 @@ class World:
         return self.pursuit.sighting(tick, self.seed, self._numbers, scene.chase)
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
-        """y_ij of every directed link, shape (L, D), in metres."""
+        """y_ij of every directed link, shape (L, D), in metres, or a unit vector, as the sensor says it."""
         measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
         if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
             return measured
-        size = self._normal(Purpose.OUTLIER_SIZE, tick)
+        size = self._normal(Purpose.OUTLIER_SIZE, tick, self.formation.dimension)
         return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
 
     def outliers(self, tick: int, now: Conditions) -> Mask:
@@ -175,13 +175,15 @@ class World:
     @cached_property
     def _sensor_noise(self) -> DrawnAhead:
         return DrawnAhead(
-            lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.sensor.covariance)
+            lambda ticks: sensors.noise(
+                self._normal(Purpose.SENSOR_NOISE, ticks[:, None], len(self.sensor.covariance)), self.sensor.covariance
+            )
         )
 
-    def _normal(self, purpose: Purpose, tick: int | Integers) -> Array:
-        """Standard normal draws for every measurement of a tick, shape (..., L, D)."""
+    def _normal(self, purpose: Purpose, tick: int | Integers, axes: int) -> Array:
+        """Standard normal draws for every measurement of a tick, shape (..., L, axes)."""
         src, dst = self.links.ends.values()
-        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=self.formation.dimension)
+        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=axes)
 
     @property
     def _numbers(self) -> Integers:
