@@ -178,8 +178,8 @@ class KernelSection(Section):
     positions: Literal["nominal", "true"] = "nominal"
 
 
-Integrator = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"]
-INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
+BodyName = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator", "unicycle"]
+INTEGRATORS: tuple[BodyName, ...] = get_args(BodyName)[:4]  # by their order, from 1
 # The keys of each kind of body beside those that all have.
 _OF_BODIES: dict[str, tuple[str, ...]] = {"unicycle": ("ahead",)}
 
@@ -191,7 +191,7 @@ class DynamicsSection(Section):
     wheels.
     """
 
-    model: Integrator | Literal["unicycle"] = "single-integrator"
+    model: BodyName = "single-integrator"
     ahead: Positive | None = None
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
