@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
+from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import Source
@@ -26,7 +27,7 @@ from affinet.scenario.units import (
     Tick,
     Ticks,
 )
-from affinet.scenario.verbs import AnyEvent, Links
+from affinet.scenario.verbs import AnyEvent
 from affinet.scenario.words import among
 from analysis.models.sensor import Sensor
 from world.formation.nominal import PRESETS

@@ -32,7 +32,7 @@ EXEMPT = {
         netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
         netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
         netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
-        netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
