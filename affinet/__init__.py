@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from analysis.models.arrays import Mask as Mask
     from analysis.models.finding import Finding as Finding
     from analysis.models.unsuited import Unsuited as Unsuited
+    from netem.impairments.own import Loss as Loss
+    from netem.impairments.own import Offered as Offered
 
     __version__: str
 
@@ -90,6 +92,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("analysis", "models.arrays"): ("Array", "Integers", "Mask"),
     ("analysis", "models.finding"): ("Finding",),
     ("analysis", "models.unsuited"): ("Unsuited",),
+    ("netem", "impairments.own"): ("Loss", "Offered"),
 }
 _MODULES = {
     "algebra": ("analysis", "models.algebra"),

@@ -16,11 +16,12 @@ from agents.exchange import Channels, Field, Fields, Heard
 from agents.laws.base import Law
 from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
 from agents.loading import returned
-from agents.loading.calling import Calling
 from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array, Mask
 from analysis.models.pursuit import Sighting
 from netem.core.channels import INPUT
+from netem.loading.calling import Calling
+from netem.loading.returned import array, pair
 
 
 class AgentState(NamedTuple):
@@ -97,15 +98,17 @@ class Agent:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
 
         The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
-        (..., m - 1, D) of integrators of an order m above 1.
+        (..., m - 1, D) of integrators of an order m above 1. Bodies that measure a velocity where they are steered by one tell
+        what they measure: it is not what they were told.
         """
         with Calling(self.estimator, "sense"):
             told = self.estimator.sense(self.brief, state.estimator, measured, seen)
-            estimator, said = returned.pair(told, "the state, and what to broadcast")
+            estimator, said = pair(told, "the state, and what to broadcast")
             returned.state(state.estimator, estimator, seen.shape[:-1])
             returned.said(self._spoken, said, seen.shape[:-1])
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
-        return state._replace(estimator=estimator), {INPUT: dict(zip(DERIVATIVES, moves, strict=False)), **said}
+        moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
+        return state._replace(estimator=estimator), {INPUT: moving, **said}
 
     def act(
         self,
@@ -140,7 +143,7 @@ class Agent:
         batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
         with Calling(self.estimator, "fuse"):
             told = self.estimator.fuse(self.brief, state.estimator, heard, own)
-            estimator, estimate = returned.pair(told, "the state, and an Estimate")
+            estimator, estimate = pair(told, "the state, and an Estimate")
             returned.state(state.estimator, estimator, batch)
             return estimator, returned.estimate(estimate, slots, dimension, batch, self.reports)
 
@@ -150,9 +153,9 @@ class Agent:
         batch = state.input.shape[:-1]
         with Calling(self.law, "command"):
             told = self.law.command(self.brief, state.law, tick, own, estimate, inputs)
-            law, steered = returned.pair(told, "the state, and the input")
+            law, steered = pair(told, "the state, and the input")
             returned.state(state.law, law, batch)
-            returned.array("the input", steered, "D", (self.brief.dimension,), batch)
+            array("the input", steered, "D", (self.brief.dimension,), batch)
             return law, steered
 
     def _led(self, mission: Manoeuvre, tick: Reading, position: Array, velocity: Array) -> Array:

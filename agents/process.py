@@ -13,10 +13,10 @@ from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Brief
 from agents.exchange import Heard
-from agents.loading.choice import Choice
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Sighting
 from netem.core import channels
+from netem.loading.choice import Choice
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError

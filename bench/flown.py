@@ -46,7 +46,7 @@ def profile(links: Links, channels: Sequence[str] = ONE, **impairments: Any) -> 
         "dt": DT,
         "coupled": True,
         "least_delay": 0,
-        **dict.fromkeys(("chains", "traces", "schedules", "reaches", "zones", "delays"), ()),
+        **dict.fromkeys(("chains", "traces", "schedules", "reaches", "zones", "own", "delays"), ()),
         "listed": np.empty((0, 4), dtype=np.int64),
         **dict.fromkeys(("duplicate", "reorder", "bias"), none),
         "corrupt": np.zeros((len(links), 4)),

@@ -40,6 +40,7 @@ def quiet_profile(links, channels, **changes):
         schedules=(),
         reaches=(),
         zones=(),
+        own=(),
         listed=np.empty((0, 4), dtype=np.int64),
         delays=(),
         duplicate=np.zeros(size),

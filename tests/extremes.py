@@ -115,10 +115,20 @@ BASES: dict[str, dict[str, Any]] = {
         "sensing": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
         "dynamics": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
     },
+    "unicycles": {
+        **_FLOWN,
+        "dynamics": {"model": "unicycle", "ahead": 0.3},
+        "agents": {"estimator": "rkf", "law": "static"},
+    },
     "polar": {
         **_FLOWN,
         "sensing": {"sigma_range": 0.1, "sigma_bearing": 0.01},
         "agents": {"estimator": "rkf", "law": "static"},
+    },
+    "directions": {
+        **_FLOWN,
+        "sensing": {"sigma_direction": 0.01},
+        "agents": {"estimator": "edge-kf", "law": "static"},
     },
     "line-of-sight": {
         **_FLOWN,

@@ -92,7 +92,7 @@ def test_its_covariance_is_the_lowest_at_every_tick_of_a_noisy_run():
     traces = {}
     for estimator in ("crkf", "joint-kf", "edge-kf", "mle"):
         plan = plan_of("rigid", *COARSE, "time.duration=1", f'agents.estimator="{estimator}"')
-        traces[estimator] = fly_all(plan, [1, 2], 1).covariance_trace
+        traces[estimator] = fly_all(plan, [1, 2], 1).quantities["covariance_trace"]
     for worse in ("joint-kf", "edge-kf", "mle"):
         assert (traces["crkf"] < traces[worse]).all()
     assert (traces["joint-kf"][:, 50:] < traces["edge-kf"][:, 50:]).all()
@@ -101,8 +101,8 @@ def test_its_covariance_is_the_lowest_at_every_tick_of_a_noisy_run():
 def test_its_errors_are_as_large_as_its_covariance_says():
     plan = plan_of("rigid", *COARSE, "time.duration=3", 'agents.estimator="crkf"')
     runs = fly_all(plan, range(1, 21), 1)
-    squared = (runs.estimation_error[:, 100:] ** 2).mean()
-    assert squared == pytest.approx(runs.covariance_trace[:, 100:].mean(), rel=0.1)
+    squared = (runs.quantities["estimation_error"][:, 100:] ** 2).mean()
+    assert squared == pytest.approx(runs.quantities["covariance_trace"][:, 100:].mean(), rel=0.1)
 
 
 def test_it_hears_past_the_medium_what_is_lost_between_agents():

@@ -9,8 +9,9 @@ from typing import get_args
 import pytest
 from flying import PROCESSES, digest_of, plan_of
 
-from affinet.runtimes.run import fly
-from affinet.scenario import profiles, sections, verbs
+from affinet.planning import plan as planning
+from affinet.runtimes.run import fly, rehearse
+from affinet.scenario import loading, profiles, sections, verbs
 from affinet.studies import study
 
 pytestmark = PROCESSES
@@ -26,6 +27,29 @@ def test_the_estimator_of_the_docs_flies_in_both_runtimes(tmp_path, out, monkeyp
     outcome = fly(plan_of("corridor", *held), "processes", out, lambda *_: None)
     assert outcome.verdict == "pass", outcome.reasons
     assert outcome.digest == digest_of("corridor", *held)
+
+
+def test_the_loss_of_the_docs_flies_in_both_runtimes(tmp_path, out):
+    page = (DOCS / "extending.md").read_text()
+    (code,) = re.findall(r"```python\n(# fading\.py.*?)```", page, flags=re.DOTALL)
+    (losses,) = re.findall(r"^    loss = (.*)$", page, flags=re.MULTILINE)
+    (tmp_path / "fading.py").write_text(code)
+    over = (
+        "time.duration=1",
+        "network.availability=1.0",
+        "network.profile=mine",
+        f"network.profiles.mine.loss={losses}",
+    )
+    plan = planning.make(loading.load("corridor", over, tmp_path))
+    outcome = fly(plan, "processes", out, lambda *_: None)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == rehearse(plan).outcome.digest
+    assert outcome.digest != digest_of("corridor", "time.duration=1", "network.availability=1.0")
+
+
+def test_a_package_names_a_loss_as_the_docs_say():
+    page = (DOCS / "extending.md").read_text()
+    assert f'[project.entry-points."{profiles.IMPAIRMENTS}"]' in page
 
 
 def test_the_realised_graph_of_the_docs_is_computed(tmp_path, monkeypatch):

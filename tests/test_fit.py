@@ -151,7 +151,7 @@ def test_a_run_too_short_for_the_order_is_refused(flown, capsys):
 def test_double_integrators_are_refused(out, capsys):
     fly(plan_of("ravine", "time.duration=0.1", "record.enabled=false"), "inprocess", out, lambda *_: None)
     line = refused(capsys, out)
-    assert line.startswith(f"{out}: its inputs are accelerations")
+    assert line.startswith(f"{out}: what its double-integrators are given is not their velocity")
 
 
 @pytest.mark.parametrize("order", ["0", "-1", "1.5", "two"])

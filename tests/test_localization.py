@@ -701,14 +701,18 @@ def test_many_runs_are_looked_at_as_each_alone():
         alone = flown(*overrides, f"seed={seed}")
         edges, place = known(alone), alone.arrays["place"]
         centre = centroid(place, weights(edges))
-        np.testing.assert_allclose(runs.localization[row], localization.distance(place, edges), atol=1e-12)
-        np.testing.assert_allclose(runs.drift[row], np.linalg.norm(centre - centre[0], axis=-1), atol=1e-12)
-        np.testing.assert_array_equal(runs.ringing[row], ringing(place))
+        np.testing.assert_allclose(
+            runs.quantities["localization"][row], localization.distance(place, edges), atol=1e-12
+        )
+        np.testing.assert_allclose(
+            runs.quantities["drift"][row], np.linalg.norm(centre - centre[0], axis=-1), atol=1e-12
+        )
+        np.testing.assert_array_equal(runs.quantities["ringing"][row], ringing(place))
     np.testing.assert_array_equal(runs.first["place"], flown(*overrides, "seed=5").arrays["place"])
-    assert runs.ringing.max() > 0.0
-    assert np.isnan(runs.found).all()
+    assert runs.quantities["ringing"].max() > 0.0
+    assert np.isnan(runs.quantities["found"]).all()
     # Nothing is said of neighbours that could be as wrong as it says.
-    assert np.isnan(runs.nees).all()
+    assert np.isnan(runs.quantities["nees"]).all()
 
 
 ROW = (
@@ -720,7 +724,7 @@ ROW = (
 @pytest.mark.parametrize("every", [2, 3, 7])
 def test_ringing_is_that_of_all_ticks_since_the_moment_before(every):
     plan = plan_of(NAME, *ROW, "time.duration=0.64", "agents.parameters.jor={h=0.99}")
-    each, some = (fly_all(plan, [1, 2], every=ticks).ringing for ticks in (1, every))
+    each, some = (fly_all(plan, [1, 2], every=ticks).quantities["ringing"] for ticks in (1, every))
     assert each.mean() > 0.5
     ticks = np.arange(0, 64, every)
     for row in range(2):

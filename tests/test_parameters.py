@@ -11,8 +11,8 @@ from affinet.planning import making, registry
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
-from agents.loading.choice import Choice
 from netem.core.plain import from_plain, to_plain
+from netem.loading.choice import Choice
 from netem.processes.user_code import UserCodeError
 
 SIMPLE = ("agents.law=rest", "time.dt=0.05", "time.duration=0.5")
@@ -298,8 +298,8 @@ def test_parameters_of_what_is_not_in_use_may_be_given():
 
 @pytest.mark.parametrize("group", [registry.ESTIMATORS, registry.LAWS])
 def test_every_parameter_of_every_shipped_algorithm_refuses_a_value_of_another_kind(group):
-    from agents.loading import parameters
-    from agents.loading.calling import load
+    from netem.loading import parameters
+    from netem.loading.calling import load
 
     for name in registry.names(group):
         for parameter in parameters.names(load(registry.choose(group, "agents", name, {}, {}).path, None)):

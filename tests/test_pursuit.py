@@ -969,7 +969,7 @@ def test_gains_of_the_laws_are_read_from_the_scenario():
     for order in (1, 2, 3, 4):
         kappa = [[1.0], [1.0, 5.0], [1.0, 5.0, 2.0], [1.0, 5.0, 8.0, 7.0]][order - 1]
         made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
-        assert (made.law.build(), made.world.order, made.agents.law.order) == (Pursuit(kappa), order, order)
+        assert (made.law.build(), made.scenario.dynamics.order, made.agents.law.order) == (Pursuit(kappa), order, order)
 
 
 def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
@@ -1165,13 +1165,13 @@ def test_the_runs_of_a_study_are_looked_at_as_each_alone(air):
         }
         for name, off in expected.items():
             rms = np.sqrt(np.nanmean(np.where(awake, (off**2).sum(axis=-1), np.nan), axis=-1))
-            np.testing.assert_allclose(getattr(runs, name)[row], rms, rtol=1e-9, atol=1e-12, err_msg=name)
+            np.testing.assert_allclose(runs.quantities[name][row], rms, rtol=1e-9, atol=1e-12, err_msg=name)
         if row == 0:
             assert runs.first.keys() == {"reference", "found", "variance", "information", "fused", "position", "target"}
             for name in runs.first.keys() - {"target"}:
                 np.testing.assert_array_equal(runs.first[name], arrays[name], name)
             np.testing.assert_allclose(runs.first["target"], target[:, 0], atol=1e-12)
-    assert np.isnan(runs.localization).all()
+    assert np.isnan(runs.quantities["localization"]).all()
 
 
 LONG = (
@@ -1274,7 +1274,7 @@ def test_who_hears_everybody_finds_all_that_is_known_and_others_do_not():
     assert apart["whole"] < 1e-12
     assert apart["ring"] > 0.1
     runs = fly_all(plan_of(NAME, *COARSE, WHOLE, MEAN, "time.duration=0.3"), [3, 4], every=5)
-    assert runs.apart.max() < 1e-12 < runs.ideal.max()
+    assert runs.quantities["apart"].max() < 1e-12 < runs.quantities["ideal"].max()
 
 
 def test_with_the_mean_derivatives_are_the_agents_own_where_wanted():

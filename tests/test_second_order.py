@@ -350,7 +350,7 @@ def test_the_plan_of_the_ravine_says_what_was_checked():
     assert found["one-tick radius"] == "0.648 < 1: accelerations heard one tick late settle"
     assert found["step"].startswith("radius 0.99")
     assert "gain" not in found["step"]
-    assert (made.world.order, made.agents.law.order, made.agents.limit) == (2, 2, 3.0)
+    assert (made.scenario.dynamics.order, made.agents.law.order, made.agents.limit) == (2, 2, 3.0)
 
 
 # ---- the ravine

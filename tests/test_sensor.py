@@ -288,13 +288,13 @@ def believing(plan, sensor):
 def test_filters_of_ranges_and_bearings_are_as_wrong_as_they_say():
     plan = plan_of("rigid", *STILL, *EDGES, SHARP)
     runs = fly_all(plan, range(1, 81), 1)
-    error = runs.nees.std(axis=0) / np.sqrt(80)
-    assert (np.abs(runs.nees.mean(axis=0) - 2.0) < 4 * error).all()
+    error = runs.quantities["nees"].std(axis=0) / np.sqrt(80)
+    assert (np.abs(runs.quantities["nees"].mean(axis=0) - 2.0) < 4 * error).all()
     assert error.max() < 0.05
     # The first innovation is that of the prior, which is wider than the formation.
-    assert (np.abs(runs.nis[:, 1:].mean(axis=0) - 2.0) < 0.15).all()
+    assert (np.abs(runs.quantities["nis"][:, 1:].mean(axis=0) - 2.0) < 0.15).all()
     deluded = fly_all(believing(plan, Sensor("coordinates", 0.05**2 * np.eye(2))), range(1, 81), 1)
-    assert (deluded.nees.mean(axis=0) > 2.2).all()
+    assert (deluded.quantities["nees"].mean(axis=0) > 2.2).all()
 
 
 def test_no_covariance_for_all_is_right_for_near_and_far_neighbours():

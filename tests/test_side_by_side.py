@@ -82,7 +82,7 @@ def test_the_runs_of_a_study_are_those_runs():
     formation, links = plan.world.formation, plan.world.links
     runs = fly_all(plan, range(3, 60), every=4)
     alone = rehearse(plan_of("corridor", *SHORT, "seed=57"))
-    np.testing.assert_array_equal(runs.error[54], alone.error[::4])
+    np.testing.assert_array_equal(runs.quantities["error"][54], alone.error[::4])
     np.testing.assert_array_equal(runs.psi[54], alone.arrays["psi"][::4])
     arrays = {name: array[:60:4] for name, array in alone.arrays.items()}
     position, known = arrays["position"], arrays["known"]
@@ -95,8 +95,8 @@ def test_the_runs_of_a_study_are_those_runs():
     }
     for name, values in expected.items():
         assert len(np.unique(values)) == 15
-        np.testing.assert_allclose(getattr(runs, name)[54], values, rtol=1e-12, err_msg=name)
-        assert getattr(runs, name).shape == (57, 15)
+        np.testing.assert_allclose(runs.quantities[name][54], values, rtol=1e-12, err_msg=name)
+        assert runs.quantities[name].shape == (57, 15)
     assert runs.mean_error[54] == pytest.approx(alone.error.mean(), rel=1e-12)
     np.testing.assert_allclose(runs.seconds, np.arange(0.0, 3.0, 0.2))
 
@@ -109,9 +109,9 @@ def test_the_longest_input_is_that_of_any_agent_in_any_tick_since_the_moment_kep
         longest = length.max(axis=-1)
         kept = range(0, 60, every)
         expected = [longest[max(0, tick - every + 1) : tick + 1].max() for tick in kept]
-        np.testing.assert_array_equal(runs.peak[row], expected)
+        np.testing.assert_array_equal(runs.quantities["peak"][row], expected)
         # Those of the moments kept alone would not do.
-        assert (runs.peak[row] == longest[::every]).all() == (every == 1)
+        assert (runs.quantities["peak"][row] == longest[::every]).all() == (every == 1)
 
 
 def test_of_the_first_run_of_a_study_everything_that_is_reported_is_kept():
@@ -155,14 +155,18 @@ def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_t
             off = means[:, :2] - (position[links.dst - 1] - position[links.src - 1])
             nees = [e @ np.linalg.inv(each[:2, :2]) @ e for e, each in zip(off, covariances, strict=True)]
             if tick % 3 == 0:
-                assert runs.nees[row, tick // 3] == pytest.approx(np.mean(np.array(nees)[known]), rel=1e-9)
-                assert runs.nis[row, tick // 3] == pytest.approx(np.mean(np.array(nis)[heard[tick]]), rel=1e-6)
+                assert runs.quantities["nees"][row, tick // 3] == pytest.approx(
+                    np.mean(np.array(nees)[known]), rel=1e-9
+                )
+                assert runs.quantities["nis"][row, tick // 3] == pytest.approx(
+                    np.mean(np.array(nis)[heard[tick]]), rel=1e-6
+                )
 
 
 def test_where_nothing_is_filtered_no_innovation_is_known():
     runs = fly_all(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", 'agents.estimator="none"'), (1, 2), 1)
-    assert np.isnan(runs.nis).all()
-    assert np.isfinite(runs.nees).all()
+    assert np.isnan(runs.quantities["nis"]).all()
+    assert np.isfinite(runs.quantities["nees"]).all()
 
 
 @pytest.mark.parametrize(

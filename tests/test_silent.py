@@ -73,7 +73,9 @@ def test_without_communication_it_beats_taking_neighbours_for_at_rest_and_not_th
     rest = ('agents.estimator="edge-kf"', "agents.parameters.edge-kf.coefficients=[]", *MUTE)
     cases = (('agents.estimator="edge-kf"',), ('agents.estimator="silent-kf"', *MUTE), rest)
     errors = [
-        fly_all(plan_of("rigid", *COARSE, "time.duration=2", *case), range(1, 11), 1).estimation_error[:, 10:].mean()
+        fly_all(plan_of("rigid", *COARSE, "time.duration=2", *case), range(1, 11), 1)
+        .quantities["estimation_error"][:, 10:]
+        .mean()
         for case in cases
     ]
     assert errors[0] < 0.5 * errors[1] < 0.5 * errors[2]

@@ -69,7 +69,7 @@ def test_what_is_no_swarm_is_refused(formation, law, words, estimator):
 def test_the_smallest_swarms_fly(formation, estimator):
     made = planning.make(Scenario.model_validate(resting(formation, estimator)))
     assert rehearse(made).outcome.verdict == "pass"
-    assert np.isfinite(fly_all(made, [1, 2], 1).error).all()
+    assert np.isfinite(fly_all(made, [1, 2], 1).quantities["error"]).all()
 
 
 def test_two_agents_leave_a_recording(tmp_path):

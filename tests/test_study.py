@@ -240,7 +240,7 @@ def made_up(labels, **values_of):
     shape = (5, 4)
     rest = {name: np.full(shape, 7e7) for name in NAMES}
     rest |= {name: np.broadcast_to(values, shape) for name, values in values_of.items()}
-    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), first={}, **rest)
+    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), first={}, quantities=rest)
     return study.Result(labels, None, runs)
 
 
@@ -440,7 +440,7 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path,
     moments = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
     assert moments["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
     for name in ("error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"):
-        values = np.concatenate([getattr(one.runs, name).mean(axis=0) for one in results])
+        values = np.concatenate([one.runs.quantities[name].mean(axis=0) for one in results])
         np.testing.assert_array_equal(moments[f"mean_{name}"], values)
     # The measurement is as uncertain in every tick, and the filter less and less.
     traces = np.array(moments["mean_covariance_trace"]).reshape(2, 20)
@@ -457,7 +457,7 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path,
     assert (title, axes, dimension) == ("Two estimators", ["graph", "disturbance", "estimator"], 2)
     for name, cases in normalised.items():
         for case, one in zip(cases, results, strict=True):
-            np.testing.assert_array_equal(case.error, getattr(one.runs, name.lower()))
+            np.testing.assert_array_equal(case.error, one.runs.quantities[name.lower()])
     assert list(normalised) == ["NEES", "NIS"]
     for name in ("figure", "consistency"):
         with Image.open(tmp_path / "out" / f"{name}.png") as figure:
@@ -492,6 +492,10 @@ bound = { at = 2.5, says = "the most" }
 ).partition("[[claims]]")[0]
 
 
+def longest(one):
+    return one.runs.quantities["peak"][:, 1:].max(axis=1).mean()
+
+
 def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, drawn):
     path = tmp_path / "sweep.toml"
     path.write_text(SWEEP)
@@ -511,7 +515,7 @@ def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, dra
     for bars, estimator in zip(panel.containers, ("none", "ga-rkf"), strict=True):
         cases = [one for one in results if one.labels["estimator"] == estimator]
         np.testing.assert_array_equal(bars[0].get_xdata(), [0.5, 1.0])
-        np.testing.assert_allclose(bars[0].get_ydata(), [one.runs.peak[:, 1:].max(axis=1).mean() for one in cases])
+        np.testing.assert_allclose(bars[0].get_ydata(), [longest(one) for one in cases])
 
 
 @pytest.mark.parametrize(

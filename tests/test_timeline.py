@@ -34,7 +34,7 @@ def test_without_faults_nothing_is_held():
 
 def test_every_condition_is_one_of_links_or_of_agents():
     derived = {"absent", "idle", "still", "coasting"}
-    assert {*OF_LINKS, *OF_AGENTS, "bias", "push", "liars"} == {f.name for f in fields(Conditions)} | derived
+    assert {*OF_LINKS, *OF_AGENTS, "bias", "push", "acting"} == {f.name for f in fields(Conditions)} | derived
 
 
 WHAT_IT_IMPOSES = [

@@ -13,7 +13,6 @@ from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.loading.choice import Choice
 from agents.process import AgentBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
@@ -23,6 +22,7 @@ from netem.core.plain import PlainError, from_plain, to_plain
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
 from netem.impairments.delay import DelayLaw
+from netem.loading.choice import Choice
 from netem.process import MediumBrief
 from netem.wire import messages
 from netem.wire.messages import WireError

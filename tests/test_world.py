@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from affinet.scenario.sections import INTEGRATORS
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
@@ -14,16 +15,22 @@ from netem.faults.timeline import Timeline
 from world.formation.manoeuvre import corridor, hover
 from world.formation.nominal import PRESETS, Formation
 from world.physics import sensors
+from world.physics.bodies import BodyModel
 from world.physics.disturbance import Disturbance
 from world.physics.world import Scene, World
 
 ZHAO7 = PRESETS["zhao7"]
 SEVEN = Links.both_ways(7, ZHAO7.edges)
 REST = np.zeros((7, 2))
+NOWHERE = np.zeros((7, 0))  # what integrators have of a pose
 UNSEEN = np.zeros((len(SEVEN), 2))
 BEFORE = np.full((len(SEVEN), 2), 77.0)
 GONE = (4, 7)
 ABSENT = np.isin(np.arange(1, 8), GONE)
+
+
+def integrators(order):
+    return BodyModel(INTEGRATORS[order - 1], {})
 
 
 def under(*faults, links=SEVEN):
@@ -36,11 +43,11 @@ QUIET = under()
 
 def scene(position, velocity=REST, measured=UNSEEN, higher=()):
     """Bodies here and so fast; `higher` are derivatives of the velocity, of integrators that have any."""
-    return Scene(position, np.stack([velocity, *higher], axis=1), measured, np.zeros_like(position), None)
+    return Scene(position, np.stack([velocity, *higher], axis=1), measured, np.zeros_like(position), None, NOWHERE)
 
 
 def few_at_rest():
-    return Scene(REST[:3], REST[:3, None], np.zeros((4, 2)), REST[:3], None)
+    return Scene(REST[:3], REST[:3, None], np.zeros((4, 2)), REST[:3], None, NOWHERE[:3])
 
 
 def pushes(deviation):
@@ -60,7 +67,7 @@ def world():
         swarm_seeds=None,
         dt=0.01,
         ticks=6000,
-        order=1,
+        body=integrators(1),
         formation=ZHAO7,
         links=SEVEN,
         manoeuvre=hover(np.arange(6001) * 0.01, 2),
@@ -265,7 +272,7 @@ def test_everybody_starts_at_rest_with_a_true_picture(world):
 
 @pytest.fixture
 def heavy(world):
-    return replace(world, order=2)
+    return replace(world, body=integrators(2))
 
 
 def test_a_double_integrator_gains_velocity_and_a_half_of_it_already_moves_it(heavy):
@@ -283,7 +290,7 @@ def test_only_those_that_do_not_command_their_velocity_are_told_how_they_move(wo
     motion = np.random.default_rng(1).normal(size=(3, 7, 2))
     assert world.odometry(scene(REST, velocity=motion[0])) is None
     for order in (2, 3, 4):
-        told = replace(world, order=order).odometry(scene(REST, motion[0], higher=motion[1 : order - 1]))
+        told = replace(world, body=integrators(order)).odometry(scene(REST, motion[0], higher=motion[1 : order - 1]))
         np.testing.assert_array_equal(told, np.moveaxis(motion[: order - 1], 0, 1))
 
 
@@ -351,7 +358,7 @@ def derivatives_of(order, here):
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_bodies_move_as_the_exponential_of_a_chain_of_integrators_says(world, order):
-    slow = replace(world, order=order, dt=0.5)
+    slow = replace(world, body=integrators(order), dt=0.5)
     z, v, a, j = np.random.default_rng(order).normal(size=(4, 7, 2))
     here = scene(z, velocity=v, higher=(a, j)[: max(0, order - 2)])
     for tick, u in enumerate(np.random.default_rng(7).normal(size=(3, 7, 2))):
@@ -395,7 +402,7 @@ def moving(order, seed=1):
 
 @HIGHER
 def test_everybody_of_any_order_starts_at_rest(world, order):
-    begun = replace(world, order=order).begin()
+    begun = replace(world, body=integrators(order)).begin()
     np.testing.assert_array_equal(begun.motion, np.zeros((7, order - 1, 2)))
     np.testing.assert_array_equal(begun.position, world.begin().position)
 
@@ -403,7 +410,7 @@ def test_everybody_of_any_order_starts_at_rest(world, order):
 @HIGHER
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
 def test_integrators_that_nobody_steers_fly_no_input_and_go_on_as_they_moved(world, order, fault):
-    slow, (here, u) = replace(world, order=order, dt=0.5), moving(order)
+    slow, (here, u) = replace(world, body=integrators(order), dt=0.5), moving(order)
     flown = slow.flown(here, u, under(fault))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
@@ -416,7 +423,7 @@ def test_integrators_that_nobody_steers_fly_no_input_and_go_on_as_they_moved(wor
 @HIGHER
 @HELD
 def test_absent_integrators_of_any_order_stop_at_once_whatever_happens(world, order, fault):
-    heavy, (here, u) = replace(world, order=order, disturbance=pushes(0.1)), moving(order)
+    heavy, (here, u) = replace(world, body=integrators(order), disturbance=pushes(0.1)), moving(order)
     gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
     flown = heavy.flown(here, u, under(fault))
     after = heavy.step(0, here, UNSEEN, flown, under(fault, gust))
@@ -429,7 +436,7 @@ def test_absent_integrators_of_any_order_stop_at_once_whatever_happens(world, or
 
 @HIGHER
 def test_gusts_and_disturbances_displace_integrators_of_any_order_and_give_them_no_motion(world, order):
-    heavy, (here, u) = replace(world, order=order), moving(order)
+    heavy, (here, u) = replace(world, body=integrators(order)), moving(order)
     gust, push = Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)), np.zeros((7, 2))
     push[[1, 4]] = (3.0, -1.0)
     calm = heavy.step(0, here, UNSEEN, u, QUIET)

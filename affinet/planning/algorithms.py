@@ -11,12 +11,12 @@ from affinet.scenario.sections import Scenario, ScenarioError
 from agents.centre.checked import CheckedCentre
 from agents.laws.base import Law
 from agents.loading import capabilities
-from agents.loading.calling import Calling, name_of
-from agents.loading.choice import Choice
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.finding import Finding
 from netem.faults.fault import Fault, Verb
+from netem.loading.calling import Calling, name_of
+from netem.loading.choice import Choice
 from netem.processes.user_code import UserCodeError, definition
 
 

@@ -18,6 +18,7 @@ from analysis.models.pursuit import Target
 from netem.core.links import Links
 from world.formation import manoeuvre
 from world.formation.nominal import PRESETS, Formation
+from world.physics.bodies import BodyModel
 from world.physics.disturbance import Disturbance, Kernel
 from world.physics.target import MovingTarget
 from world.physics.world import World
@@ -71,7 +72,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         swarm_seeds=None,
         dt=given.time.dt,
         ticks=given.time.ticks,
-        order=given.dynamics.order,
+        body=_body(given, formation.dimension),
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
@@ -82,6 +83,16 @@ def world_of(given: Scenario, formation: Formation) -> World:
         spread=given.formation.spread,
         swarms=1,
     )
+
+
+def _body(given: Scenario, dimension: int) -> BodyModel:
+    body = given.dynamics.body
+    if dimension not in (flown_in := body.build().dimensions):
+        said = " or ".join(map(str, flown_in))
+        raise ScenarioError(
+            f"dynamics.model: a {body.model} moves in {said} dimensions, and the formation has {dimension}"
+        )
+    return body
 
 
 def _disturbance(given: Scenario, dimension: int) -> Disturbance:
@@ -173,7 +184,7 @@ def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
     return SwarmBrief(
         dt=first.dt,
         ticks=given.time.ticks,
-        order=first.order,
+        order=given.dynamics.order,
         late=given.time.exchange == "next-tick" or given.network.delay_ticks > 0,
         nominal=formation.nominal,
         neighbours=links.neighbours,

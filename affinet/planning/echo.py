@@ -57,6 +57,7 @@ def _mean_delay(one: LinkClass, dt: float, least_delay: int) -> tuple[float, flo
 
 
 _SAYS: Mapping[type[Any], Callable[[Any], str]] = {
+    profiles.Own: lambda model: f"and what {model.model} loses",
     profiles.Listed: lambda model: f"drops messages {model.messages[:6]}{' ...' if len(model.messages) > 6 else ''}",
     profiles.Traced: lambda model: f"and what the trace {model.file} says",
     profiles.Disk: lambda model: f"nothing beyond {model.range:g} m",

@@ -92,7 +92,8 @@ def delays(
             )
         key, profile = f"network.profiles.{one.name}", one.profile
         for number, loss in enumerate(profile.loss or [], start=1):
-            delay(f"{key}.loss.{number}.extra_delay", getattr(loss, "extra_delay", 0.0), time)
+            if "extra_delay" in type(loss).model_fields:
+                delay(f"{key}.loss.{number}.extra_delay", getattr(loss, "extra_delay", 0.0), time)
         if (model := profile.delay) is not None:
             for name in ("mean", "jitter"):
                 delay(f"{key}.delay.{name}", getattr(model, name) or 0.0, time)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from affinet.planning import algorithms, checks, limits, network, recordings, registry, script, tryout
+from affinet.planning import algorithms, checks, limits, network, own_losses, recordings, registry, script, tryout
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swarm_of, world_of
 from affinet.planning.plan import Plan, PlanError, agents_of
 from affinet.scenario import inputs, loading
@@ -97,6 +97,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
 
 def _make(given: Scenario) -> Plan:
     registry.check_parameters(given.agents.parameters, given.own_modules)
+    own_losses.check(given.network.profiles, given.own_modules)
     formation = formation_of(given)
     estimator, law = algorithms.chosen(given)
     findings, L = _framework(given, formation, law.build())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from affinet.planning import limits, recordings
+from affinet.planning import limits, own_losses, recordings
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
@@ -60,6 +60,7 @@ def plan(
         schedules=tuple(one.schedule(links) for one in groups if one.losses(SCHEDULES)),
         reaches=tuple(_reach(one, dt) for one in groups if one.losses(REACHES)),
         zones=_zones(network, formation, links),
+        own=tuple(loss for one in groups for loss in own_losses.of_class(one, given.own_modules)),
         listed=_listed(groups),
         delays=tuple(law for one in heard for law in one.delays(dt)),
         duplicate=_each(heard, links, lambda profile: profile.duplicate or 0.0),
@@ -69,6 +70,7 @@ def plan(
         rate=_rate(heard, links, message_bits),
         message_bits=message_bits,
     )
+    own_losses.try_out(profile.own, links, dt, formation.nominal, coupled=network.coupled)
     notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
     notes += [note for _, said in traced for note in said]
     return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)

@@ -12,7 +12,6 @@ from agents.agent import Agent
 from agents.brief import Brief
 from agents.centre.checked import CheckedCentre, centre_of
 from agents.loading import capabilities
-from agents.loading.choice import Choice
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.arrays import Mask
@@ -23,6 +22,7 @@ from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
 from netem.impairments.profile import Profile
+from netem.loading.choice import Choice
 from netem.medium.medium import Verdicted, recorded
 from world.brief import RecordOptions
 from world.physics.world import World

@@ -1,36 +1,48 @@
-"""Estimators and control laws by name: entry points of any installed package, or "module:Class"."""
+"""Estimators, laws and impairments by name: entry points of any installed package, or "module:Class"."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from affinet.planning import limits
+from affinet.scenario.profiles import IMPAIRMENTS
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import among
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
-from agents.loading import parameters
-from agents.loading.calling import Calling, NoSuchAlgorithm, load, name_of
-from agents.loading.choice import Choice
-from agents.loading.parameters import ParameterError
+from netem.impairments.own import Loss
+from netem.loading import parameters
+from netem.loading.calling import Calling, NoSuchAlgorithm, load, name_of
+from netem.loading.choice import Choice, offered
+from netem.loading.parameters import ParameterError
 from netem.processes.user_code import UserCodeError, definition, text_of
 
 ESTIMATORS = "affinet.estimators"
 LAWS = "affinet.controllers"
-_PROTOCOLS: Mapping[str, tuple[type, tuple[str, ...]]] = {
-    ESTIMATORS: (Estimator, ("channels", "init", "sense", "fuse")),
-    LAWS: (Law, ("init", "command")),
+
+
+class _Kind(NamedTuple):
+    """What algorithms of a group have to be, and the page that says it."""
+
+    protocol: type
+    methods: tuple[str, ...]
+    page: str
+
+
+_KINDS: Mapping[str, _Kind] = {
+    ESTIMATORS: _Kind(Estimator, ("channels", "init", "sense", "fuse"), "docs/estimators.md"),
+    LAWS: _Kind(Law, ("init", "command"), "docs/estimators.md"),
+    IMPAIRMENTS: _Kind(Loss, ("lost",), "docs/extending.md"),
 }
 
 
 def names(group: str) -> list[str]:
     """The names that installed packages offer in a group."""
-    return sorted(_offered(group))
+    return sorted(offered(group))
 
 
 def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mapping[str, Path]) -> Choice:
@@ -39,7 +51,7 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mappi
     Parameters
     ----------
     group
-        `ESTIMATORS` or `LAWS`.
+        `ESTIMATORS`, `LAWS` or `IMPAIRMENTS`.
     key
         Of the scenario, for error messages.
     name
@@ -59,7 +71,8 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mappi
     path = _path(group, key, name)
     algorithm = _load(key, path, own.get(name))
     _refuse_another_kind(group, algorithm)
-    return _made(name, path, algorithm, given, own.get(name))
+    table = key if group == IMPAIRMENTS else f"agents.parameters.{name}"  # parameters stand beside an impairment's name
+    return _made(table, name, path, algorithm, given, own.get(name))
 
 
 def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, Path]) -> None:
@@ -74,13 +87,13 @@ def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, P
     """
     if not given:
         return
-    offered = {name: path for group in _PROTOCOLS for name, path in _offered(group).items()}
+    known = {name: path for group in (ESTIMATORS, LAWS) for name, path in offered(group).items()}
     for name, table in given.items():
         key = f"agents.parameters.{name}"
-        if name not in offered and ":" not in name:
-            raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(offered))}")
-        path = offered.get(name, name)
-        _made(name, path, _load(key, path, own.get(name)), table, own.get(name))
+        if name not in known and ":" not in name:
+            raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(known))}")
+        path = known.get(name, name)
+        _made(key, name, path, _load(key, path, own.get(name)), table, own.get(name))
 
 
 @contextmanager
@@ -94,17 +107,13 @@ def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
         raise
 
 
-def _offered(group: str) -> dict[str, str]:
-    return {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}
-
-
 def _path(group: str, key: str, name: str) -> str:
     if ":" in name:
         return name
-    offered = _offered(group)
-    if name not in offered:
-        raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(offered))}, or give 'module:Class'")
-    return offered[name]
+    known = offered(group)
+    if name not in known:
+        raise ScenarioError(f"{key}: no {name!r}; {among(name, sorted(known))}, or give 'module:Class'")
+    return known[name]
 
 
 def _load(key: str, path: str, folder: Path | None) -> type:
@@ -117,8 +126,7 @@ def _load(key: str, path: str, folder: Path | None) -> type:
     return algorithm
 
 
-def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any], folder: Path | None) -> Choice:
-    key = f"agents.parameters.{name}"
+def _made(key: str, name: str, path: str, algorithm: type, given: Mapping[str, Any], folder: Path | None) -> Choice:
     try:
         with Calling(algorithm, "__init__"):
             parameters.arguments(algorithm, given)
@@ -136,10 +144,10 @@ def _made(name: str, path: str, algorithm: type, given: Mapping[str, Any], folde
 
 
 def _refuse_another_kind(group: str, algorithm: type) -> None:
-    protocol, methods = _PROTOCOLS[group]
-    missing = [method for method in methods if not _has(algorithm, method, protocol)]
+    kind = _KINDS[group]
+    missing = [method for method in kind.methods if not _has(algorithm, method, kind.protocol)]
     if missing:
-        has_no = f"has no method {', '.join(missing)}: {protocol.__name__} in docs/estimators.md says what each does"
+        has_no = f"has no method {', '.join(missing)}: {kind.protocol.__name__} in {kind.page} says what each does"
         raise UserCodeError(name_of(algorithm), has_no, definition(algorithm))
 
 

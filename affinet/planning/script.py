@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from affinet.scenario import selectors, verbs
+from affinet.scenario.events import Event, Found, Lasting, When
 from affinet.scenario.sections import Scenario, ScenarioError, said_at
 from affinet.scenario.selectors import ChoiceKey
-from affinet.scenario.verbs import Event, Lasting
 from affinet.scenario.words import among
 from netem.core.links import Links
-from netem.faults.fault import DepartedBody, Fault, Pairs, UnderWay, Verb
+from netem.faults.fault import Fault, Pairs, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
 from world.formation.nominal import Formation
@@ -128,7 +128,7 @@ def _called(draft: _Draft, name: str) -> str:
     return f"; {among(name, names)}" if names else '; no entry has a name: give one its name = "..."'
 
 
-def _trigger(draft: _Draft, when: verbs.When) -> Trigger:
+def _trigger(draft: _Draft, when: When) -> Trigger:
     ticks = max(1, draft.ticks(when.lasting))
     if when.tracking_error_above is not None:
         return Trigger(when.tracking_error_above, True, ticks)
@@ -176,59 +176,33 @@ def _add(draft: _Draft, number: int, entry: Event) -> None:
 
 def _shapes(draft: _Draft, number: int, entry: Any, key: str) -> list[Fault]:
     """The faults of an entry, without their times."""
-    lot, dimension = ChoiceKey(draft.given.seed, number + 1), draft.formation.dimension
-    verb = Verb(entry.verb)
+    lot, formation = ChoiceKey(draft.given.seed, number + 1), draft.formation
 
-    def on() -> Pairs:
+    def on(named: Sequence[str]) -> Pairs:
         with said_at(f"{key}.links"):
-            return selectors.pairs(entry.links, draft.formation, draft.links, lot)
+            return selectors.pairs(named, formation, draft.links, lot)
 
-    def whom() -> tuple[int, ...]:
+    def whom(named: Sequence[int | str]) -> tuple[int, ...]:
         with said_at(f"{key}.agents"):
-            return selectors.agents(entry.agents, draft.formation, lot)
+            return selectors.agents(named, formation, lot)
 
-    def vector(name: str) -> tuple[float, ...]:
-        numbers = tuple(getattr(entry, name))
-        if len(numbers) != dimension:
-            raise ScenarioError(f"{key}.{name}: needs {dimension} numbers")
-        return numbers
+    def groups(split: list[list[int]] | str) -> tuple[tuple[int, ...], ...]:
+        return tuple(map(tuple, split if isinstance(split, list) else selectors.groups(split, formation)))
 
-    match entry:
-        case verbs.Cut():
-            return [Fault(verb, 0, None, pairs=on(), under_way=UnderWay(entry.in_flight))]
-        case verbs.Partition():
-            split = entry.groups if isinstance(entry.groups, list) else selectors.groups(entry.groups, draft.formation)
-            return [Fault(verb, 0, None, groups=tuple(map(tuple, split)), under_way=UnderWay(entry.in_flight))]
-        case verbs.Lose():
-            return [Fault(verb, 0, None, pairs=on(), probability=entry.loss)]
-        case verbs.Delay():
-            return [Fault(verb, 0, None, pairs=on(), seconds=entry.delay)]
-        case verbs.Degrade():
-            number_of = _profile(draft, entry.profile, f"{key}.profile")
-            return [Fault(verb, 0, None, pairs=on(), profile=number_of, profile_name=entry.profile)]
-        case verbs.Bias():
-            return [Fault(verb, 0, None, pairs=on(), vector=vector("by"))]
-        case verbs.Outlier():
-            return [Fault(verb, 0, None, pairs=on(), probability=entry.p, deviation=entry.sigma)]
-        case verbs.Dropout():
-            return [Fault(verb, 0, None, pairs=on(), probability=entry.p)]
-        case verbs.Freeze():
-            return [Fault(verb, 0, None, pairs=on())]
-        case verbs.Gust():
-            return [Fault(verb, 0, None, agents=whom(), vector=vector("velocity"))]
-        case verbs.Clock():
-            return [Fault(verb, 0, None, agents=whom(), rate=entry.rate)]
-        case verbs.Lie():
-            if len(entry.matrix) != dimension:
-                raise ScenarioError(f"{key}.matrix: must be {dimension} x {dimension} numbers")
-            return [Fault(verb, 0, None, agents=whom(), matrix=tuple(map(tuple, entry.matrix)))]
-        case verbs.Pause():
-            policy = UnderWay(entry.in_flight)
-            return [Fault(verb, 0, None, agents=(agent,), under_way=policy) for agent in whom()]
-        case verbs.Depart():
-            return [Fault(verb, 0, None, agents=(agent,), body=DepartedBody(entry.body)) for agent in whom()]
-        case _:
-            return [Fault(verb, 0, None, agents=(agent,)) for agent in whom()]
+    def numbers(name: str) -> tuple[Any, ...]:
+        said, dimension = getattr(entry, name), formation.dimension
+        if len(said) != dimension:
+            needs = f"must be {dimension} x {dimension}" if isinstance(said[0], list) else f"needs {dimension}"
+            raise ScenarioError(f"{key}.{name}: {needs} numbers")
+        return tuple(tuple(row) if isinstance(row, list) else row for row in said)
+
+    def profile(name: str) -> int:
+        return _profile(draft, name, f"{key}.profile")
+
+    says_positions = draft.given.sensing.sigma_direction is None
+    with said_at(key):
+        shapes: list[Fault] = entry.faults(Found(on, whom, groups, numbers, profile, says_positions))
+    return shapes
 
 
 def _profile(draft: _Draft, name: str, key: str) -> int:

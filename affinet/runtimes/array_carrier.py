@@ -9,7 +9,7 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from agents.agent import AgentAction, AgentState, renew
-from agents.brief import Reading
+from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
 from analysis.models.arrays import Array, Integers, Mask
@@ -96,7 +96,7 @@ class ArrayCarrier:
         self._relay.keep(tick, told)
         heard = {name: self._hear(tick, name, relayed.delivery) for name in self._fields}
         if self._centre:
-            heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, before.input)
+            heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, self._steered(said))
         sighting = self._world.sighting(tick, scene)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
         self._state = renew(state, before, idle) if idle.any() else state
@@ -116,6 +116,10 @@ class ArrayCarrier:
         self._whole, told = centre.step(self._whole, of_swarms(measured), of_swarms(seen), of_swarms(inputs))
         fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in told._asdict().items()}
         return Heard(fields, self._links.present)
+
+    def _steered(self, said: Broadcasts) -> Array:
+        """What all fly from the tick before, as they say it."""
+        return said[channels.INPUT][DERIVATIVES[self._agents.law.order - 1]]
 
     def _reading(self, tick: int) -> Reading:
         """What the clocks say; one reading for all, where they agree, spares looking up the manoeuvre for each."""

@@ -98,6 +98,7 @@ def _profile(one: Profile, number: int) -> Profile:
     return replace(
         one,
         chains=tuple(_chains(layer, number) for layer in one.chains),
+        own=tuple(replace(loss, rows=np.tile(loss.rows, number)) for loss in one.own),
         delays=tuple(_delay(law, number) for law in one.delays),
         duplicate=np.tile(one.duplicate, number),
         reorder=np.tile(one.reorder, number),

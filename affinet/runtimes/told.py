@@ -50,7 +50,7 @@ _OF_ALL: Mapping[str, Mapping[str, Check]] = {
 _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 _MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
-    "netem": {**_OF_ALL, "done": {}},
+    "netem": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "centre": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "world": {
         **_OF_ALL,

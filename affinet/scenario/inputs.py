@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from affinet.scenario.sections import Scenario, ScenarioError
-from agents.loading import modules
 from analysis.models.finding import Finding
+from netem.loading import modules
 from netem.medium.medium import JOURNAL
 
 FOLDER = "inputs"  # in a run directory
@@ -50,7 +50,7 @@ def anchored(said: Any, folder: Path) -> Any:
 
 
 def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[str, Path]:
-    """The folders in which the modules of a scenario's algorithms lie, by "module:Class"; without those that are installed.
+    """The folders in which the modules that a scenario names lie, by "module:Class"; without those that are installed.
 
     Parameters
     ----------
@@ -61,6 +61,11 @@ def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[
     """
     named = {f"agents.parameters.{name}": name for name in given.agents.parameters}
     named |= {"agents.estimator": given.agents.estimator, "agents.law": given.agents.law}
+    named |= {
+        f"network.profiles.{profile}.loss.{number}.model": loss.model
+        for profile, said in given.network.profiles.items()
+        for number, loss in said.own
+    }
     found = {
         name: modules.holder(name.partition(":")[0], folders(key, name)) for key, name in named.items() if ":" in name
     }

@@ -7,7 +7,16 @@ from functools import cache
 from importlib import resources
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    SerializeAsAny,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
 
 from affinet.scenario.units import (
     AtLeast1,
@@ -20,8 +29,11 @@ from affinet.scenario.units import (
     Steps,
     Ticks,
 )
-from affinet.scenario.words import among
+from affinet.scenario.words import among, hint, shown
 from netem.impairments import netem_string
+from netem.loading.choice import offered
+
+IMPAIRMENTS = "affinet.impairments"  # the group of entry points
 
 Step = Literal["time", "packet"]
 
@@ -187,6 +199,33 @@ LOSSES: dict[str, type[Section]] = {
 }
 
 
+class Own(Section):
+    """A loss that a package offers under this name, or of the user's own as "module:Class"; its parameters stand beside."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+
+    model: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What is given beside the model."""
+        return dict(self.model_extra or {})
+
+
+def _own_or(given: Any, built_in: ValidatorFunctionWrapHandler) -> Any:
+    model = given.get("model") if isinstance(given, dict) else None
+    if isinstance(given, Own) or not isinstance(model, str) or model in LOSSES:
+        return given if isinstance(given, Own) else built_in(given)
+    known = [*LOSSES, *sorted(offered(IMPAIRMENTS))]
+    if ":" not in model and model not in known:
+        near = f"; {hint(model, known)}".rstrip("; ")
+        raise ValueError(f"needs a model among {', '.join(known)}, or 'module:Class', got {shown(model)}{near}")
+    return Own.model_validate(given)
+
+
+AnyLoss = Annotated[Loss, WrapValidator(_own_or), SerializeAsAny()]
+
+
 def _delays(given: Any) -> list[float] | str | None:
     if given is None or isinstance(given, str):
         return given
@@ -246,7 +285,7 @@ class LinkProfile(Section):
 
     like: str | None = None
     netem: Annotated[str | None, Field(exclude=True)] = None  # a scenario as resolved has what it means instead
-    loss: list[Loss] | None = None
+    loss: list[AnyLoss] | None = None
     delay: DelayModel | None = None
     duplicate: Probability | None = None
     reorder: Probability | None = None
@@ -277,6 +316,12 @@ class LinkProfile(Section):
     def notes(self) -> tuple[str, ...]:
         """Where netem's own semantics mislead."""
         return netem_string.read(self.netem).notes if self.netem else ()
+
+    @property
+    def own(self) -> list[tuple[int, Own]]:
+        """The losses that are none of ours, each with its number in the list, from 1."""
+        losses: list[Any] = self.loss or []
+        return [(number, loss) for number, loss in enumerate(losses, start=1) if isinstance(loss, Own)]
 
     def over(self, base: LinkProfile) -> LinkProfile:
         """This profile, with what it does not say taken from another."""

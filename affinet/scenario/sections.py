@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
+from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import Source
@@ -26,10 +27,11 @@ from affinet.scenario.units import (
     Tick,
     Ticks,
 )
-from affinet.scenario.verbs import AnyEvent, Links
+from affinet.scenario.verbs import AnyEvent
 from affinet.scenario.words import among
 from analysis.models.sensor import Sensor
 from world.formation.nominal import PRESETS
+from world.physics.bodies import BodyModel
 
 Matrix = list[list[Finite]]
 
@@ -139,7 +141,8 @@ class SensingSection(Section):
     """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
     Or those of a range, in metres, and of a bearing, in radians (in three dimensions azimuth and elevation); or those along and
-    across the line of sight, as shares of the distance. It makes `samples` of them in a tick, and reports their mean.
+    across the line of sight, as shares of the distance. Or that of a direction, in radians, of a sensor that says no distance.
+    It makes `samples` of them in a tick, and reports their mean.
     """
 
     samples: Steps = 1
@@ -149,6 +152,7 @@ class SensingSection(Section):
     sigma_bearing: Bearing | None = None
     sigma_along: ShareOfDistance | None = None
     sigma_across: ShareOfDistance | None = None
+    sigma_direction: Bearing | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> SensingSection:
@@ -156,10 +160,11 @@ class SensingSection(Section):
             raise ValueError("sigma_range (m) and sigma_bearing (rad) go together")
         if (self.sigma_along is None) != (self.sigma_across is None):
             raise ValueError("sigma_along and sigma_across (shares of the distance) go together")
-        if sum(given is not None for given in (self.sigma, self.covariance, self.sigma_range, self.sigma_along)) != 1:
+        kinds = (self.sigma, self.covariance, self.sigma_range, self.sigma_along, self.sigma_direction)
+        if sum(given is not None for given in kinds) != 1:
             raise ValueError(
                 "give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad), "
-                "or sigma_along and sigma_across (shares of the distance)"
+                "or sigma_along and sigma_across (shares of the distance), or sigma_direction (rad)"
             )
         if self.sigma == 0.0:
             raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")
@@ -174,17 +179,21 @@ class KernelSection(Section):
     positions: Literal["nominal", "true"] = "nominal"
 
 
-Integrator = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator"]
-INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
+BodyName = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator", "unicycle"]
+INTEGRATORS: tuple[BodyName, ...] = get_args(BodyName)[:4]  # by their order, from 1
+# The keys of each kind of body beside those that all have.
+_OF_BODIES: dict[str, tuple[str, ...]] = {"unicycle": ("ahead",)}
 
 
 class DynamicsSection(Section):
     """What the bodies are, and what displaces them in a tick: a standard deviation per axis, in metres, or a covariance, in m2.
 
-    `kernel` correlates agents, `persistence` successive ticks.
+    `kernel` correlates agents, `persistence` successive ticks. A unicycle is steered by a point so many metres `ahead` of its
+    wheels.
     """
 
-    model: Integrator = "single-integrator"
+    model: BodyName = "single-integrator"
+    ahead: Positive | None = None
     disturbance: NotNegative | None = None
     covariance: Matrix | None = None
     kernel: KernelSection | None = None
@@ -196,10 +205,26 @@ class DynamicsSection(Section):
             raise ValueError("give disturbance (m) or covariance (m2), not both")
         return self
 
+    @model_validator(mode="after")
+    def _of_its_body(self) -> DynamicsSection:
+        for model, keys in _OF_BODIES.items():
+            for key in keys:
+                if (getattr(self, key) is None) == (self.model == model):
+                    missing = f"a {model} needs {key} (m)"
+                    raise ValueError(
+                        missing if self.model == model else f"{key} is of a {model}, not of a {self.model}"
+                    )
+        return self
+
+    @property
+    def body(self) -> BodyModel:
+        """What the bodies are."""
+        return BodyModel(self.model, {key: getattr(self, key) for key in _OF_BODIES.get(self.model, ())})
+
     @property
     def order(self) -> int:
         """How often the input is integrated to a position."""
-        return 1 + INTEGRATORS.index(self.model)
+        return self.body.build().order
 
 
 class TargetSection(Section):
@@ -329,6 +354,8 @@ def sensor(sensing: SensingSection, dimension: int) -> Sensor:
     if sensing.sigma_along is not None and sensing.sigma_across is not None:
         deviations = np.array([sensing.sigma_along] + [sensing.sigma_across] * (dimension - 1))
         return Sensor("line-of-sight", np.diag(deviations**2) / sensing.samples)
+    if sensing.sigma_direction is not None:
+        return Sensor("direction", sensing.sigma_direction**2 * np.eye(dimension - 1) / sensing.samples)
     R = _covariance("sensing", sensing.sigma, sensing.covariance, dimension)
     return Sensor("coordinates", R / sensing.samples)
 

@@ -1,79 +1,15 @@
-"""The entries of a scenario's timeline as typed models: one for each verb."""
+"""The entries of a scenario's timeline as typed models: one for each verb, with the faults it stands for."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from affinet.scenario import selectors
-from affinet.scenario.profiles import Section
-from affinet.scenario.units import Finite, NotNegative, Positive, Probability, Rate, Steps
-
-Links = Annotated[str, AfterValidator(selectors.check)]
-Whom = Annotated[list[Annotated[int | str, PlainValidator(selectors.agent_or_word)]], Field(min_length=1)]
-On = Annotated[list[Links], Field(min_length=1)]
-Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
-InFlight = Literal["drop", "deliver", "hold"]
-
-
-class When(Section):
-    """What an entry waits for: the tracking error (m2) below or above a level, for some simulated seconds in a row."""
-
-    tracking_error_below: Positive | None = None
-    tracking_error_above: NotNegative | None = None
-    lasting: NotNegative = 0.0
-
-    @model_validator(mode="after")
-    def _one(self) -> When:
-        if (self.tracking_error_below is None) == (self.tracking_error_above is None):
-            raise ValueError("give tracking_error_below, or tracking_error_above")
-        return self
-
-
-class Event(Section):
-    """When something happens: `at` counts in simulated seconds from the start, from another entry, or from a condition."""
-
-    name: str | None = None
-    at: NotNegative | None = None
-    after: str | None = None
-    when: When | None = None
-    every: Positive | None = None
-    times: Steps | None = None
-
-    @model_validator(mode="after")
-    def _timed(self) -> Event:
-        if self.after is not None and self.when is not None:
-            raise ValueError("give after, or when, not both")
-        if self.at is None and self.after is None and self.when is None:
-            raise ValueError("says not when: give at (s), after (the name of another entry), or when (a condition)")
-        if self.times is not None and self.every is None:
-            raise ValueError("times says how often; give every (s) as well")
-        return self
-
-    @property
-    def relative(self) -> bool:
-        """Whether `at` counts from something else than the start of the run."""
-        return self.after is not None or self.when is not None
-
-
-class Lasting(Event):
-    """What lasts: `until` a time, or for as long as it `lasts`; without either, to the end of the run."""
-
-    until: Positive | None = None
-    lasts: Positive | None = None
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Lasting:
-        if self.until is not None and self.lasts is not None:
-            raise ValueError("give until, or lasts, not both")
-        if self.until is not None and (self.relative or self.every is not None):
-            raise ValueError("until is a time of the run; with after, when or every say how long it lasts")
-        if self.until is not None and self.at is not None and self.until <= self.at:
-            raise ValueError(f"ends at {self.until:g} s, but begins at {self.at:g} s; until must be later")
-        if self.every is not None and (self.lasts is None or self.lasts > self.every):
-            raise ValueError("what comes back every so many seconds lasts no longer than that: give lasts")
-        return self
+from affinet.scenario.events import Event, Found, InFlight, Lasting, On, Vector, Whom
+from affinet.scenario.units import Finite, Positive, Probability, Rate
+from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 
 
 class Cut(Lasting):
@@ -83,6 +19,10 @@ class Cut(Lasting):
     links: On
     in_flight: InFlight = "drop"
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.CUT, 0, None, pairs=found.links(self.links), under_way=UnderWay(self.in_flight))]
+
 
 class Partition(Lasting):
     """Groups between which nothing passes: lists of agents, or how to split the swarm in two."""
@@ -90,6 +30,10 @@ class Partition(Lasting):
     verb: Literal["partition"] = "partition"
     groups: Annotated[list[list[int]] | str, PlainValidator(selectors.groups_or_word)]
     in_flight: InFlight = "drop"
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.PARTITION, 0, None, groups=found.groups(self.groups), under_way=UnderWay(self.in_flight))]
 
 
 class Lose(Lasting):
@@ -99,6 +43,10 @@ class Lose(Lasting):
     links: On
     loss: Probability
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.LOSE, 0, None, pairs=found.links(self.links), probability=self.loss)]
+
 
 class Delay(Lasting):
     """Links whose communication takes longer, in seconds; sensing is not delayed."""
@@ -107,6 +55,10 @@ class Delay(Lasting):
     links: On
     delay: Positive
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.DELAY, 0, None, pairs=found.links(self.links), seconds=self.delay)]
+
 
 class Degrade(Lasting):
     """Links that have another profile in place of their own."""
@@ -114,6 +66,11 @@ class Degrade(Lasting):
     verb: Literal["degrade"] = "degrade"
     links: On
     profile: str
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        number = found.profile(self.profile)
+        return [Fault(Verb.DEGRADE, 0, None, pairs=found.links(self.links), profile=number, profile_name=self.profile)]
 
 
 class Heal(Event):
@@ -128,6 +85,10 @@ class Kill(Event):
 
     verb: Literal["kill"] = "kill"
     agents: Whom
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.KILL, 0, None, agents=(agent,)) for agent in found.agents(self.agents)]
 
 
 class Restart(Event):
@@ -144,6 +105,11 @@ class Pause(Lasting):
     verb: Literal["pause"] = "pause"
     agents: Whom
     in_flight: Literal["hold", "drop"] = "hold"
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        policy = UnderWay(self.in_flight)
+        return [Fault(Verb.PAUSE, 0, None, agents=(one,), under_way=policy) for one in found.agents(self.agents)]
 
 
 class Resume(Event):
@@ -166,6 +132,10 @@ class Clock(Lasting):
             raise ValueError("rate 0 is a clock that is right")
         return self
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.CLOCK, 0, None, agents=found.agents(self.agents), rate=self.rate)]
+
 
 class Depart(Lasting):
     """Agents that leave the formation on purpose; their bodies hold, drift on, or vanish."""
@@ -173,6 +143,11 @@ class Depart(Lasting):
     verb: Literal["depart"] = "depart"
     agents: Whom
     body: Literal["hold", "drift", "vanish"] = "hold"
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        body = DepartedBody(self.body)
+        return [Fault(Verb.DEPART, 0, None, agents=(agent,), body=body) for agent in found.agents(self.agents)]
 
 
 class Rejoin(Event):
@@ -200,6 +175,10 @@ class Gust(Lasting):
     def _blows(self) -> Gust:
         return _something(self, self.velocity, "velocity")
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.GUST, 0, None, agents=found.agents(self.agents), vector=found.numbers("velocity"))]
+
 
 class Bias(Lasting):
     """Sensors that are off by a vector, in metres: of what is measured over these links."""
@@ -212,6 +191,11 @@ class Bias(Lasting):
     def _biased(self) -> Bias:
         return _something(self, self.by, "by")
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        _refuse_metres(self.verb, found)
+        return [Fault(Verb.BIAS, 0, None, pairs=found.links(self.links), vector=found.numbers("by"))]
+
 
 class Outlier(Lasting):
     """Sensors that are wildly wrong now and then: with probability `p`, by a normal error of `sigma` metres per axis."""
@@ -221,6 +205,12 @@ class Outlier(Lasting):
     p: Probability
     sigma: Positive
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        _refuse_metres(self.verb, found)
+        pairs = found.links(self.links)
+        return [Fault(Verb.OUTLIER, 0, None, pairs=pairs, probability=self.p, deviation=self.sigma)]
+
 
 class Dropout(Lasting):
     """Sensors that make no measurement, with probability `p` in each tick."""
@@ -229,12 +219,20 @@ class Dropout(Lasting):
     links: On
     p: Probability = 1.0
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.DROPOUT, 0, None, pairs=found.links(self.links), probability=self.p)]
+
 
 class Freeze(Lasting):
     """Sensors that repeat their last measurement."""
 
     verb: Literal["freeze"] = "freeze"
     links: On
+
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.FREEZE, 0, None, pairs=found.links(self.links))]
 
 
 class Lie(Lasting):
@@ -253,11 +251,20 @@ class Lie(Lasting):
             raise ValueError("matrix is the identity: that is the truth")
         return self
 
+    def faults(self, found: Found) -> list[Fault]:
+        """What it does, but for the times."""
+        return [Fault(Verb.LIE, 0, None, agents=found.agents(self.agents), matrix=found.numbers("matrix"))]
+
 
 def _something(entry: Any, vector: list[float], key: str) -> Any:
     if not any(vector):
         raise ValueError(f"{key} is zero: that is nothing")
     return entry
+
+
+def _refuse_metres(verb: str, found: Found) -> None:
+    if not found.says_positions:
+        raise ValueError(f"{verb} is in metres, and sensors here say directions; let them freeze, or drop out")
 
 
 AnyEvent = Annotated[

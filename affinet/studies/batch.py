@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -12,16 +12,18 @@ import numpy as np
 from affinet.planning.plan import Plan
 from affinet.runtimes.inprocess import BatchTick, InProcessSwarm
 from affinet.runtimes.side_by_side import side_by_side
-from analysis.metrics import consistency, errors
+from affinet.verdicts.metrics import METRICS, seen
+from analysis.metrics import errors
 from analysis.metrics.localization import centroid, distance, ringing
 from analysis.models.arrays import Array, Mask
 from analysis.models.information import position, reported
 from analysis.models.jacobi import EdgeInformation, weights
 from netem.core import channels
 from netem.faults.timeline import Timeline
-from world.books.edges import of_swarms
 from world.books.history import Moment
 from world.books.localized import FirstMeasurements
+
+REPORT = "report:"  # and the name of a report: a quantity
 
 # As many as fit into a cache of a few megabytes together; more at once are not faster.
 _AT_ONCE = 50
@@ -35,61 +37,47 @@ class Runs:
     ----------
     seconds
         Of the ticks kept, shape (T,).
-    error
-        Tracking error (15) in those ticks, shape (R, T), in square metres; NaN or infinite where a run has diverged.
     mean_error
-        Its mean over all ticks of each run, shape (R,).
+        Tracking error (15), its mean over all ticks of each run, shape (R,), in square metres.
     psi
         Convergence indicators (16) in those ticks, shape (R, T, N).
-    procrustes, estimation_error, covariance_trace
-        As in `analysis.metrics.errors`, in those ticks, shape (R, T), in metres, metres and square metres.
-    nees, nis
-        Means over the edges, as in `analysis.metrics.consistency`, in those ticks, shape (R, T); NaN where no edge counts.
-    localization, drift, ringing
-        Distance from the optimal places, and of the weighted centroid from where it began, in those ticks, shape (R, T), in
-        metres, and which share of the steps since the moment before went back; NaN where
-        nobody localizes, the second also while anybody is silent.
-    found, agreed, ideal, apart, behind, effort
-        Of agents that pursue a target, in those ticks, shape (R, T): how far the target is from where each finds it by itself,
-        from where the agents agree that it is, and from where all they know together puts it (8); how far agreed and ideal
-        are apart; how far agents are from the places that they steer for; how hard they steer. Root mean squares over the
-        agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
-    peak
-        The longest input of any agent since the moment before, shape (R, T), in metres per second or per second squared.
+    quantities
+        By name, in those ticks, shape (R, T): `error`, the tracking error, NaN or infinite where a run has diverged; all of
+        `affinet.verdicts.metrics`, NaN where no edge counts; and `report:name`, how long what the estimator reports is, in the
+        mean over the agents awake.
+
+        `localization`, `drift`, `ringing`: distance from the optimal places, and of the weighted centroid from where it began,
+        in metres, and which share of the steps since the moment before went back; NaN where nobody localizes, the second also
+        while anybody is silent.
+
+        `found`, `agreed`, `ideal`, `apart`, `behind`, `effort`, of agents that pursue a target: how far the target is from
+        where each finds it by itself, from where the agents agree that it is, and from where all they know together puts it
+        (8); how far agreed and ideal are apart; how far agents are from the places that they steer for; how hard they steer.
+        Root mean squares over the agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
+
+        `peak`: the longest input of any agent since the moment before, in metres per second or per second squared.
     first
         Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position`, and
         the `target` where there is one, (T, D), in metres.
     """
 
     seconds: Array
-    error: Array
     mean_error: Array
     psi: Array
-    procrustes: Array
-    estimation_error: Array
-    covariance_trace: Array
-    nees: Array
-    nis: Array
-    localization: Array
-    drift: Array
-    ringing: Array
-    found: Array
-    agreed: Array
-    ideal: Array
-    apart: Array
-    behind: Array
-    effort: Array
-    peak: Array
+    quantities: Mapping[str, Array]
     first: Mapping[str, Array]
 
     def together(self, other: Runs) -> Runs:
         """These runs and others of the same ticks."""
-        joined = {
-            field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
-            for field in fields(self)
-            if field.name not in {"seconds", "first"}
-        }
-        return Runs(self.seconds, first=self.first, **joined)
+        return Runs(
+            seconds=self.seconds,
+            mean_error=np.concatenate([self.mean_error, other.mean_error]),
+            psi=np.concatenate([self.psi, other.psi]),
+            quantities={
+                name: np.concatenate([values, other.quantities[name]]) for name, values in self.quantities.items()
+            },
+            first=self.first,
+        )
 
 
 def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
@@ -116,6 +104,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     swarm = InProcessSwarm(together)
     tracking: list[Array] = []
     kept: list[dict[str, Array]] = []
+    psi: list[Array] = []
     first: list[dict[str, Array]] = []
     peak = np.zeros(len(seeds))
     places = _Places(plan, len(seeds))
@@ -132,9 +121,11 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
-                looked_at = _looked_at(together, present, moment, of_runs)
+                looked_at = _looked_at(together, present, moment)
                 awake = of_runs(~swarm.timeline.at(instant.tick).idle)
-                kept.append({"peak": peak, **looked_at, **_pursued(together, awake, moment, of_runs)})
+                pursued = _pursued(together, awake, moment, of_runs)
+                kept.append({"peak": peak, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
+                psi.append(of_runs(moment.psi))
                 first.append(_shown(plan, moment))
                 places.keep(moment)
                 peak = np.zeros(len(seeds))
@@ -142,11 +133,14 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         mean_error = error.mean(axis=1)
     return Runs(
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
-        error=error[:, ::every],
         mean_error=mean_error,
-        **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+        psi=np.stack(psi, axis=1),
+        quantities={
+            "error": error[:, ::every],
+            **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+            **places.found(len(kept)),
+        },
         first={name: np.stack([one[name] for one in first]) for name in first[0]},
-        **places.found(len(kept)),
     )
 
 
@@ -156,7 +150,7 @@ class _Places:
     def __init__(self, plan: Plan, runs: int) -> None:
         self._wanted = channels.PLACE in plan.reports
         self._runs = runs
-        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,))
+        self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,), plan.world.formation.dimension)
         self._kept: list[Array] = []
         self._recent: list[Array] = []
         self._since = 0
@@ -195,28 +189,22 @@ class _Places:
         return array.reshape(self._runs, -1, *array.shape[1:])
 
 
-def _looked_at(plan: Plan, present: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
-    """What is kept of a tick of all runs of a plan; `of_runs` splits what begins with all agents into (R, N)."""
-    formation = plan.world.formation
-    nominal = formation.nominal[: formation.agents // plan.world.swarms]
-    edges = of_swarms(
-        plan.world,
-        position=moment.position,
-        measured=moment.measured,
-        fates=moment.entry.fates[0],
-        estimate=moment.estimate,
-        covariance=moment.covariance,
-        known=moment.known,
-    )
-    innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
-    return {
-        "psi": of_runs(moment.psi),
-        "procrustes": errors.procrustes_error(of_runs(moment.position), nominal, present),
-        "estimation_error": errors.estimation_error(edges.estimate, edges.true, edges.known),
-        "covariance_trace": errors.covariance_trace(edges.covariance, formation.dimension),
-        "nees": consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known).mean,
-        "nis": innovations.mean,
-    }
+def _looked_at(plan: Plan, present: Mask, moment: Moment) -> dict[str, Array]:
+    """What is kept of a tick of all runs of a plan."""
+    of_agents = {name: getattr(moment, name) for name in ("position", "measured", "estimate", "covariance", "known")}
+    looked_at = seen(plan.world, present.reshape(-1), moment.entry.fates[0], of_agents)
+    return {name: metric.of(looked_at) for name, metric in METRICS.items()}
+
+
+def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """How long what each agent reports is, in the mean over those awake (R, N), shape (R,); NaN where nobody is."""
+    number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
+    means = {}
+    for name, told in moment.reports.items():
+        each = of_runs(told)
+        length = each if each.ndim == 2 else np.sqrt((each * each).sum(axis=tuple(range(2, each.ndim))))
+        means[f"{REPORT}{name}"] = np.where(awake, length, 0.0).sum(axis=1) / number
+    return means
 
 
 def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:

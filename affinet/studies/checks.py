@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from affinet.planning.plan import Plan
 from affinet.runtimes.side_by_side import NotABatch, side_by_side
 from affinet.scenario.words import among
+from affinet.studies.batch import REPORT
 from affinet.studies.quantities import NAMES
 from analysis.claims.checks import Span
 from analysis.models.information import reported
@@ -106,7 +107,7 @@ def _of_axes(study: Study) -> Iterator[Wrong]:
     for number, axis in enumerate(study.axes, start=1):
         if names.index(axis.name) < number - 1:
             yield f"axes.{number}.name", f"two axes are called {axis.name!r}: call each by a name of its own"
-        if axis.name in _TAKEN:
+        if axis.name in _TAKEN or REPORT in axis.name:
             yield f"axes.{number}.name", f"{axis.name!r} is a column of the data already: give the axis another name"
         if not axis.values:
             yield f"axes.{number}.values", 'has no label: give at least one, like { "as it is" = [] }'
@@ -199,6 +200,10 @@ def _those(cases: Sequence[Case], labels: Mapping[str, str]) -> list[Case]:
 
 def _quantity(key: str, quantity: str, planned: Sequence[Planned]) -> Iterator[Wrong]:
     for case, plan in planned:
+        if quantity.startswith(REPORT) and (name := quantity.removeprefix(REPORT)) not in plan.reports:
+            has = f"has {', '.join(plan.reports)}" if plan.reports else "has none"
+            yield key, f"no report is called {name!r}: the estimator of the case {named(case.labels)} {has}"
+            return
         if quantity in _PLACES and channels.PLACE not in plan.reports:
             yield (
                 key,

@@ -28,9 +28,9 @@ def inputs(directory: Path, order: int) -> Model:
     ScenarioError
         When it holds no run, or a damaged one, or one of double integrators, or nothing in it moves.
     """
-    if loading.resolved(directory).dynamics.order != 1:
+    if (bodies := loading.resolved(directory).dynamics.model) != "single-integrator":
         raise ScenarioError(
-            f"{directory}: its inputs are accelerations; the filters that predict inputs want velocities"
+            f"{directory}: what its {bodies}s are given is not their velocity; the filters that predict inputs want that"
         )
     try:
         flown = history.load(directory / history.FILE)["input"]

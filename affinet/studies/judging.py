@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from affinet.scenario.sections import ScenarioError
-from affinet.studies.quantities import NAMES, Quantity, over_time
+from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Claim, Result, Study, selected
 from analysis.claims import checks, random_graphs
 from analysis.claims.checks import ClaimVerdict
@@ -47,7 +47,7 @@ def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
         says, level = ", ".join(labels) + ": " * bool(labels) + claim.says, claim.level
         if claim.levels is not None:
             level = claim.levels[labels[0]]
-            says += f" {level:g} {NAMES[claim.quantity or study.quantity][1]}".rstrip()
+            says += f" {level:g} {said(claim.quantity or study.quantity)[1]}".rstrip()
         yield claim.model_copy(update={"says": says, "of": claim.of | where, "to": other, "level": level})
 
 
@@ -55,7 +55,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
     chosen = [one for one in results if selected(one, claim.of)]
     if not chosen:
         raise ValueError(f"no case has the labels {claim.of}")
-    span, unit = (claim.since, claim.until), NAMES[quantity][1]
+    span, unit = (claim.since, claim.until), said(quantity)[1]
     level, between = claim.level or 0.0, claim.between or []  # checks that want them have been given them
 
     def means(of: list[Result], what: Quantity = quantity) -> Array:
@@ -64,7 +64,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
     other = [one for one in results if selected(one, claim.to or {})]
     others = claim.to_quantity or quantity
     seconds = chosen[0].runs.seconds
-    values = np.concatenate([getattr(one.runs, quantity) for one in chosen])
+    values = np.concatenate([one.runs.quantities[quantity] for one in chosen])
     match claim.check:
         case "flat":
             return checks.flat(claim.says, means(chosen), level, unit)
@@ -89,5 +89,5 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
         case "indicator_below_error":
             (one,) = chosen
             followers, limits, runs = one.followers, one.bounds, one.runs
-            psi = (runs.psi - limits.offset)[:, :, followers]
-            return checks.below_in_mean(claim.says, runs.seconds, psi, runs.error[..., None] * limits.slope[followers])
+            psi, error = (runs.psi - limits.offset)[:, :, followers], runs.quantities["error"]
+            return checks.below_in_mean(claim.says, runs.seconds, psi, error[..., None] * limits.slope[followers])

@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterable
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator
 
-from affinet.studies.batch import Runs
+from affinet.scenario.words import hint, shown
+from affinet.studies.batch import REPORT, Runs
+from affinet.verdicts.metrics import METRICS
 from analysis.claims.checks import Span, within
 from analysis.models.arrays import Array
 
-Quantity = Literal[
-    "error",
-    "procrustes",
-    "estimation_error",
-    "covariance_trace",
-    "nees",
-    "nis",
-    "localization",
-    "drift",
-    "ringing",
-    "found",
-    "agreed",
-    "ideal",
-    "apart",
-    "behind",
-    "effort",
-    "peak",
-]
-
-NAMES: dict[Quantity, tuple[str, str]] = {
+NAMES: dict[str, tuple[str, str]] = {
     "error": ("tracking error", "m²"),
-    "procrustes": ("Procrustes error", "m"),
-    "estimation_error": ("estimation error", "m"),
-    "covariance_trace": ("trace of the covariances", "m²"),
-    "nees": ("normalised estimation error squared", ""),
-    "nis": ("normalised innovation squared", ""),
+    **{name: (metric.says, metric.unit) for name, metric in METRICS.items()},
     "localization": ("distance from the optimal places", "m"),
     "drift": ("drift of the weighted centroid", "m"),
     "ringing": ("share of steps that go back", ""),
@@ -52,14 +33,35 @@ NAMES: dict[Quantity, tuple[str, str]] = {
 _ROOT_MEAN_SQUARES = frozenset({"found", "agreed", "ideal", "apart", "behind", "effort"})
 
 
-def over_time(runs: Runs, quantity: Quantity, span: Span) -> Array:
+def _known(name: str) -> str:
+    if name not in NAMES and not (name.startswith(REPORT) and name.removeprefix(REPORT).isidentifier()):
+        near = f"; {hint(name, NAMES)}".rstrip("; ")
+        names = ", ".join(map(repr, NAMES))
+        raise ValueError(f"should be {names}, or '{REPORT}name' of what an estimator reports, got {shown(name)}{near}")
+    return name
+
+
+Quantity = Annotated[str, AfterValidator(_known)]
+
+
+def said(quantity: str) -> tuple[str, str]:
+    """What a quantity is called, and its unit; only who reports one knows that of a report."""
+    return NAMES.get(quantity) or (quantity.removeprefix(REPORT).replace("_", " "), "")
+
+
+def reports(names: Iterable[str]) -> list[str]:
+    """Those of these quantities that estimators report."""
+    return [name for name in names if name.startswith(REPORT)]
+
+
+def over_time(runs: Runs, quantity: str, span: Span) -> Array:
     """What stands for each run over a span of seconds, shape (R,): a mean, a root mean square, or the largest.
 
     Of the tracking error over all of it, every tick counts.
     """
     if quantity == "error" and span == (0.0, None):
         return runs.mean_error
-    values: Array = getattr(runs, quantity)[:, within(runs.seconds, span)]
+    values: Array = runs.quantities[quantity][:, within(runs.seconds, span)]
     if quantity == "peak":
         return np.asarray(values.max(axis=1), dtype=np.float64)
     if quantity in _ROOT_MEAN_SQUARES:

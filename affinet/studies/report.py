@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from affinet.runtimes import directories
 from affinet.studies.judging import graph_rates
-from affinet.studies.quantities import NAMES, Quantity, over_time
+from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Result, Study
 from analysis.claims.checks import ClaimVerdict
 from analysis.figures import curves, target
@@ -49,8 +49,13 @@ def prepare(out: Path | str) -> Path:
 
 def save(out: Path, study: Study, results: list[Result]) -> None:
     """Write the data into a directory."""
-    pq.write_table(pa.concat_tables([_moments(one) for one in results]), out / "curves.parquet")
-    pq.write_table(pa.concat_tables([_runs(one, study.since) for one in results]), out / "runs.parquet")
+    pq.write_table(_joined([_moments(one) for one in results]), out / "curves.parquet")
+    pq.write_table(_joined([_runs(one, study.since) for one in results]), out / "runs.parquet")
+
+
+def _joined(tables: list[pa.Table]) -> pa.Table:
+    """What only some cases have, estimators' reports, is null in the others."""
+    return pa.concat_tables(tables, promote_options="default")
 
 
 def tell(out: Path, verdicts: list[ClaimVerdict]) -> None:
@@ -78,7 +83,7 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
             [(one.labels, one.runs.seconds, one.runs.first[PLACE]) for one in results],
         )
     axes = [axis.name for axis in study.axes]
-    drawn, quantity = _curves(results, study.quantity, study.since), curves.said(*NAMES[study.quantity])
+    drawn, quantity = _curves(results, study.quantity, study.since), curves.said(*said(study.quantity))
     bound = None if study.bound is None else (study.bound.at, study.bound.says)
     if study.figure == "curves":
         curves.curves(out / "figure.png", study.title, drawn, axes, quantity, bound)
@@ -94,7 +99,9 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
         corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
         numbers = np.flatnonzero(one.followers)
         path, seen = out / "figure.png", corrected[:, :, numbers]
-        curves.indicator(path, study.title, one.runs.seconds, one.runs.error, seen, (numbers + 1).tolist())
+        curves.indicator(
+            path, study.title, one.runs.seconds, one.runs.quantities["error"], seen, (numbers + 1).tolist()
+        )
 
 
 def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:
@@ -126,7 +133,7 @@ def _flight(one: Result) -> TargetRun:
 
 def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Curve]:
     return [
-        Curve(one.labels, one.runs.seconds, getattr(one.runs, quantity), over_time(one.runs, quantity, (since, None)))
+        Curve(one.labels, one.runs.seconds, one.runs.quantities[quantity], over_time(one.runs, quantity, (since, None)))
         for one in results
     ]
 
@@ -135,8 +142,7 @@ def _moments(one: Result) -> pa.Table:
     number = len(one.runs.seconds)
     columns = {name: [label] * number for name, label in one.labels.items()} | {"seconds": one.runs.seconds}
     with np.errstate(invalid="ignore", over="ignore"):
-        for name in NAMES:
-            values = getattr(one.runs, name)
+        for name, values in one.runs.quantities.items():
             columns |= {f"mean_{name}": values.mean(axis=0), f"std_{name}": values.std(axis=0)}
     return pa.table(columns)
 
@@ -145,5 +151,5 @@ def _runs(one: Result, since: float) -> pa.Table:
     number = len(one.runs.mean_error)
     labels = {name: [label] * number for name, label in one.labels.items()}
     with np.errstate(invalid="ignore", over="ignore"):
-        overall = {name: over_time(one.runs, name, (since, None)) for name in NAMES}
+        overall = {name: over_time(one.runs, name, (since, None)) for name in one.runs.quantities}
     return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error} | overall)

@@ -123,13 +123,9 @@ def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
     fates = arrays["fates"][fault.start : fault.end]
     held = timeline.held(number)
     match fault.verb:
-        case Verb.GUST:
-            return _agent_ticks(span, fault, lambda tick: ~timeline.at(tick).still), "ticks of agents"
         case Verb.CLOCK:
             wrong = lambda tick: plan.told_mission & ~timeline.at(tick).idle & (timeline.clock(tick) != tick)  # noqa: E731
             return _agent_ticks(span, fault, wrong), "ticks of agents that fly by the clock"
-        case Verb.FREEZE:
-            return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
         case Verb.BIAS:
             return int((_working(timeline, span, fates) & held).sum()), "measurements"
         case Verb.OUTLIER:
@@ -143,7 +139,11 @@ def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
             return _otherwise(flown, number), "messages"
         case Verb.DEGRADE:
             return int((fates[:, :, held] > Fate.DELIVERED).sum()), "messages"
-    return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
+    if fault.verb in FATE_OF:
+        return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
+    if fault.agents:
+        return _agent_ticks(span, fault, lambda tick: ~timeline.at(tick).still), "ticks of agents"
+    return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
 
 
 def _agent_ticks(span: range, fault: Fault, which: Any) -> int:

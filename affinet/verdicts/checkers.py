@@ -6,15 +6,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from affinet.scenario.words import among
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.metrics import METRICS, of_run
 from affinet.verdicts.outcome import Verdict
-from agents.loading.calling import Calling
-from agents.loading.returned import WrongReturn, shown
 from analysis.metrics import consistency, localization
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
 from netem.faults.fault import Fault, Verb
+from netem.loading.calling import Calling
+from netem.loading.returned import WrongReturn, shown
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
 
@@ -107,6 +109,26 @@ def recovers(level: float, within: float) -> Checker:
         if not spent:
             return CheckResult(name, "vacuous", None, f"no fault that ended had lifted the error above {level:g} m²")
         return CheckResult(name, "pass", None, f"after {spent} faults")
+
+    return Checker(name, check)
+
+
+def below(metric: str, level: float, *, since: float = 0.0, until: float | None = None) -> Checker:
+    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever it is defined."""
+    name = f"below({metric!r}, {level:g})"
+    if metric not in METRICS:
+        raise ValueError(f"{name}: no metric {metric!r}; {among(metric, METRICS)}")
+    above_zero(name, level=level)
+    times(name, since=since, until=until)
+
+    def check(evidence: Evidence) -> CheckResult:
+        span = span_of(evidence, since, until)
+        values = of_run(evidence, metric, span)
+        if np.isnan(values).all():
+            return CheckResult(name, "vacuous", None, f"there is no {METRICS[metric].says} in any of its ticks")
+        holds: Mask = np.isnan(values) | (values < level)
+        unit = METRICS[metric].unit
+        return every(name, evidence, span, holds, lambda tick: f"it is {values[tick - span.start]:.4g} {unit}".rstrip())
 
     return Checker(name, check)
 

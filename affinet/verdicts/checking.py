@@ -15,8 +15,8 @@ import numpy as np
 
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Verdict
-from agents.loading.calling import Calling
-from agents.loading.returned import WrongReturn, kind
+from netem.loading.calling import Calling
+from netem.loading.returned import WrongReturn, kind
 
 
 @dataclass(frozen=True)

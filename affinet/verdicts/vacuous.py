@@ -9,14 +9,11 @@ import numpy as np
 from affinet.planning.plan import Plan
 from analysis.models.arrays import Array, Mask
 from netem.faults import lie
-from netem.faults.fault import Fault, Verb
+from netem.faults.fault import BY_CHANCE, OF_SENSORS, Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
-from netem.medium.verdict import Fate
+from netem.medium.verdict import FATE_OF, Fate
 from world.books.history import Arrays
-
-_BY_CHANCE = (Verb.LOSE, Verb.DROPOUT, Verb.OUTLIER)
-_OF_SENSORS = (Verb.FREEZE, Verb.BIAS, Verb.OUTLIER, Verb.DROPOUT)
 
 
 def why(plan: Plan, timeline: Timeline, arrays: Arrays, number: int) -> str:
@@ -38,16 +35,16 @@ def why(plan: Plan, timeline: Timeline, arrays: Arrays, number: int) -> str:
         return _never_fired(timeline.triggers[fault.trigger], arrays["error"], dt)
     if fault.start >= ticks:
         return f"it starts at {fault.start * dt:g} s, and the run ends at {ticks * dt:g} s"
-    if fault.verb in _BY_CHANCE and fault.probability == 0.0:
+    if fault.verb in BY_CHANCE and fault.probability == 0.0:
         return "its probability is 0"
     span = range(fault.start, ticks if fault.end is None else min(ticks, fault.end))
     match fault.verb:
-        case Verb.GUST:
-            return "its agents held still, dead or departed, while it lasted"
         case Verb.CLOCK:
             return _right_clocks(plan, timeline, fault, span)
         case Verb.LIE if lie.CHANNEL not in plan.channels:
             return f"nobody tells a Theta: the estimator {plan.scenario.agents.estimator!r} has none to tell"
+    if fault.agents and fault.verb is not Verb.LIE and fault.verb not in FATE_OF:
+        return "its agents held still, dead or departed, while it lasted"
     return _fared(plan, fault, timeline.held(number), arrays, span)
 
 
@@ -72,7 +69,7 @@ def _right_clocks(plan: Plan, timeline: Timeline, fault: Fault, span: range) -> 
 def _fared(plan: Plan, fault: Fault, held: Mask, arrays: Arrays, span: range) -> str:
     """What became of the messages that it could have touched."""
     fates = arrays["fates"][span.start : span.stop]
-    if fault.verb in _OF_SENSORS:
+    if fault.verb in OF_SENSORS:
         what, fared = "measurements", fates[:, :1, held]
     elif fault.verb is Verb.LIE:
         said = np.isin(plan.world.links.src, fault.agents)
@@ -85,6 +82,6 @@ def _fared(plan: Plan, fault: Fault, held: Mask, arrays: Arrays, span: range) ->
         return f"{where} carried nothing while it lasted"
     became = ", ".join(f"{number} {Fate(fate).label}" for fate, number in sorted(offered.items()))
     fared_alike = f"of the {offered.total()} {what} on {where} meanwhile ({became})"
-    if fault.verb in _BY_CHANCE and offered[Fate.DELIVERED]:
+    if fault.verb in BY_CHANCE and offered[Fate.DELIVERED]:
         return f"its probability, {fault.probability:g}, struck none {fared_alike}"
     return f"it changed nothing {fared_alike}"

@@ -7,10 +7,10 @@ from typing import Any
 
 from agents.estimators.base import Centre, CentreEstimate
 from agents.loading import capabilities, returned
-from agents.loading.calling import Calling
-from agents.loading.returned import WrongReturn
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
+from netem.loading.calling import Calling
+from netem.loading.returned import WrongReturn, array, kind, pair
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class CheckedCentre:
         batch, edges = seen.shape[:-2], measured.shape[-3:]
         with Calling(self.filter, "step"):
             told = self.filter.step(state, measured, seen, inputs)
-            after, estimate = returned.pair(told, "the state, and a CentreEstimate")
+            after, estimate = pair(told, "the state, and a CentreEstimate")
             returned.state(state, after, batch)
             if not isinstance(estimate, CentreEstimate):
-                raise WrongReturn(f"must return a CentreEstimate, got {returned.kind(estimate)}")
-            returned.array("relative", estimate.relative, "N, n, D", edges, batch)
-            returned.array("covariance", estimate.covariance, "N, n, D, D", (*edges, edges[-1]), batch)
+                raise WrongReturn(f"must return a CentreEstimate, got {kind(estimate)}")
+            array("relative", estimate.relative, "N, n, D", edges, batch)
+            array("covariance", estimate.covariance, "N, n, D, D", (*edges, edges[-1]), batch)
             return after, estimate
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from agents.brief import DERIVATIVES
 from agents.centre.checked import CheckedCentre, centre_of
 from agents.estimators.base import CentreEstimate
-from agents.loading.choice import Choice
 from agents.swarm import SwarmBrief
 from netem.core.channels import INPUT, MEASUREMENT
 from netem.core.clock import Clock, Lockstep
+from netem.loading.choice import Choice
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor, called
 from netem.processes.user_code import UserCodeError

@@ -56,6 +56,7 @@ class CentralizedFilter(Estimator[Stateless]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Stateless:  # noqa: ARG002
         """Nothing to remember."""
+        brief.sensor.require_positions()  # the centre measures by it
         return Stateless()
 
     def sense(

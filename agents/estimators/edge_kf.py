@@ -2,6 +2,9 @@
 
 A neighbour says what it flew from the tick before. Where that is lost, an autoregressive model predicts it from what was heard
 earlier, and (6.3) widens the covariance, with the dt^2 that the printed algorithms leave out.
+
+Of a sensor that says directions alone, the first one puts an edge at its nominal distance; from then on how far it is follows
+from how its direction changes while both ends fly.
 """
 
 from __future__ import annotations
@@ -26,13 +29,14 @@ from netem.core.channels import INPUT
 
 
 class EdgeStates(NamedTuple):
-    """The filters: mean (..., n, D), covariance (..., n, D, D), the neighbours' inputs, and what was measured in this tick."""
+    """The filters: mean (..., n, D), covariance (..., n, D, D), the neighbours' inputs, what is measured, and was ever."""
 
     mean: Array
     covariance: Array
     flown: inputs.NeighbourInputs
     measured: Array
     seen: Mask
+    met: Mask
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,7 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
             flown=inputs.at_rest(shape, brief.dimension, len(self.coefficients)),
             measured=np.zeros((*shape, brief.dimension)),
             seen=np.zeros(shape, dtype=bool),
+            met=np.zeros(shape, dtype=bool),
         )
 
     def sense(
@@ -90,14 +95,17 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
         """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g)."""
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
-        mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
+        mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = state.covariance + of_edges(brief) + brief.dt * brief.dt * doubt
-        R = brief.sensor.spread(state.measured)
-        filters = kalman.correct(mean, covariance, state.measured, R, state.seen)
+        if not brief.sensor.says_positions:
+            nominal = np.linalg.norm(brief.relative, axis=-1, keepdims=True) * state.measured
+            mean = np.where((state.seen & ~state.met)[..., None], nominal, mean)
+        filters = kalman.correct(mean, covariance, *brief.sensor.observed(state.measured, mean), state.seen)
         estimate = Estimate(
             filters[0], np.broadcast_to(brief.present, state.seen.shape), filters[1], no_indicator(state.seen)
         )
-        return state._replace(mean=filters[0], covariance=filters[1], flown=flown), estimate
+        met = state.met | state.seen
+        return state._replace(mean=filters[0], covariance=filters[1], flown=flown, met=met), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether inputs are heard in the tick they are of."""

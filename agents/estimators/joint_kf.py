@@ -88,7 +88,7 @@ class JointEdgeFilter(Estimator[Joint]):
         """Predict all edges by the inputs (14c)-(14d), and correct them by those measured (14e)-(14g)."""
         flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
         theirs, doubt = flown.last
-        mean = state.mean + brief.dt * (own.input[..., None, :] - theirs)
+        mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
         R = block_diagonal(brief.sensor.spread(state.measured))
         mean, covariance = corrected(mean, covariance, state.measured, R, state.seen)

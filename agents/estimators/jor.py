@@ -113,6 +113,9 @@ class JacobiOverRelaxation(Estimator[Belief]):
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """How fast it comes to its answer, from measurements as they would be without noise."""
+        if not swarm.sensor.says_positions:
+            says = "agents find out where they are from positions of each other, and the sensor says directions alone"
+            return [Finding("localization", "error", says)]
         leaders = np.flatnonzero(swarm.leader)
         if self.anchor and len(leaders) != 1:
             says = f"with an anchor exactly one agent leads: formation.leaders has {len(leaders)}"

@@ -111,9 +111,9 @@ class SilentEdgeFilter(Estimator[Silent]):
     ) -> tuple[Silent, Estimate]:
         """Predict every edge by what its neighbour is believed to fly, and correct those measured."""
         inputs.refuse_accelerations(heard[INPUT])
-        past = state.past._replace(input=_pushed(own.input, state.past.input, -2))
+        past = state.past._replace(input=_pushed(own.velocity, state.past.input, -2))
         theirs, doubt = self._neighbours(brief, past)
-        mean = past.mean[..., 0, :, :] + brief.dt * (own.input[..., None, :] - theirs)
+        mean = past.mean[..., 0, :, :] + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt * brief.dt * doubt
         R = brief.sensor.spread(state.measured)
         mean, covariance = kalman.correct(mean, covariance, state.measured, R, state.seen)

@@ -1,1 +1,1 @@
-"""A user's own code: found, its parameters checked, called, and what it returns checked."""
+"""What estimators and laws return, checked."""

@@ -8,12 +8,12 @@ from typing import Any, get_args
 import numpy as np
 
 from agents.estimators.base import Centre
-from agents.loading.calling import Calling
-from agents.loading.returned import WrongReturn, array, kind
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.arrays import Array
 from analysis.models.finding import Finding, Level
+from netem.loading.calling import Calling
+from netem.loading.returned import WrongReturn, array, kind
 
 
 def wants(algorithm: Any) -> Wants:

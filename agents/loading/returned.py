@@ -5,7 +5,7 @@ These checks run in every tick, so they compare a shape and a dtype each, and lo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from math import prod
 from typing import Any, NoReturn
@@ -15,34 +15,12 @@ import numpy as np
 from agents.estimate import Estimate
 from agents.exchange import Channels, Field, Fields
 from netem.core import channels as air
+from netem.loading.returned import ARRAYS, BOOL, FLOAT, Shape, WrongReturn, array, kind, shown, written
 
-Shape = tuple[int, ...]
-_ARRAYS = (np.ndarray, np.generic)
-_FLOAT, _BOOL = np.dtype(np.float64), np.dtype(np.bool_)
 _NUMBERS = "biuf"
 _WIDEST = 8  # bytes of a number that a message can carry
 _MOST_AXES, _MOST_NUMBERS = 8, 65536
 _RESERVED = frozenset({air.SENSE, air.MEASUREMENT, air.INPUT, air.CENTRE})
-
-
-class WrongReturn(TypeError):
-    """An algorithm returned something else than was asked of it."""
-
-
-def pair(given: Any, what: str) -> tuple[Any, Any]:
-    """The two things that a method has to return."""
-    if type(given) is not tuple or len(given) != 2:
-        raise WrongReturn(f"must return {what}, got {kind(given)}")
-    return given
-
-
-def array(name: str, value: Any, axes: str, shape: Shape, batch: Shape, dtype: np.dtype[Any] = _FLOAT) -> None:
-    """Refuse what is no array of this dtype and shape, which begins with the batch axes; `axes` name the others."""
-    if isinstance(value, _ARRAYS) and value.shape == (*batch, *shape) and value.dtype == dtype:
-        return
-    symbols = _written(axes.split(", ") if axes else [])
-    meant = "" if _written(shape) == symbols else f" = {_written(shape)}"
-    raise WrongReturn(f"{name} must be {dtype} {symbols}{meant}, got {shown(value, batch)}")
 
 
 def declared(given: Any) -> Channels:
@@ -84,7 +62,7 @@ def fresh(given: Any, batch: Shape, name: str = "the state") -> None:
     if isinstance(given, tuple) and hasattr(given, "_fields"):
         for field, part in zip(given._fields, given, strict=True):
             fresh(part, batch, f"{name}.{field}")
-    elif not isinstance(given, _ARRAYS) or given.dtype.kind not in _NUMBERS or given.shape[: len(batch)] != batch:
+    elif not isinstance(given, ARRAYS) or given.dtype.kind not in _NUMBERS or given.shape[: len(batch)] != batch:
         what = "a NamedTuple of arrays" if name == "the state" else "an array of numbers or truths"
         raise WrongReturn(f"{name} must be {what} that begins with the batch axes, got {shown(given, batch)}")
 
@@ -97,7 +75,7 @@ def state(before: Any, given: Any, batch: Shape, name: str = "the state") -> Non
         for field, old, new in zip(before._fields, before, given, strict=True):  # type: ignore[attr-defined]
             if new is not old:
                 state(old, new, batch, field if name == "the state" else f"{name}.{field}")
-    elif not isinstance(given, _ARRAYS) or given.shape != before.shape or given.dtype != before.dtype:
+    elif not isinstance(given, ARRAYS) or given.shape != before.shape or given.dtype != before.dtype:
         raise WrongReturn(f"{name} must stay what it was, {shown(before, batch)}, got {shown(given, batch)}")
 
 
@@ -113,7 +91,7 @@ def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
             _differ(f"what to broadcast on {channel!r}", "fields", fields, told)
         for name, field in fields.items():
             axes = ", ".join(map(str, field.shape))
-            array(f"{channel}.{name}", told[name], axes, field.shape, batch, _BOOL if _is_truth(field) else _FLOAT)
+            array(f"{channel}.{name}", told[name], axes, field.shape, batch, BOOL if _is_truth(field) else FLOAT)
     return given
 
 
@@ -123,13 +101,13 @@ def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapp
         raise WrongReturn(f"must return an Estimate, got {kind(given)}")
     edges = (slots, dimension)
     array("relative", given.relative, "n, D", edges, batch)
-    array("known", given.known, "n", (slots,), batch, _BOOL)
+    array("known", given.known, "n", (slots,), batch, BOOL)
     array("covariance", given.covariance, "n, D, D", (*edges, dimension), batch)
     array("psi", given.psi, "", (), batch)
     if given.relative_velocity is not None:
         array("relative_velocity", given.relative_velocity, "n, D", edges, batch)
     if given.feasible is not None:
-        array("feasible", given.feasible, "", (), batch, _BOOL)
+        array("feasible", given.feasible, "", (), batch, BOOL)
     _reports(given.reports, batch, reports)
     return given
 
@@ -142,13 +120,13 @@ def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> No
     for name, value in given.items():
         if not isinstance(name, str) or not name.isidentifier():
             raise WrongReturn(f"a report is called by a name like 'place', not {name!r}")
-        numbers = isinstance(value, _ARRAYS) and value.dtype.kind in _NUMBERS and value.dtype.itemsize <= _WIDEST
+        numbers = isinstance(value, ARRAYS) and value.dtype.kind in _NUMBERS and value.dtype.itemsize <= _WIDEST
         if not numbers or value.shape[: len(batch)] != batch:
             raise WrongReturn(
                 f"report {name!r} must be an array of numbers (..., *) of at most 64 bits, got {shown(value, batch)}"
             )
         if wanted is not None and value.shape[len(batch) :] != wanted[name]:
-            was = _written(wanted[name])
+            was = written(wanted[name])
             raise WrongReturn(f"report {name!r} must stay what it was, {was}, got {shown(value, batch)}")
 
 
@@ -160,25 +138,3 @@ def _differ(what: str, of: str, wanted: Mapping[str, Any], given: Any) -> NoRetu
     if not isinstance(given, Mapping):
         raise WrongReturn(f"{what} must be a map, got {kind(given)}")
     raise WrongReturn(f"{what} must have the {of} {sorted(wanted)}, got {sorted(map(str, given))}")
-
-
-def _written(sizes: Sequence[Any]) -> str:
-    return f"({', '.join(['...', *map(str, sizes)])})"
-
-
-def shown(value: Any, batch: Shape | None = None) -> str:
-    """Dtype and shape of an array, without the batch axes where it has them, or what else a value is."""
-    if not isinstance(value, _ARRAYS):
-        return kind(value)
-    if batch is None or value.shape[: len(batch)] != batch:
-        return f"{value.dtype} {value.shape}"
-    return f"{value.dtype} {_written(value.shape[len(batch) :])}"
-
-
-def kind(value: Any) -> str:
-    """What a value is, for people."""
-    if value is None:
-        return "None"
-    if isinstance(value, tuple) and not hasattr(value, "_fields"):
-        return f"a tuple of {len(value)}"
-    return f"a {type(value).__name__}"

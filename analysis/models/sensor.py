@@ -1,5 +1,8 @@
 """What measures relative positions, in axes that all agents share: by coordinates, by range and bearing, or along and across.
 
+And what measures their directions alone. A sensor of another quantity joins here, by its keys in
+`affinet/scenario/sections.py`, and by the estimator that uses what it says.
+
 A range and a bearing make the error of a position depend on where it is, and correlate its coordinates (paper 004, section
 4.1.1). They also draw it toward the agent, by a factor that is known: the positions here are corrected for it.
 """
@@ -15,6 +18,10 @@ from analysis.models.arrays import Array
 from analysis.models.elementary import arctan2, cos, exp, expm1, hypot, sin
 from analysis.models.unsuited import Unsuited
 
+# Along the line of sight a direction leaves as much open as this many times the distance, which costs filters no digits that
+# count; and nothing is taken for nearer than so many metres.
+_BLIND, _NEAREST = 1e3, 1e-6
+
 
 @dataclass(frozen=True)
 class Sensor:
@@ -24,13 +31,14 @@ class Sensor:
     ----------
     reads
         Coordinates; or range and bearing, in three dimensions range, azimuth and elevation; or a position along and across the
-        line of sight, as wrong as it is far (paper 003, section VII).
+        line of sight, as wrong as it is far (paper 003, section VII); or a direction, a unit vector.
     covariance
         Of what it reads, shape (D, D): in square metres, of angles in square radians, or as shares of the square of the
-        distance. All but that of coordinates is diagonal, and the same for all directions across.
+        distance; of a direction, of the angles by which it is off, shape (D - 1, D - 1), in square radians. All but that of
+        coordinates is diagonal, and the same for all directions across.
     """
 
-    reads: Literal["coordinates", "range-bearing", "line-of-sight"]
+    reads: Literal["coordinates", "range-bearing", "line-of-sight", "direction"]
     covariance: Array
 
     def measured(self, true: Array, noise: Array) -> Array:
@@ -41,16 +49,73 @@ class Sensor:
         true
             Shape (..., D), in metres.
         noise
-            With the covariance of the sensor, shape (..., D).
+            With the covariance of the sensor, shape (..., D), or (..., D - 1).
         """
         if self.reads == "coordinates":
             return true + noise
         if self.reads == "line-of-sight":
             return true + _turned(true, np.linalg.norm(true, axis=-1, keepdims=True) * noise)
+        if self.reads == "direction":
+            return _swung(true, noise)
         return _cartesian(_polar(true) + noise) / _shrinking(self._variances)
 
+    @property
+    def says_positions(self) -> bool:
+        """Whether it says how far away things are."""
+        return self.reads != "direction"
+
+    def exact(self, true: Array) -> Array:
+        """What it would say of relative positions (..., D), in metres, without noise."""
+        return true if self.says_positions else _swung(true, np.zeros((*true.shape[:-1], true.shape[-1] - 1)))
+
+    def observed(self, measured: Array, expected: Array) -> tuple[Array, Array]:
+        """Measurements as relative positions (..., D), and their covariances (..., D, D), in square metres.
+
+        A direction says where across the line to where a thing is expected it is, at the distance at which it is expected, and
+        next to nothing of how far: an extended Kalman filter's measurement of a bearing (Aidala, IEEE Transactions on Aerospace
+        and Electronic Systems 15(1), 1979). By the line measured, whose error is that of the measurement, filters find
+        distances where there is no parallax.
+
+        Parameters
+        ----------
+        measured
+            What it said, shape (..., D).
+        expected
+            Where the estimator takes things to be, shape (..., D), in metres.
+        """
+        if self.says_positions:
+            return measured, self.spread(measured)
+        distance = np.maximum(np.linalg.norm(expected, axis=-1, keepdims=True), _NEAREST)
+        toward = expected / distance
+        aside = measured - (measured * toward).sum(axis=-1, keepdims=True) * toward
+        squared = (distance * distance)[..., None]
+        line = toward[..., :, None] * toward[..., None, :]
+        across = np.eye(measured.shape[-1]) - line
+        return expected + distance * aside, squared * (self._variances[0] * across + _BLIND * _BLIND * line)
+
+    def require_positions(self) -> None:
+        """Fail where it says none.
+
+        Raises
+        ------
+        Unsuited
+            When it says directions alone.
+        """
+        if not self.says_positions:
+            raise Unsuited(
+                "this estimator takes what is measured for a relative position, and this sensor says the direction alone; "
+                "choose 'edge-kf', which finds the distance by how both ends fly, or another sensor"
+            )
+
     def spread(self, measured: Array) -> Array:
-        """Covariances of measurements (..., D), shape (..., D, D), in m2: of ranges and bearings, that at what they say."""
+        """Covariances of measurements (..., D), shape (..., D, D), in m2: of ranges and bearings, that at what they say.
+
+        Raises
+        ------
+        Unsuited
+            When it says directions alone.
+        """
+        self.require_positions()
         if self.reads == "coordinates":
             return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
         if self.reads == "line-of-sight":
@@ -70,8 +135,9 @@ class Sensor:
         Raises
         ------
         Unsuited
-            When each measurement has its own.
+            When each measurement has its own, or says a direction alone.
         """
+        self.require_positions()
         if self.reads != "coordinates":
             raise Unsuited(
                 "this estimator takes one covariance for all measurements, and this sensor gives each its own; "
@@ -167,6 +233,17 @@ def _turned(line: Array, offset: Array) -> Array:
     along_mirror = (offset * mirror).sum(axis=-1, keepdims=True)
     turned: Array = offset - np.where(size > 0.0, 2.0 * along_mirror / np.where(size > 0.0, size, 1.0), 0.0) * mirror
     return turned
+
+
+def _swung(line: Array, angles: Array) -> Array:
+    """Unit vectors along lines (..., D), swung by angles (..., D - 1) across them, in radians."""
+    length = np.linalg.norm(line, axis=-1, keepdims=True)
+    first = np.eye(line.shape[-1])[0]
+    direction = np.where(length > 0.0, line, first) / np.where(length > 0.0, length, 1.0)
+    angle = np.linalg.norm(angles, axis=-1, keepdims=True)
+    aside = _turned(direction, np.concatenate([np.zeros_like(angle), angles], axis=-1))
+    share = np.where(angle > 0.0, sin(angle) / np.where(angle > 0.0, angle, 1.0), 1.0)
+    return cos(angle) * direction + share * aside
 
 
 def _cartesian(polar: Array) -> Array:

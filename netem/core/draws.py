@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
+from hashlib import blake2b
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ class Purpose(IntEnum):
     TARGET = 21
     LATENCY = 22
     DETECTION = 23
+    NAMED = 24
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:
@@ -96,7 +98,7 @@ def _mixed(product: Words, word: Words, key: Words, *, out: Words) -> Words:
 
 def uniform(
     seed: Seed,
-    purpose: Purpose,
+    purpose: Purpose | str,
     *,
     tick: ArrayLike = 0,
     src: ArrayLike = 0,
@@ -111,7 +113,7 @@ def uniform(
     seed
         Of the run, in [0, 2**64); of many runs, an array that broadcasts against the indices.
     purpose
-        What the draws are for.
+        What the draws are for: one of ours, or the name of what a user's own code draws for.
     tick, channel
         Integers below 2**32.
     src, dst
@@ -139,13 +141,17 @@ def uniform(
         _words("dst", dst, 16),
         _words("channel", channel, 32),
     )
-    keys = np.asarray(seed, dtype=np.uint64)[..., None]
+    keys, word = np.asarray(seed, dtype=np.uint64)[..., None], Purpose.NAMED
+    if isinstance(purpose, Purpose):
+        word = purpose
+    else:  # names have no number in the counter: each has a key of its own
+        keys = keys ^ np.uint64(int.from_bytes(blake2b(purpose.encode(), digest_size=8).digest(), "little"))
     blocks = np.arange((lanes + 1) // 2, dtype=np.uint64)
     counter = (
         ticks[..., None],
         (sources << np.uint64(16) | targets)[..., None],
         channels[..., None],
-        np.uint64(int(purpose) << 16) | blocks,
+        np.uint64(int(word) << 16) | blocks,
     )
     x0, x1, x2, x3 = philox(counter, (keys & _WORD, keys >> _HALF))
     pairs = np.stack([_unit(x0, x1), _unit(x2, x3)], axis=-1)

@@ -26,6 +26,11 @@ class Verb(StrEnum):
     LIE = "lie"
 
 
+# Verbs that strike with a probability, and those of what is measured rather than of all that is said.
+BY_CHANCE = frozenset({Verb.LOSE, Verb.DROPOUT, Verb.OUTLIER})
+OF_SENSORS = frozenset({Verb.FREEZE, Verb.BIAS, Verb.OUTLIER, Verb.DROPOUT})
+
+
 class UnderWay(StrEnum):
     """What a fault does to the messages under way on its links."""
 

@@ -10,6 +10,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,14 @@ from netem.faults.trigger import Trigger
 
 # What a clock gains is a whole number of ticks again and again, and floats fall a little short of that.
 _ROUNDING = 1e-9
+
+
+class Acting(NamedTuple):
+    """A fault in force, and the links (L,) and the agents (N,) that it names."""
+
+    fault: Fault
+    links: Mask
+    agents: Mask
 
 
 @dataclass(frozen=True)
@@ -51,8 +60,8 @@ class Conditions:
         and (N, 1) of zeros.
     outlier, deviation
         Probability of an outlier, and its standard deviation in metres, shape (L,).
-    liars
-        Faults by which agents lie.
+    acting
+        All faults in force, each with the links (L,) and the agents (N,) that it names.
     """
 
     dead: Mask
@@ -75,7 +84,16 @@ class Conditions:
     push: Array
     outlier: Array
     deviation: Array
-    liars: tuple[Fault, ...]
+    acting: tuple[Acting, ...]
+
+    def under(self, verb: Verb) -> list[Acting]:
+        """Those of a verb."""
+        return [one for one in self.acting if one.fault.verb is verb]
+
+    @property
+    def liars(self) -> tuple[Fault, ...]:
+        """Faults by which agents lie."""
+        return tuple(one.fault for one in self.under(Verb.LIE))
 
     @property
     def absent(self) -> Mask:
@@ -290,7 +308,7 @@ class Timeline:
             push=sums(Verb.GUST, self._agent_masks, agents),
             outlier=chance(Verb.OUTLIER),
             deviation=largest(Verb.OUTLIER, lambda fault: fault.deviation),
-            liars=tuple(fault for fault, _ in under(Verb.LIE, self._agent_masks)),
+            acting=tuple(Acting(self.faults[n], self._link_masks[n], self._agent_masks[n]) for n in in_force),
         )
 
     def _links_held(self, fault: Fault) -> Mask:

@@ -8,6 +8,7 @@ from analysis.models.arrays import Array, Integers
 from netem.impairments.chain import ChainLayer
 from netem.impairments.delay import MessageDelay
 from netem.impairments.jamming import Zone
+from netem.impairments.own import OwnLoss
 from netem.impairments.rate import Rate
 from netem.impairments.reach import Reach
 from netem.impairments.schedule import Schedule
@@ -33,6 +34,8 @@ class Profile:
         Links that take turns.
     reaches, zones
         Losses that positions decide.
+    own
+        Losses of a user's own.
     listed
         Messages that are dropped, by number: rows of (link row, how many were offered before it, whether on sensing, whether
         on communication), shape (m, 4).
@@ -56,6 +59,7 @@ class Profile:
     schedules: tuple[Schedule, ...]
     reaches: tuple[Reach, ...]
     zones: tuple[Zone, ...]
+    own: tuple[OwnLoss, ...]
     listed: Integers
     delays: tuple[MessageDelay, ...]
     duplicate: Array
@@ -68,4 +72,4 @@ class Profile:
     @property
     def spatial(self) -> bool:
         """Whether a verdict depends on where the agents are."""
-        return bool(self.reaches or self.zones)
+        return bool(self.reaches or self.zones) or any(loss.by_position for loss in self.own)

@@ -1,8 +1,7 @@
 """What one profile makes of the messages of a tick: which it loses, and how the others arrive.
 
 The layers are independent: each says what it holds, a message passes when none holds it, and it is booked under the strongest
-that does, in the order of `Fate`. To add an impairment, write its pure file beside `impairments/loss.py`. If time alone decides
-it, add it to `by_tick.py`; if it loses messages, give it a `Fate` and name it in `_layers`.
+that does, in the order of `Fate`. To add a loss, see docs/extending.md.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from netem.impairments.profile import Profile
 from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
 from netem.medium.in_flight import MediumState, Verdicts
+from netem.medium.own_losses import OwnLosses
 from netem.medium.verdict import PASSED, Fate, Fates
 
 _SHARED_DRAW = 0
@@ -78,6 +78,10 @@ class LinkModel:
         self._names = np.array([channel_names.code(name) for name in channels], dtype=np.int64)
         self._codes = np.array([_SHARED_DRAW]) if profile.coupled else self._names
         self._by_tick = ImpairmentsByTick(seed, links, profile, self._codes, self._sensing)
+        self._own = [
+            (OwnLosses(seed, links, profile.dt, own, self._codes), self._by_tick.on(own.sensing, own.comms))
+            for own in profile.own
+        ]
         self._packet_layers = [n for n, layer in enumerate(profile.chains) if layer.by_packet.any()]
         self._packet_lanes = 1 + max((profile.chains[n].lane for n in self._packet_layers), default=-1)
         orderly = [law.rows for law in profile.delays if law.ordered]
@@ -124,7 +128,7 @@ class LinkModel:
         impairments = self._by_tick.at(tick)
         packets = self._packet_chains(memory, tick, offered)
         reason = np.full(self._shape, PASSED)
-        for fate, held in self._layers(air, impairments, packets, position):
+        for fate, held in self._layers(air, tick, impairments, packets, position):
             np.copyto(reason, fate, where=held)
         reason = np.minimum(reason, imposed)
         passed = offered & (reason == PASSED)
@@ -152,17 +156,19 @@ class LinkModel:
         return self._by_tick.draw(purpose, ticks, 1)[..., 0]
 
     def _layers(
-        self, air: MediumState, impairments: TickImpairments, packets: _Packets, position: Array | None
+        self, air: MediumState, tick: int, impairments: TickImpairments, packets: _Packets, position: Array | None
     ) -> Iterator[tuple[np.uint8, Mask]]:
         """The layers that change from tick to tick, and what each holds: the weakest first."""
+        if self.profile.spatial and position is None:
+            raise ValueError("loss by distance and jammed zones need the positions of the tick")
         yield _LOST, impairments.lost
         if packets.states:
             yield _LOST, packets.lost
+        for own, on in self._own:
+            yield _LOST, own.lost(tick, position) & on
         if len(self.profile.listed):
             yield _LISTED, self._listed(air.offered)
-        if self.profile.spatial:
-            if position is None:
-                raise ValueError("loss by distance and jammed zones need the positions of the tick")
+        if position is not None:
             for zone, on in zip(self.profile.zones, impairments.jams.tolist(), strict=True):
                 if on:
                     yield _JAMMED, zone.jammed(self._receiver, position) & self._by_tick.on(zone.sensing, zone.comms)

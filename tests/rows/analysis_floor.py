@@ -58,6 +58,16 @@ CASES = {
             ("spread", one.spread, (real(9, dimension),)),
         )
     },
+    **{
+        f"analysis.models.sensor.Sensor.{what} (direction in {dimension})": of(function, *arguments)
+        for dimension in (2, 3)
+        for one in [sensor.Sensor("direction", 0.02 * np.eye(dimension - 1))]
+        for what, function, arguments in (
+            ("measured", one.measured, (real(9, dimension), real(9, dimension - 1))),
+            ("exact", one.exact, (real(9, dimension),)),
+            ("observed", one.observed, (real(9, dimension), real(9, dimension))),
+        )
+    },
     "analysis.models.sensor.moments": of(lambda polar: sensor.moments(polar, np.array([0.1, 0.2, 0.3])), real(9, 3)),
     "analysis.models.affine.Manoeuvre.target": of(lambda p: MANOEUVRE.target(3, p), real(9, 2)),
     "analysis.models.affine.Manoeuvre.velocity": of(lambda k, p: MANOEUVRE.velocity(k, p, 0.1), whole(20), real(2)),

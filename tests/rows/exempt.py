@@ -21,6 +21,7 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
         netem.core.draws.DrawnAhead.at netem.medium.relay.Relay.decide netem.medium.relay.Relay.decide_on
         netem.medium.relay.Relay.as_told netem.medium.relay.Relay.as_it_arrives
+        netem.medium.own_losses.OwnLosses.lost
     """,
     WHOLE: """
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
@@ -34,12 +35,14 @@ EXEMPT = {
         netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
         netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
         netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
-        netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
+        world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
+        world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
         analysis.models.sensor.Sensor.common
     """,
     ONE_WORLD: """
@@ -88,6 +91,8 @@ EXEMPT = {
         agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
         agents.estimators.base.Centre.step
         agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        netem.impairments.own.Loss.lost world.physics.bodies.Body.rest world.physics.bodies.Body.coasting
+        world.physics.bodies.Body.moved
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance world.flight.Acted.input
         world.flight.Carrier.carry

@@ -44,6 +44,15 @@ def _plan():
     return plan_of("hexa", "time.duration=1")
 
 
+def _carried_off(body, position, motion, flown, push):
+    rows = [
+        np.reshape(one, (-1, *shape)) for one, shape in ((position, (2,)), (motion, motion.shape[-2:]), (flown, (2,)))
+    ]
+    here, moving, commanded = rows
+    moved = body.moved(bodies.Motion(here, moving, here[:, :1]), commanded, push.reshape(-1, 2), 0.013)
+    return tuple(one.reshape(*position.shape[:-1], *one.shape[1:]) for one in moved)
+
+
 def _of_swarms(position, measured, fates, estimate, spread, known):
     return edges.of_swarms(
         _plan().world,
@@ -135,6 +144,14 @@ CASES = {
         lambda before, white, position: PUSH.next(before, white, position, NOMINAL), real(9, 2), real(9, 2), real(9, 2)
     ),
     "world.physics.bodies.carried": of(lambda *motion: bodies.carried(motion, 0.013), *[real(9, 2)] * 4),
+    "world.physics.bodies.Integrators.moved": of(
+        lambda position, motion, flown, push: _carried_off(bodies.Integrators(3), position, motion, flown, push),
+        *(real(2), real(2, 2), real(2), real(2)),
+    ),
+    "world.physics.bodies.Unicycle.moved": of(
+        lambda position, motion, flown, push: _carried_off(bodies.Unicycle(0.3), position, motion, flown, push),
+        *(real(2), real(1, 2), real(2), real(2)),
+    ),
     "world.books.edges.of_swarms": of(
         _of_swarms,
         *(real(10, 2), real(DIRECTED, 2), whole(3, DIRECTED), real(*SLOTS, 2), real(*SLOTS, 3), truth(*SLOTS)),

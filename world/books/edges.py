@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from analysis.models.arrays import Array, Mask
 from netem.medium.verdict import Fate, Fates
 from world.physics import sensors
@@ -57,13 +59,16 @@ def of_swarms(
         shape = of_agents.shape
         return of_agents.reshape(*shape[:axis], swarms, shape[axis] // swarms, *shape[len(shape) + axis + 1 :])
 
+    positions = world.sensor.says_positions  # innovations are of them
     said = each(measured[..., slots, :], -3)
     return EdgesByTick(
         estimate=each(estimate, -3),
         true=each(sensors.relative(position, world.links)[..., slots, :], -3),
         measured=said,
         covariance=each(covariance, -3),
-        R=world.sensor.spread(said),
+        R=world.sensor.spread(said)
+        if positions
+        else np.broadcast_to(np.eye(said.shape[-1]), (*said.shape, said.shape[-1])),
         known=each(known, -2),
-        seen=each(known & (fates == Fate.DELIVERED)[..., slots], -2),
+        seen=each(positions & known & (fates == Fate.DELIVERED)[..., slots], -2),
     )

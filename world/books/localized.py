@@ -28,24 +28,26 @@ class FirstMeasurements:
         Of one run.
     batch
         Shape of the runs: () for one.
+    dimension
+        D.
     """
 
     links: Links
     sensor: Sensor
     batch: tuple[int, ...]
+    dimension: int
     measured: Array = field(init=False)
     seen: Mask = field(init=False)
 
     def __post_init__(self) -> None:
         """Nothing is measured yet."""
-        dimension = len(self.sensor.covariance)
-        self.measured = np.zeros((*self.batch, len(self.links), dimension))
+        self.measured = np.zeros((*self.batch, len(self.links), self.dimension))
         self.seen = np.zeros((*self.batch, len(self.links)), dtype=bool)
 
     @classmethod
     def of(cls, world: World, timeline: Timeline, measured: Array, fates: Fates) -> FirstMeasurements:
         """Those of a whole run: measurements (T, L, D) in every tick, and their verdicts (T, L)."""
-        first = cls(world.links, world.sensor, ())
+        first = cls(world.links, world.sensor, (), world.formation.dimension)
         for tick in range(len(measured)):
             first.tick(timeline, tick, measured[tick], fates[tick])
         return first

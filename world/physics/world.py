@@ -18,6 +18,7 @@ from netem.core.links import Links
 from netem.faults.timeline import Conditions
 from world.formation.nominal import Formation
 from world.physics import bodies, sensors
+from world.physics.bodies import Body, BodyModel, Motion
 from world.physics.disturbance import Disturbance
 from world.physics.noise import normal
 from world.physics.target import MovingTarget, PursuitState
@@ -28,11 +29,8 @@ class Scene(NamedTuple):
 
     Parameters
     ----------
-    position
-        Of the agents, shape (N, D), in metres.
-    motion
-        Their velocities and higher derivatives, as far as the bodies integrate them, shape (N, order - 1, D), in metres per
-        second, per second squared ...: of single integrators, the input they flew in the tick before, shape (N, 1, D).
+    position, motion, pose
+        Of the agents, as `bodies.Motion` has them: shape (N, D), in metres, derivatives (N, K, D), and what else (N, S).
     measured
         What was measured in the tick before, shape (L, D), in metres.
     disturbance
@@ -46,6 +44,12 @@ class Scene(NamedTuple):
     measured: Array
     disturbance: Array
     chase: PursuitState | None
+    pose: Array
+
+    @property
+    def bodies(self) -> Motion:
+        """Where the bodies are, and how they move."""
+        return Motion(self.position, self.motion, self.pose)
 
     @property
     def velocity(self) -> Array:
@@ -65,8 +69,8 @@ class World:
         Tick, in seconds.
     ticks
         How many there are.
-    order
-        Of the bodies: how often they integrate their input to a position; 1 for single integrators.
+    body
+        How they move under their input.
     formation, links, manoeuvre
         Who flies, who is linked to whom, and what the leaders fly.
     sensor
@@ -87,7 +91,7 @@ class World:
     swarm_seeds: NDArray[np.uint64] | None
     dt: float
     ticks: int
-    order: int
+    body: BodyModel
     formation: Formation
     links: Links
     manoeuvre: Manoeuvre
@@ -111,10 +115,10 @@ class World:
         position = offset
         if self.start == "targets":
             position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
-        still = np.zeros_like(position)
-        rest = np.repeat(still[:, None], max(1, self.order - 1), axis=1)
+        still, rest = np.zeros_like(position), self._body.rest(position)
         chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
-        return Scene(position, rest, sensors.relative(position, self.links), still, chase)
+        seen = self.sensor.exact(sensors.relative(position, self.links))
+        return Scene(position, rest.derivatives, seen, still, chase, rest.pose)
 
     def target(self, tick: int | Integers) -> Array:
         """Where the manoeuvre wants every agent in a tick, shape (N, D), or in each of many, shape (T, N, D)."""
@@ -134,11 +138,11 @@ class World:
         return self.pursuit.sighting(tick, self.seed, self._numbers, scene.chase)
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
-        """y_ij of every directed link, shape (L, D), in metres."""
+        """y_ij of every directed link, shape (L, D), in metres, or a unit vector, as the sensor says it."""
         measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
         if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
             return measured
-        size = self._normal(Purpose.OUTLIER_SIZE, tick)
+        size = self._normal(Purpose.OUTLIER_SIZE, tick, self.formation.dimension)
         return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
 
     def outliers(self, tick: int, now: Conditions) -> Mask:
@@ -149,36 +153,44 @@ class World:
 
     def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
         """The inputs that the bodies fly when their agents command these, shape (N, D)."""
-        coasting = scene.velocity if self.order == 1 else np.zeros_like(scene.velocity)
-        return bodies.flown(commanded, coasting, now)
+        return bodies.flown(commanded, self._body.coasting(scene.bodies), now)
 
     def odometry(self, scene: Scene) -> Array | None:
-        """The motion that agents are told, as in `Scene`, shape (N, order - 1, D); single integrators know their input."""
-        return None if self.order == 1 else scene.motion
+        """The derivatives that agents are told, as in `Scene`, shape (N, K, D), unless their input says all."""
+        return scene.motion if self._body.odometry else None
 
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
         noise, still = self._disturb(tick, scene), now.still[:, None]
-        kept = [] if self.order == 1 else [*np.moveaxis(scene.motion, 1, 0)]
-        driven = [*kept, flown]
-        moved = bodies.carried([scene.position, driven[0] + now.push, *driven[1:]], self.dt) + noise
-        led = [bodies.carried(driven[order:], self.dt) for order in range(len(kept))]
-        motion = np.stack([np.where(still, 0.0, each) for each in led] if led else [flown], axis=1)
+        moved = self._body.moved(scene.bodies, flown, now.push, self.dt)
         chase = scene.chase
         if self.pursuit is not None and chase is not None:
             chase = self.pursuit.step(tick, self.seed, self._numbers, chase)
-        return Scene(np.where(still, scene.position, moved), motion, measured, noise, chase)
+        return Scene(
+            position=np.where(still, scene.position, moved.position + noise),
+            motion=np.where(still[..., None], 0.0, moved.derivatives),
+            measured=measured,
+            disturbance=noise,
+            chase=chase,
+            pose=np.where(still, scene.pose, moved.pose),
+        )
+
+    @cached_property
+    def _body(self) -> Body:
+        return self.body.build()
 
     @cached_property
     def _sensor_noise(self) -> DrawnAhead:
         return DrawnAhead(
-            lambda ticks: sensors.noise(self._normal(Purpose.SENSOR_NOISE, ticks[:, None]), self.sensor.covariance)
+            lambda ticks: sensors.noise(
+                self._normal(Purpose.SENSOR_NOISE, ticks[:, None], len(self.sensor.covariance)), self.sensor.covariance
+            )
         )
 
-    def _normal(self, purpose: Purpose, tick: int | Integers) -> Array:
-        """Standard normal draws for every measurement of a tick, shape (..., L, D)."""
+    def _normal(self, purpose: Purpose, tick: int | Integers, axes: int) -> Array:
+        """Standard normal draws for every measurement of a tick, shape (..., L, axes)."""
         src, dst = self.links.ends.values()
-        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=self.formation.dimension)
+        return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=axes)
 
     @property
     def _numbers(self) -> Integers:

@@ -37,7 +37,7 @@ class Places:
         self._origin = origin
         self._dt = world.dt
         self._links = world.links
-        self._first = FirstMeasurements(world.links, world.sensor, ())
+        self._first = FirstMeasurements(world.links, world.sensor, (), world.formation.dimension)
         reach = float(np.ptp(world.formation.nominal, axis=0).max())
         for path, colour in (("swarm/place", _ESTIMATED), ("swarm/optimal", _OPTIMAL)):
             stream.log(path, rr.Points3D.from_fields(radii=0.015 * reach, colors=colour), static=True)

@@ -8,8 +8,8 @@ import re
 from types import FunctionType, ModuleType, TracebackType
 from typing import Any
 
-from agents.loading import modules
-from agents.loading.returned import WrongReturn
+from netem.loading import modules
+from netem.loading.returned import WrongReturn
 from netem.processes.user_code import UserCodeError, definition, is_of_a_signal, place_of, text_of, worded
 
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")

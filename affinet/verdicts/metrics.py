@@ -1,0 +1,111 @@
+"""The metrics of a swarm in a tick, by name: for checkers, and for the figures and claims of studies.
+
+A metric joins by its function in `analysis/metrics` and its line in `METRICS`: then `below("its name", ...)` checks it of a
+run, and a study draws and judges it as a quantity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from affinet.verdicts.evidence import Evidence
+from analysis.metrics import consistency, errors
+from analysis.models.arrays import Array, Mask
+from world.books.edges import EdgesByTick, of_swarms
+from world.physics.world import World
+
+
+class Seen(NamedTuple):
+    """What is looked at of S swarms, in a tick or in many.
+
+    Parameters
+    ----------
+    position
+        Of the agents, shape (..., S, N, D), in metres.
+    present
+        Who takes part, shape (..., S, N).
+    nominal
+        Their places in the formation, shape (N, D), in metres.
+    edges
+        Of all agents.
+    """
+
+    position: Array
+    present: Mask
+    nominal: Array
+    edges: EdgesByTick
+
+
+class Metric(NamedTuple):
+    """What it is called, its unit, and its value of each swarm, shape (..., S)."""
+
+    says: str
+    unit: str
+    of: Callable[[Seen], Array]
+
+
+METRICS: Mapping[str, Metric] = {
+    "procrustes": Metric(
+        "Procrustes error", "m", lambda seen: errors.procrustes_error(seen.position, seen.nominal, seen.present)
+    ),
+    "estimation_error": Metric(
+        "estimation error",
+        "m",
+        lambda seen: errors.estimation_error(seen.edges.estimate, seen.edges.true, seen.edges.known),
+    ),
+    "covariance_trace": Metric(
+        "trace of the covariances",
+        "m²",
+        lambda seen: errors.covariance_trace(seen.edges.covariance, seen.nominal.shape[-1]),
+    ),
+    "nees": Metric(
+        "normalised estimation error squared",
+        "",
+        lambda seen: (
+            consistency.of_errors(seen.edges.estimate, seen.edges.true, seen.edges.covariance, seen.edges.known).mean
+        ),
+    ),
+    "nis": Metric(
+        "normalised innovation squared",
+        "",
+        lambda seen: (
+            consistency.of_innovations(
+                seen.edges.estimate, seen.edges.measured, seen.edges.covariance, seen.edges.R, seen.edges.seen
+            ).mean
+        ),
+    ),
+}
+
+
+def seen(world: World, present: Mask, fates: Any, of_agents: Mapping[str, Any]) -> Seen:
+    """What is looked at of the swarms of a world.
+
+    Parameters
+    ----------
+    world
+        Of the swarms.
+    present
+        Which agents take part, shape (..., S N).
+    fates
+        What became of the measurements, shape (..., L).
+    of_agents
+        `position`, `measured`, `estimate`, `covariance` and `known`, as in `world.books.history.Moment`.
+    """
+    size = world.formation.agents // world.swarms
+    edges = of_swarms(world, fates=fates, **of_agents)
+
+    def by_swarm(array: Any, axis: int) -> Any:
+        return array.reshape(*array.shape[:axis], world.swarms, size, *array.shape[array.ndim + axis + 1 :])
+
+    return Seen(by_swarm(of_agents["position"], -2), by_swarm(present, -1), world.formation.nominal[:size], edges)
+
+
+def of_run(evidence: Evidence, name: str, span: range) -> Array:
+    """A metric in each of these ticks of a run, shape (T,)."""
+    part, arrays = slice(span.start, span.stop), evidence.arrays
+    told = {what: arrays[what][part] for what in ("measured", "estimate", "covariance")}
+    awake = (evidence.awake & evidence.present)[part, :, None]
+    whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
+    looked_at = seen(evidence.plan.world, evidence.present[part], arrays["fates"][part, 0], whole)
+    return METRICS[name].of(looked_at)[..., 0]
