@@ -25,7 +25,7 @@ from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts
 from netem.medium.ledger import NOTHING, Accounts, Ledger
-from netem.medium.verdict import Fate
+from netem.medium.verdict import BY_THE_AIR, Fate
 from netem.processes import system_errors
 
 VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")
@@ -281,7 +281,7 @@ def carried(table: Any, links: Links, *, sensing: bool) -> Carried:
     if not names:
         raise JournalError(f"the journal has no verdicts on {'sensing' if sensing else 'communication'}")
     fate = Recorded(table, links, names).fate
-    offered, lost = fate != Fate.SILENT, fate >= Fate.CLOSED
+    offered, lost = fate != Fate.SILENT, np.isin(fate, BY_THE_AIR)
     by_air = lost | (fate == Fate.DELIVERED) | (fate == Fate.DELAYED)
     share = 1.0 - lost.sum(axis=1) / np.maximum(offered.sum(axis=1), 1)
     return Carried(share, offered.any(axis=(0, 1)), ~by_air.any(axis=1))

@@ -1,7 +1,7 @@
 """What one profile makes of the messages of a tick: which it loses, and how the others arrive.
 
 The layers are independent: each says what it holds, a message passes when none holds it, and it is booked under the strongest
-that does, in the order of `Fate`. To add a loss, see docs/extending.md.
+that does, in the order of `verdict.STRONGEST_FIRST`. To add a loss, see docs/extending.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
 from netem.medium.in_flight import MediumState, Verdicts
 from netem.medium.own_losses import OwnLosses
-from netem.medium.verdict import PASSED, Fate, Fates
+from netem.medium.verdict import PASSED, Fate, Fates, stronger
 
 _SHARED_DRAW = 0
 
@@ -130,7 +130,7 @@ class LinkModel:
         reason = np.full(self._shape, PASSED)
         for fate, held in self._layers(air, tick, impairments, packets, position):
             np.copyto(reason, fate, where=held)
-        reason = np.minimum(reason, imposed)
+        reason = stronger(reason, imposed)
         passed = offered & (reason == PASSED)
         extra_s = packets.extra_s if delay_s is None else packets.extra_s + delay_s
         by_message = delay_s is not None or bool(self._packet_layers)

@@ -22,7 +22,7 @@ from netem.faults.timeline import Conditions, Timeline
 from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
 from netem.medium.link_model import LinkModel, Memory
-from netem.medium.verdict import PASSED, Fate, Fates, doom, standing
+from netem.medium.verdict import PASSED, Fate, Fates, doom, standing, stronger
 
 JOURNAL = "journal.arrows"  # in a run directory
 
@@ -190,9 +190,9 @@ class Medium:
         reason = under.standing
         if under.drops_out:
             unmade = self._sensing & (self._dropouts.at(tick) < now.dropout)
-            reason = np.minimum(reason, np.where(unmade, _DROPOUT, PASSED))
+            reason = stronger(reason, np.where(unmade, _DROPOUT, PASSED))
         if under.loses:
-            reason = np.minimum(reason, np.where(self._scripted.at(tick) < now.loss, _SCRIPTED, PASSED))
+            reason = stronger(reason, np.where(self._scripted.at(tick) < now.loss, _SCRIPTED, PASSED))
         return reason
 
     def _under(self, now: Conditions) -> _Under:
@@ -206,7 +206,7 @@ class Medium:
         deaf = now.paused[links.dst - 1]
         if deaf.any():  # a paused agent measures nothing; what is sent to it is dropped, or waits
             unheard = deaf & (self._sensing | now.pause_drops)
-            held = np.minimum(held, np.where(unheard, _PAUSED, PASSED))
+            held = stronger(held, np.where(unheard, _PAUSED, PASSED))
         return _Under(
             standing=held,
             doom=doom(links, now),

@@ -13,12 +13,15 @@ from netem.faults.timeline import Conditions
 
 Fates = NDArray[np.uint8]
 
-# No layer holds the message: above every reason, so that the strongest reason is the smallest number.
-PASSED = np.uint8(255)
+PASSED = np.uint8(255)  # no layer holds the message
 
 
 class Fate(IntEnum):
-    """What became of a message; from DEAD on, the reason it was dropped, the strongest first."""
+    """What became of a message; from DEAD on, the reason it was dropped.
+
+    The numbers stand in arrays and digests and never change: another reason takes the next one, and its place in
+    `STRONGEST_FIRST`.
+    """
 
     SILENT = 0  # nothing was offered
     DELIVERED = 1
@@ -53,7 +56,20 @@ FATE_OF = {
     Verb.DROPOUT: Fate.DROPOUT,
     Verb.DELAY: Fate.DELAYED,
 }
+STRONGEST_FIRST = (
+    *(Fate.DEAD, Fate.PAUSED, Fate.DEPARTED, Fate.CUT, Fate.PARTITION, Fate.SCRIPTED, Fate.DROPOUT),
+    *(Fate.CLOSED, Fate.RANGE, Fate.JAMMED, Fate.LISTED, Fate.LOST, Fate.OVERFLOW),
+)
 REASONS = tuple(fate for fate in Fate if fate >= Fate.DEAD)
+BY_THE_AIR = (Fate.CLOSED, Fate.RANGE, Fate.JAMMED, Fate.LISTED, Fate.LOST, Fate.OVERFLOW)
+
+_RANK = np.full(256, len(STRONGEST_FIRST), dtype=np.uint8)
+_RANK[list(STRONGEST_FIRST)] = np.arange(len(STRONGEST_FIRST))
+
+
+def stronger(one: Fates, other: Fates) -> Fates:
+    """Of two reasons, or PASSED, the one under which a message is booked that both hold, elementwise."""
+    return np.where(_RANK[one] <= _RANK[other], one, other)
 
 
 def standing(links: Links, now: Conditions) -> Fates:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -290,10 +290,22 @@ def digest(arrays: Arrays) -> str:
     set OPENBLAS_CORETYPE alike to compare (docs/decisions/0001).
     """
     total = hashlib.sha256()
-    for name, array in sorted(arrays.items()):
+    for name, array in _digested(arrays):
         total.update(f"{name}{array.dtype.str}{array.shape}".encode())
         total.update(one_nan(array).tobytes())
     return total.hexdigest()
+
+
+def _digested(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays by name, and what was dropped under way by each reason that occurred: a new one changes no older run."""
+    for name, array in sorted(arrays.items()):
+        if name == "dropped":
+            yield from (
+                (f"{name} {Fate(number).label}", array[:, number])
+                for number in np.flatnonzero(array.any(axis=0)).tolist()
+            )
+        else:
+            yield name, array
 
 
 def one_nan(array: NDArray[Any]) -> NDArray[Any]:

@@ -1,0 +1,49 @@
+"""Reasons: their numbers are in arrays and digests for good, and which is the strongest does not hang on them."""
+
+import numpy as np
+
+from netem.medium.verdict import BY_THE_AIR, FATE_OF, PASSED, REASONS, STRONGEST_FIRST, Fate, stronger
+
+NUMBERS = {
+    "silent": 0,
+    "delivered": 1,
+    "delayed": 2,
+    "dead": 3,
+    "paused": 4,
+    "departed": 5,
+    "cut": 6,
+    "partition": 7,
+    "scripted": 8,
+    "dropout": 9,
+    "closed": 10,
+    "range": 11,
+    "jammed": 12,
+    "listed": 13,
+    "lost": 14,
+    "overflow": 15,
+}
+
+
+def test_no_number_has_changed():
+    assert {fate.label: int(fate) for fate in Fate} == NUMBERS
+
+
+def test_every_reason_has_its_place_among_the_others():
+    assert sorted(STRONGEST_FIRST) == sorted(REASONS)
+    assert set(BY_THE_AIR) <= set(REASONS) - set(FATE_OF.values())
+
+
+def test_a_message_that_two_layers_hold_is_booked_under_the_stronger():
+    order = [*STRONGEST_FIRST, PASSED]
+    one, other = np.meshgrid(np.array(order, dtype=np.uint8), np.array(order, dtype=np.uint8), indexing="ij")
+    place = np.arange(len(order))
+    assert (stronger(one, other) == np.array(order)[np.minimum(place[:, None], place)]).all()
+    assert stronger(one, other).dtype == np.uint8
+
+
+def test_strength_is_no_matter_of_numbers(monkeypatch):
+    turned = np.full(256, 255, dtype=np.uint8)
+    turned[list(reversed(STRONGEST_FIRST))] = np.arange(len(STRONGEST_FIRST))
+    monkeypatch.setattr("netem.medium.verdict._RANK", turned)
+    dead, lost = np.array([Fate.DEAD], dtype=np.uint8), np.array([Fate.LOST], dtype=np.uint8)
+    assert stronger(dead, lost) == stronger(lost, dead) == Fate.LOST
