@@ -4,10 +4,13 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test test-all test-pythons test-wheel lint types imports bench clean
+.PHONY: demo help test test-all test-pythons test-wheel coverage lint types imports picture bench clean
 
 demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
+
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk -F '  ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
 test: lint types imports ## everything that must hold, in minutes
 	$(BIN)/pytest -n 2 --dist loadgroup
@@ -21,15 +24,22 @@ test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every
 test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose modules are called like the rooms
 	$(BIN)/python tests/programs/wheel.py
 
-lint: $(READY)
+coverage: $(READY) ## which lines the tests run, by room, into docs/coverage.md; longer than the tests alone
+	$(BIN)/pytest -n 2 --dist loadgroup --timeout 600 --cov --cov-report=json:.coverage.json --cov-report=
+	$(BIN)/python docs/covered.py .coverage.json
+
+lint: $(READY) ## ruff: errors, and the one format
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-types: $(READY)
+types: $(READY) ## mypy, strict
 	$(BIN)/mypy
 
-imports: $(READY)
+imports: $(READY) ## import-linter: who may know whom
 	$(BIN)/lint-imports
+
+picture: $(READY) ## docs/pictures/house.svg and the contracts in docs/architecture.md, from imports and pyproject.toml
+	$(BIN)/python docs/draw_house.py
 
 bench: $(READY) ## the tick against the floor
 	$(BIN)/python bench/lockstep.py
@@ -40,5 +50,5 @@ $(READY): pyproject.toml uv.lock
 	$(UV) sync --locked --quiet --compile-bytecode
 	touch $@
 
-clean:
+clean: ## without environments and runs
 	rm -rf .venv .venv-3.* runs
