@@ -100,6 +100,15 @@ class Agent:
         The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
         (..., m - 1, D) of integrators of an order m above 1. Bodies that measure a velocity where they are steered by one tell
         what they measure: it is not what they were told.
+
+        Parameters
+        ----------
+        state
+            What it remembers.
+        measured, seen
+            Relative positions, shape (..., n, D), in metres, and which there are, shape (..., n).
+        motion
+            Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
         """
         with Calling(self.estimator, "sense"):
             told = self.estimator.sense(self.brief, state.estimator, measured, seen)
@@ -119,10 +128,22 @@ class Agent:
         motion: Array | None,
         sighting: Sighting | None,
     ) -> tuple[AgentState, AgentAction]:
-        """Estimate from what was heard, and steer; `tick` is what its clock says.
+        """Estimate from what was heard, and steer.
 
-        Only leaders, and those whose law wants it, have their own `position` (..., D); only integrators of an order m
-        above 1 a `motion` (..., m - 1, D); only who pursues a target a `sighting`.
+        Parameters
+        ----------
+        state
+            What it remembers.
+        tick
+            What its clock says.
+        heard
+            By channel.
+        position
+            Its own, shape (..., D), in metres, of leaders and of those whose law wants it.
+        motion
+            Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
+        sighting
+            What its detector says of a target, if it pursues one.
         """
         brief = self.brief
         velocity, higher = (state.input, None) if motion is None else (motion[..., 0, :], motion[..., 1:, :])

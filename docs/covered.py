@@ -1,6 +1,6 @@
 """What coverage.py says of a run of the tests, by room: docs/coverage.md.
 
-    python docs/covered.py COVERAGE.json
+python docs/covered.py COVERAGE.json
 """
 
 from __future__ import annotations
@@ -35,9 +35,8 @@ def page(report: Mapping[str, Any]) -> str:
         [
             "# Coverage",
             "",
-            f"`make coverage` wrote this on {report['meta']['timestamp'][:10]}, with Python {platform.python_version()}:"
-            " lines that `make test` runs.",
-            "Processes of their own are not counted, so that of `process.py`, `carrier.py` and `wire/` more is tested than it says.",
+            f"`make coverage` wrote this on {report['meta']['timestamp'][:10]}, with Python {platform.python_version()}.",
+            "Processes of their own are not counted: of `process.py`, `carrier.py` and `wire/` more is run than it says.",
             "",
             "| room | statements | run |",
             "|---|---|---|",

@@ -131,7 +131,9 @@ def _contract(said: Mapping[str, Any]) -> str:
     else:
         modules, forbidden = (", ".join(said[key]) for key in ("source_modules", "forbidden_modules"))
         held = f"{modules} do not import {forbidden}, {_WAYS[said.get('allow_indirect_imports', False)]}"
-    return textwrap.fill(f"- {said['name']}{within}: {held}.", width=120, subsequent_indent="  ", break_long_words=False)
+    return textwrap.fill(
+        f"- {said['name']}{within}: {held}.", width=120, subsequent_indent="  ", break_long_words=False
+    )
 
 
 class _Panel:

@@ -54,6 +54,15 @@ class Acts:
     def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> messages.Act:
         """The act that came on a key, its numbers as arrays.
 
+        Parameters
+        ----------
+        key, data
+            As it came.
+        tick
+            In which the world is.
+        awaited
+            Agents whose act is to come.
+
         Raises
         ------
         WireError

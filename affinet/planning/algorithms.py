@@ -66,6 +66,15 @@ def refuse_late(given: Scenario, name: str, wants: Wants) -> None:
 def refuse_absent(faults: Sequence[Fault], name: str, wants: Wants, centre: CheckedCentre | None) -> None:
     """Refuse that agents are killed or paused where an algorithm of this name, or a centre, wants everybody.
 
+    Parameters
+    ----------
+    faults
+        What is scripted.
+    name, wants
+        The algorithm, and what it wants.
+    centre
+        The filter that hears everybody, if there is one.
+
     Raises
     ------
     ScenarioError

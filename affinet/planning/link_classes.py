@@ -165,6 +165,15 @@ def _possible(one: LinkClass) -> LinkClass:
 def select(selector: str, formation: Formation, links: Links, key: str) -> list[int]:
     """Rows of the links that a selector names.
 
+    Parameters
+    ----------
+    selector
+        As a scenario says it.
+    formation, links
+        Who flies, and over which links.
+    key
+        That says the selector, for error messages.
+
     Raises
     ------
     ScenarioError

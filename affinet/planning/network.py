@@ -35,7 +35,16 @@ _ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
 def plan(
     given: Scenario, formation: Formation, links: Links, message_bits: Array, ruled: Mask | None = None
 ) -> tuple[Profile, tuple[Finding, ...]]:
-    """The air of a scenario, and what is to be said of it; `ruled` are the links that ever meet it, shape (L,), if not all.
+    """The air of a scenario, and what is to be said of it.
+
+    Parameters
+    ----------
+    given, formation, links
+        The scenario, who flies, and over which links.
+    message_bits
+        Size of a message on each channel, shape (C,).
+    ruled
+        The links that ever meet it, shape (L,), if not all.
 
     Raises
     ------

@@ -50,7 +50,14 @@ def silent_tick(agents: Agent, centre: CheckedCentre | None) -> Mapping[str, tup
 def alone(agent: Callable[[int], Agent], positioned: Mask, told_mission: Mask, centre: CheckedCentre | None) -> None:
     """One agent of each kind by itself, as in a process of its own: with no leading axes, and no more than it is told.
 
-    Kinds differ in whether they are told where they are, and the manoeuvre, shapes (N,).
+    Parameters
+    ----------
+    agent
+        Makes the agent of a row.
+    positioned, told_mission
+        Who is told where it is, and the manoeuvre, shape (N,).
+    centre
+        The filter that hears everybody, if there is one.
 
     Raises
     ------

@@ -50,6 +50,8 @@ class Child:
         Whether it said why it goes down.
     is_ready, is_done
         Whether it has told so.
+    rss_mb
+        The most memory it was seen to take, in megabytes.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
     looks

@@ -134,6 +134,15 @@ def rows(selector: str, formation: Formation, links: Links, lot: ChoiceKey | Non
 
     An agent or a role alone names all links from it and to it.
 
+    Parameters
+    ----------
+    selector
+        Of links, as a scenario says it.
+    formation, links
+        Who flies, and over which links.
+    lot
+        What a random selector draws by.
+
     Raises
     ------
     ValueError
@@ -163,6 +172,15 @@ def pairs(
     selectors: Sequence[str], formation: Formation, links: Links, lot: ChoiceKey | None = None
 ) -> tuple[tuple[int, int], ...]:
     """The directed links (src, dst) that any of the selectors names, each once.
+
+    Parameters
+    ----------
+    selectors
+        Of links, as a scenario says them.
+    formation, links
+        Who flies, and over which links.
+    lot
+        What random selectors draw by.
 
     Raises
     ------

@@ -58,6 +58,15 @@ def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[A
 
     The first derivative that the model leaves out is the noise that drives it, a fresh one in every tick; those beyond are 0.
     The rest moves exactly as in `motion`.
+
+    Parameters
+    ----------
+    model
+        Of motion.
+    dimension, dt
+        D, and the tick, in seconds.
+    sigma_w
+        Deviation of the noise that drives it.
     """
     order = ORDER[model]
     taylor = np.array([[1.0, dt, dt * dt / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])

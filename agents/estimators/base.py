@@ -40,6 +40,8 @@ class Centre(Protocol[State]):
 
         Parameters
         ----------
+        state
+            What it remembers.
         measured, seen
             Relative positions, shape (..., N, n, D), in metres, and which were made, shape (..., N, n).
         inputs

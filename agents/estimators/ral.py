@@ -80,7 +80,16 @@ class RelativeAffineLocalization(Estimator[Perceived]):
 def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric: Array, psi: Array) -> Estimate:
     """Measured edges as measured, the others from a shape (Algorithm 2, lines 9-13, by the errata).
 
-    `geometric` is the covariance of the shape's edges, shape (..., n, D, D).
+    Parameters
+    ----------
+    brief, perceived
+        Its place in the formation, and what it measured and heard.
+    shape
+        Fitted to its edges.
+    geometric
+        Covariance of the shape's edges, shape (..., n, D, D), in square metres.
+    psi
+        Its convergence indicator, shape (...).
     """
     seen = perceived.seen
     relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))

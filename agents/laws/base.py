@@ -44,7 +44,16 @@ class Law(Protocol[State]):
     ) -> tuple[State, Array]:
         """The input of this tick, shape (..., D), in metres per second, or per second squared.
 
-        `inputs` is what the neighbours said of theirs.
+        Parameters
+        ----------
+        brief, state
+            Its place in the formation, and what it remembers.
+        tick, own
+            What its clock says, and what it knows of itself.
+        estimate
+            What its estimator believes of its edges.
+        inputs
+            What the neighbours said of theirs.
         """
 
     @property

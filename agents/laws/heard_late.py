@@ -31,6 +31,8 @@ def finding(law: Relaxed, swarm: SwarmBrief, inputs: str, instead: str = "") -> 
 
     Parameters
     ----------
+    law, swarm
+        Which law, and whom it is to fly.
     inputs
         What they are: velocities, or accelerations.
     instead

@@ -16,6 +16,8 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
 
     Parameters
     ----------
+    brief, mission, tick
+        Its place in the formation, the manoeuvre, and what its clock says.
     gain
         Of the pull, per second.
     position
@@ -32,8 +34,12 @@ def hold_distances(brief: Brief, gain: float, estimate: Estimate) -> Array:
 
     Parameters
     ----------
+    brief
+        Its place in the formation.
     gain
         Per second and square metre.
+    estimate
+        What it believes of its edges.
     """
     z, p = estimate.relative, brief.relative
     stretch = (z * z).sum(axis=-1) - (p * p).sum(axis=-1)
@@ -53,6 +59,8 @@ def pilot_of_accelerations(
 
     Parameters
     ----------
+    brief, mission, tick
+        Its place in the formation, the manoeuvre, and what its clock says.
     gain
         Natural frequency of the pull, per second.
     position, velocity

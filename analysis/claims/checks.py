@@ -41,6 +41,15 @@ def approaches(says: str, mean_errors: Array, others: Array, share: float) -> Cl
     """From the last case to the first of (S, R), the mean at least doubles, and comes nearest to the other's, to a share of it.
 
     The last case, where nothing is lost and both may be the same, is where it starts from; nearer counts among the others.
+
+    Parameters
+    ----------
+    says
+        The claim.
+    mean_errors, others
+        Of one and of the other, shape (S, R).
+    share
+        How near it comes, as a share of the other's.
     """
     means = _mean(mean_errors)
     ratio, growth = means / _mean(others), float(means[0] / means[-1])
@@ -62,6 +71,15 @@ def ratio(says: str, values: Array, others: Array, between: Sequence[float]) -> 
     """The mean of runs (R,) over that of others lies in an interval, and so does its 95 % confidence interval in part.
 
     Runs are paired by their draws; the confidence interval is the delta method's.
+
+    Parameters
+    ----------
+    says
+        The claim.
+    values, others
+        Of the runs, and of those they are paired with, shape (R,).
+    between
+        The ends of the interval.
     """
     found = float(values.mean() / others.mean())
     deviation = (values - found * others).std(ddof=1) / np.sqrt(len(values)) / abs(others.mean())

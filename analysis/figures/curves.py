@@ -44,7 +44,16 @@ def curves(
 ) -> None:
     """A quantity over time: a panel for each label of the first axis and each of the second, a curve for each of the third.
 
-    A bound is a dashed line, with what it says.
+    Parameters
+    ----------
+    path, title
+        The file to draw, and what stands above.
+    cases, axes
+        The curves, and the axes by which they are laid out.
+    quantity
+        What is drawn, with its unit.
+    bound
+        A dashed line, and what it says.
     """
     across, down, each = axes
     columns, rows = _labels(cases, across), _labels(cases, down)
@@ -69,6 +78,17 @@ def consistency(
 
     Their mean over the runs, of filters whose covariances tell the truth, lies in the grey band with 95 %: that of one edge in
     every run, and the more surely that of the mean over many.
+
+    Parameters
+    ----------
+    path, title
+        The file to draw, and what stands above.
+    normalised
+        The curves of each row, by what they are.
+    axes
+        By which panels and curves are laid out.
+    dimension
+        Of an error, D.
     """
     across, down, each = axes
     first = next(iter(normalised.values()))
@@ -181,6 +201,13 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
     """Mean error over a grid: a panel for each label of the first axis, rows and columns for those of the second and third.
 
     A cell has a cross where the formation is lost for good: the mean over the runs is above 1 m² at the end.
+
+    Parameters
+    ----------
+    path, title
+        The file to draw, and what stands above.
+    cases, axes
+        The curves, and the axes of the grid.
     """
     across, down, each = axes
     panels, rows, columns = (_labels(cases, axis) for axis in (across, down, each))

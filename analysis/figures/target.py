@@ -68,6 +68,15 @@ def agreement(path: Path, title: str, seconds: Array, fused: Array, known: Array
     """What agents agree on, and the mean of what they know, with derivatives: a row for each derivative (paper 002, Fig. 4).
 
     Shapes (T, N, m + 1), of one number that they agree on; on the left the whole run, on the right its last tenth.
+
+    Parameters
+    ----------
+    path, title
+        The file to draw, and what stands above.
+    seconds
+        Of the ticks, shape (T,).
+    fused, known
+        What each agent agreed on, and what it knew by itself, shapes (T, N, m + 1).
     """
     rows = fused.shape[-1]
     figure = Figure(figsize=(9.0, 2.0 * rows), layout="constrained", dpi=130)

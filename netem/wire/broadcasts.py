@@ -35,6 +35,15 @@ class Broadcasts:
     def read(self, key: str, data: bytes, tick: int, awaited: Container[tuple[int, str]]) -> messages.Broadcast:
         """The broadcast that came on a key, which access control leaves to one agent.
 
+        Parameters
+        ----------
+        key, data
+            As it came.
+        tick
+            In which the medium is.
+        awaited
+            Agents and channels that are to come.
+
         Raises
         ------
         WireError

@@ -94,6 +94,10 @@ class Moments:
     ----------
     first
         The first tick.
+    position, measured, input, estimate, known, covariance, psi, feasible, reports
+        As of a `Moment`.
+    fates
+        Verdicts on what was offered, shape (T, C, L).
     target
         Where the manoeuvre wants the agents, shape (T, N, D), in metres.
     error
