@@ -24,8 +24,8 @@ test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every
 test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose modules are called like the rooms
 	$(BIN)/python tests/programs/wheel.py
 
-coverage: $(READY) ## which lines the tests run, by room, into docs/coverage.md; longer than the tests alone
-	$(BIN)/pytest -n 2 --dist loadgroup --timeout 600 --cov --cov-report=json:.coverage.json --cov-report=
+coverage: $(READY) ## which lines the tests in this process run, by room, into docs/coverage.md
+	$(BIN)/pytest -n 2 --timeout 600 -m "not slow and not xdist_group" --cov --cov-report=json:.coverage.json --cov-report=
 	$(BIN)/python docs/covered.py .coverage.json
 
 lint: $(READY) ## ruff: errors, and the one format
