@@ -63,6 +63,12 @@ def test_where_the_page_points_to_is_there(path):
     assert (ROOT / path).exists()
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_between_files_lead_somewhere(page):
+    links = re.findall(r"\]\(([^)\s#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    assert [link for link in links if "://" not in link and not (page.parent / link).exists()] == []
+
+
 def test_the_page_names_enough():
     assert len(NAMES) > 40
     assert len(PATHS) > 20

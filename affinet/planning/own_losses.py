@@ -53,7 +53,18 @@ def of_class(one: LinkClass, own: OwnModules) -> tuple[OwnLoss, ...]:
 
 
 def try_out(losses: Sequence[OwnLoss], links: Links, dt: float, nominal: Array, *, coupled: bool) -> None:
-    """Have each rule a tick in which all agents are at their nominal positions (N, D), in metres.
+    """Have each rule a tick in which all agents are at their nominal positions.
+
+    Parameters
+    ----------
+    losses, links
+        Which, and over which links.
+    dt
+        Tick, in seconds.
+    nominal
+        Nominal positions, shape (N, D), in metres.
+    coupled
+        Whether all channels of a link share a verdict.
 
     Raises
     ------
