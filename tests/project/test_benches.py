@@ -2,27 +2,29 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from flying import PROCESSES
+from paths import BENCH, ROOT
 
 pytestmark = PROCESSES
 
-HERE = Path(__file__).parent
-BENCH = HERE.parent / "bench"
 SMALLEST = {
     "lockstep": (("--ticks", "5", "--rounds", "1", "--swarms", "corridor"), "| corridor, 7 agents | "),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }
-ELSEWHERE = {"accuracy": "test_models.py", "kills": "test_kills.py", "redcho": "test_redcho.py"}
+ELSEWHERE = {
+    "accuracy": "netem/impairments/test_models.py",
+    "kills": "system/test_kills.py",
+    "redcho": "agents/algebra/test_redcho.py",
+}
 STARTED_BY = {"floor": "lockstep"}
 
 
 def test_no_script_is_left_out():
     scripts = {file.stem for file in BENCH.glob("*.py") if '__name__ == "__main__"' in file.read_text()}
     assert scripts == {*SMALLEST, *ELSEWHERE, *STARTED_BY}
-    assert all(f'"{script}.py"' in (HERE / file).read_text() for script, file in ELSEWHERE.items())
+    assert all(f'"{script}.py"' in (ROOT / "tests" / file).read_text() for script, file in ELSEWHERE.items())
 
 
 @pytest.mark.parametrize("script", SMALLEST)

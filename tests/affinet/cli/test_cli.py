@@ -4,13 +4,11 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 from flying import PROCESSES
+from paths import ROOT
 
 pytestmark = PROCESSES
-
-ROOT = Path(__file__).parents[1]
 
 
 def affinet(*arguments, cwd=ROOT):

@@ -5,6 +5,7 @@ import inspect
 from pathlib import Path
 
 import pytest
+from paths import ROOT
 
 from affinet.runtimes.run import rehearse
 from affinet.scenario.sections import ScenarioError
@@ -12,8 +13,8 @@ from affinet.testing.swarm import Swarm, SwarmRuns
 
 FAILURES = (AssertionError, ScenarioError, LookupError)
 MODULES = [
-    importlib.import_module(f"faults.{file.stem}")
-    for file in sorted((Path(__file__).parent / "faults").glob("test_*.py"))
+    importlib.import_module(f"tests.faults.{file.stem}")
+    for file in sorted((ROOT / "tests" / "faults").glob("test_*.py"))
 ]
 GALLERY = [test for module in MODULES for name, test in vars(module).items() if name.startswith("test_")]
 

@@ -24,7 +24,9 @@ def test_a_row_alone_has_the_bits_of_a_row_of_a_batch(name):
 def test_no_array_function_is_forgotten():
     flown = {name for name in surface.functions() if name.rpartition(".")[0] in surface.by_entry_point()}
     forgotten = set(surface.functions()) - COVERED - flown - set(exempt.NAMES)
-    assert not forgotten, f"give {sorted(forgotten)} a case in tests/rows, or a reason in tests/rows/exempt.py"
+    assert not forgotten, (
+        f"give {sorted(forgotten)} a case in tests/helpers/rows, or a reason in tests/helpers/rows/exempt.py"
+    )
 
 
 def test_no_name_is_out_of_date_or_twice():

@@ -2,12 +2,12 @@
 
 import runpy
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from briefs import of_all
 from flying import plan_of
+from paths import BENCH
 from scripted import timeline
 
 from affinet.runtimes.run import rehearse
@@ -116,12 +116,12 @@ def test_information_that_is_heard_late_is_told_of(fusion, late):
 # The bench
 
 
-BENCH = Path(__file__).parents[1] / "bench" / "redcho.py"
+LIMITS = BENCH / "redcho.py"
 
 
 def bench(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", [str(BENCH), *arguments])
-    runpy.run_path(str(BENCH), run_name="__main__")
+    monkeypatch.setattr(sys, "argv", [str(LIMITS), *arguments])
+    runpy.run_path(str(LIMITS), run_name="__main__")
 
 
 def test_the_bench_prints_a_row_for_each_step_and_gain(monkeypatch, capsys):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from flying import PROCESSES, TRIANGLE, plan_of
+from paths import PROGRAMS
 
 from affinet.cli import commands
 from affinet.runtimes import launcher
@@ -20,7 +21,6 @@ from netem.medium import journal
 from netem.medium.medium import JOURNAL
 from netem.wire.session import Login
 
-PROGRAMS = Path(__file__).parent / "programs"
 OFFERED = 10 * 6 * 3  # ticks, links, channels
 
 # All that accounts have to follow: delays, copies, losses, queues, a kill, a partition that holds what is under way.

@@ -1,7 +1,8 @@
 """Which Pythons the matrix tries, what it says of them, and that it fails when one fails."""
 
 import pytest
-from programs import pythons
+
+from tests.programs import pythons
 
 
 def interpreter(folder, name, script):

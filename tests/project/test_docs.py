@@ -8,6 +8,7 @@ from typing import get_args
 
 import pytest
 from flying import PROCESSES, digest_of, plan_of
+from paths import ROOT
 
 from affinet.planning import plan as planning
 from affinet.runtimes.run import fly, rehearse
@@ -16,7 +17,7 @@ from affinet.studies import study
 
 pytestmark = PROCESSES
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = ROOT / "docs"
 
 
 def test_the_estimator_of_the_docs_flies_in_both_runtimes(tmp_path, out, monkeypatch):

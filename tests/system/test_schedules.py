@@ -7,7 +7,6 @@ import pytest
 from flying import PROCESSES, plan_of
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
-from test_runtimes import OCTAHEDRON
 
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
@@ -16,6 +15,7 @@ from affinet.scenario import verbs as verb_models
 from affinet.scenario.sections import ScenarioError
 from affinet.testing import strategies
 from affinet.verdicts import checkers
+from tests.system.test_runtimes import OCTAHEDRON
 
 pytestmark = PROCESSES
 

@@ -5,7 +5,8 @@ import zipfile
 
 import laying
 import pytest
-from programs import wheel
+
+from tests.programs import wheel
 
 MODULES = {"agents.brief", "netem", "netem.core.links", "world"}
 LAID = [

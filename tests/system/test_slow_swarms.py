@@ -1,11 +1,11 @@
 """A slow swarm is not a stalled one: a hundred processes on two cores, batches of five hundred ticks, agents that think."""
 
 import sys
-from pathlib import Path
 
 import pytest
 import tomli_w
 from flying import PROCESSES, TRIANGLE, plan_of
+from paths import PROGRAMS
 
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.run import fly
@@ -13,7 +13,6 @@ from world.books import history
 
 pytestmark = PROCESSES
 
-PROGRAMS = Path(__file__).parent / "programs"
 SIDE = 10
 
 

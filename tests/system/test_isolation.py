@@ -2,16 +2,14 @@
 
 import json
 import sys
-from pathlib import Path
 
 from flying import PROCESSES, digest_of, plan_of
+from paths import PROGRAMS
 
 from affinet.runtimes.launcher import Launcher
 from world.books import history
 
 pytestmark = PROCESSES
-
-PROGRAMS = Path(__file__).parent / "programs"
 
 
 def fly(plan, out, **programs):

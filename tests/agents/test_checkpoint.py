@@ -12,6 +12,7 @@ import pytest
 from flying import plan_of
 from offered import by_affinet
 from own_code import ESTIMATOR
+from paths import HELPERS
 
 from affinet.scenario.sections import INTEGRATORS
 from agents import checkpoint
@@ -184,7 +185,7 @@ def test_estimators_of_other_packages_are_not_tested_as_ours(tmp_path):
         "for group, what in ((ESTIMATORS, 'estimators'), (LAWS, 'controllers')):\n"
         "    assert set(names(group)) - by_affinet(what).names == {'stranger'}\n"
     )
-    beside = os.pathsep.join([str(tmp_path), str(Path(__file__).parent)])
+    beside = os.pathsep.join([str(tmp_path), str(HELPERS)])
     done = subprocess.run(
         [sys.executable, "-c", program],
         env=os.environ | {"PYTHONPATH": beside},

@@ -3,10 +3,10 @@
 import subprocess
 import sys
 from itertools import pairwise, product
-from pathlib import Path
 
 import numpy as np
 import pytest
+from paths import BENCH
 from scipy import stats
 from scipy.special import ndtr
 
@@ -606,7 +606,7 @@ def test_a_period_of_one_is_always_open():
 
 
 def accuracy(*options):
-    bench = Path(__file__).parents[1] / "bench" / "accuracy.py"
+    bench = BENCH / "accuracy.py"
     return subprocess.run([sys.executable, str(bench), *options], capture_output=True, text=True, check=False)
 
 

@@ -2,18 +2,18 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from flying import PROCESSES
+from paths import BENCH
 
 pytestmark = PROCESSES
 
-BENCH = Path(__file__).parents[1] / "bench" / "kills.py"
+KILLS = BENCH / "kills.py"
 
 
 def killed(role, moment, *options):
-    command = [sys.executable, str(BENCH), "--kills", "1", "--only", role, "--moments", moment, moment, *options]
+    command = [sys.executable, str(KILLS), "--kills", "1", "--only", role, "--moments", moment, moment, *options]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 

@@ -1,6 +1,6 @@
 """A target that is found with a latency: filters against textbooks and finite differences, consensus, the law, the runs."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
 from math import factorial
@@ -24,7 +24,6 @@ from affinet.studies.batch import fly_all
 from agents.algebra.redcho import Consensus
 from agents.brief import Own
 from agents.estimate import Estimate
-from agents.estimators.none import NoEstimator
 from agents.estimators.target import TargetEstimator
 from agents.exchange import Heard
 from agents.laws.pursuit import Pursuit
@@ -1292,21 +1291,8 @@ def test_with_the_mean_derivatives_are_the_agents_own_where_wanted():
 # Reports
 
 
-@dataclass(frozen=True)
-class Reporting(NoEstimator):
-    """Says something under a name that is given."""
-
-    name: str = "said"
-
-    def fuse(self, brief, state, heard, own):
-        state, estimate = super().fuse(brief, state, heard, own)
-        batch = estimate.known.shape[:-1]
-        number = np.arange(np.prod(batch, dtype=int) * 3.0).reshape(*batch, 3)
-        return state, estimate._replace(reports={self.name: number})
-
-
 def reporting(name):
-    return 'agents.estimator="test_pursuit:Reporting"', f'agents.parameters.test_pursuit:Reporting.name="{name}"'
+    return 'agents.estimator="reporting:Reporting"', f'agents.parameters.reporting:Reporting.name="{name}"'
 
 
 @pytest.mark.parametrize("name", ["position", "error", "fates", "target", "psi", "known"])

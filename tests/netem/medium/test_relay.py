@@ -1,11 +1,11 @@
 """The relay, one piece for every runtime: what is said is kept while it may be heard, and what is decided ahead is no past."""
 
 import ast
-from pathlib import Path
 
 import numpy as np
 import pytest
 from airs import quiet_profile
+from paths import ROOT
 
 from netem.core.links import Links
 from netem.faults.control import Order, OrderAction
@@ -16,7 +16,6 @@ from netem.medium.medium import Medium
 from netem.medium.relay import Relay, changed_on_the_way
 from netem.medium.verdict import Fate
 
-ROOT = Path(__file__).resolve().parent.parent
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 CHANNELS = ("sense", "input", "theta")
 

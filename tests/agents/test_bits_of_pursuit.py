@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import test_bits
 from flying import plan_of
 from rows.surface import by_entry_point
 
@@ -13,6 +12,7 @@ from agents.estimators.centralized import CentralizedFilter
 from agents.estimators.target import TargetEstimator
 from agents.laws.pursuit import Pursuit as PursuitLaw
 from analysis.models.pursuit import Sighting
+from tests.agents import test_bits
 
 TICKS = 40
 ESTIMATORS = {
@@ -61,6 +61,6 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator):
 
 def test_every_estimator_and_law_is_called_alone_and_in_a_batch():
     flown = [*test_bits.ESTIMATORS.values(), *test_bits.LAWS.values(), *ESTIMATORS.values(), PursuitLaw()]
-    told = {CentralizedFilter}  # what its centre decides is a row of tests/rows; itself passes it on
+    told = {CentralizedFilter}  # what its centre decides is a row of tests/helpers/rows; itself passes it on
     classes = {f"{kind.__module__}.{kind.__name__}" for kind in {*map(type, flown), *told}}
     assert by_entry_point() == classes
