@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 OLDEST = 11
-TESTS = ("tests/test_wire.py", "tests/test_bits.py", "tests/test_runtimes.py")
+TESTS = ("tests/netem/wire/test_wire.py", "tests/agents/test_bits.py", "tests/system/test_runtimes.py")
 _NAME = re.compile(r"python3\.(\d+)")
 _VERSION = "import sys, venv; print('.'.join(map(str, sys.version_info[:3])))"
 

@@ -1,0 +1,61 @@
+"""Who can pursue a target, and who is refused in one line."""
+
+import pytest
+from flying import plan_of
+from pursuits import ALONE, NAME, SINGLE, TRIPLE, bodies, refusal
+
+from agents.laws.pursuit import Pursuit
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (('agents.estimator="none"',), "the estimator has to report them"),
+        (("target.order=1", ALONE), "derivatives up to 2"),
+        (('agents.estimator="none"', *SINGLE), "derivatives up to 1"),
+        (("target.order=1",), "a target of order 1 needs 2 gains k and gamma"),
+        (('agents.parameters.target={output="optimal"}',), "fusion = 'redcho' wants output = 'smooth'"),
+        (('agents.parameters.target={output="optimal",fusion="mean"}',), "fusion = 'mean' wants output = 'smooth'"),
+        (('agents.parameters.target={fusion="median"}',), '"redcho", "mean" or "none", got "median"'),
+        (
+            (*bodies(3, 1, 3, 3), ALONE),
+            "up to 3: the estimator has to report them, and the target to be of order 3 at least",
+        ),
+        (bodies(2, 1), "bodies are double-integrators; set it to 'single-integrator'"),
+        (bodies(2, 1, 3, 3), "pursuit steers jerks, and bodies are double-integrators; set it to 'triple-integrator'"),
+        (bodies(3, 1, 4, 6, 4), "pursuit steers snaps, and bodies are triple-integrators; set it to 'quadruple-i"),
+        (bodies(4, 1, 2), "pursuit steers accelerations, and bodies are quadruple-integrators; set it to 'double-i"),
+        (bodies(2), "agents.parameters.pursuit: kappa needs a gain for each of 1 to 4 times that bodies integrate"),
+        (bodies(2, 1, -1), "agents.parameters.pursuit: with kappa [1.0, -1.0] agents leave the reference"),
+        ((*TRIPLE, ALONE, "formation.leaders=[1,2,3]"), "formation.leaders: who leads is steered by velocities or acc"),
+        (("agents.parameters.target.alpha=0.0",), "alpha must be above 0"),
+        (("target.latencies=[0.5,0.0031]",), "target.latencies"),
+        (("target.latencies=[0.5]",), "a variance for each latency"),
+        (("target.position=[1,2,3]",), "target.position"),
+    ],
+)
+def test_what_cannot_pursue_is_refused_in_one_line(overrides, says):
+    assert says in refusal(*overrides)
+
+
+def test_latencies_that_are_no_whole_number_of_ticks_are_named():
+    said = refusal("target.latencies=[0.105,0.1]", "time.dt=0.01")
+    assert "target.latencies: [0.105, 0.1] s are not whole numbers of ticks of 0.01 s" in said
+
+
+def test_an_estimator_of_a_target_needs_one():
+    assert "give the scenario a [target]" in refusal('agents.estimator="target"', name="localization")
+    assert "give the scenario a [target]" in refusal('agents.estimator="target"', ALONE, name="localization")
+
+
+def test_gains_of_the_laws_are_read_from_the_scenario():
+    assert plan_of(NAME, "agents.parameters.pursuit={kappa=[4.0,5.0]}").law.build() == Pursuit([4.0, 5.0])
+    for order in (1, 2, 3, 4):
+        kappa = [[1.0], [1.0, 5.0], [1.0, 5.0, 2.0], [1.0, 5.0, 8.0, 7.0]][order - 1]
+        made = plan_of(NAME, *bodies(order, *kappa), f"target.order={order}", ALONE)
+        assert (made.law.build(), made.scenario.dynamics.order, made.agents.law.order) == (Pursuit(kappa), order, order)
+
+
+def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
+    for overrides in (SINGLE, ()):
+        assert plan_of(NAME, *overrides, "formation.leaders=[1,2,3]").world.formation.is_leader.sum() == 3

@@ -1,0 +1,8 @@
+"""Where the repository is, and what tests start and look at."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+BENCH = ROOT / "bench"
+HELPERS = ROOT / "tests" / "helpers"
+PROGRAMS = ROOT / "tests" / "programs"

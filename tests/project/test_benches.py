@@ -1,0 +1,37 @@
+"""Every script in bench/ runs, at its smallest size."""
+
+import subprocess
+import sys
+
+import pytest
+from flying import PROCESSES
+from paths import BENCH, ROOT
+
+pytestmark = PROCESSES
+
+SMALLEST = {
+    "lockstep": (("--ticks", "5", "--rounds", "1", "--swarms", "corridor"), "| corridor, 7 agents | "),
+    "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
+}
+ELSEWHERE = {
+    "accuracy": "netem/impairments/test_models.py",
+    "kills": "system/test_kills.py",
+    "redcho": "agents/algebra/test_redcho.py",
+}
+STARTED_BY = {"floor": "lockstep"}
+
+
+def test_no_script_is_left_out():
+    scripts = {file.stem for file in BENCH.glob("*.py") if '__name__ == "__main__"' in file.read_text()}
+    assert scripts == {*SMALLEST, *ELSEWHERE, *STARTED_BY}
+    assert all(f'"{script}.py"' in (ROOT / "tests" / file).read_text() for script, file in ELSEWHERE.items())
+
+
+@pytest.mark.parametrize("script", SMALLEST)
+def test_a_script_runs_at_its_smallest_size(script):
+    # lockstep.py died of a TypeError: messages had got fields it did not give.
+    size, row = SMALLEST[script]
+    command = [sys.executable, str(BENCH / f"{script}.py"), *size]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert row in done.stdout

@@ -1,0 +1,47 @@
+"""A sample of `bench/kills.py`, which kills any process of a run at any moment and looks at what is left."""
+
+import subprocess
+import sys
+
+import pytest
+from flying import PROCESSES
+from paths import BENCH
+
+pytestmark = PROCESSES
+
+KILLS = BENCH / "kills.py"
+
+
+def killed(role, moment, *options):
+    command = [sys.executable, str(KILLS), "--kills", "1", "--only", role, "--moments", moment, moment, *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+# Seconds from the victim's start: the launcher while its children log in, the world while it imports, the others in flight.
+@pytest.mark.parametrize(
+    ("role", "moment"),
+    [
+        ("launcher", "2.2"),
+        ("world", "0.5"),
+        pytest.param("netem", "3", marks=pytest.mark.slow),
+        pytest.param("agents", "3.5", marks=pytest.mark.slow),
+    ],
+)
+def test_a_kill_at_any_moment_leaves_nothing_but_what_can_be_read(role, moment):
+    bench = killed(role, moment)
+    assert bench.returncode == 0, bench.stdout + bench.stderr
+
+
+@pytest.mark.parametrize("moment", ["1.8", pytest.param("2.6", marks=pytest.mark.slow)])
+def test_ctrl_c_while_it_starts_leaves_in_order(moment):
+    bench = killed("ctrl-c", moment)
+    assert bench.returncode == 0, bench.stdout + bench.stderr
+
+
+def test_a_row_that_is_not_ok_says_what_was_wrong_and_how_to_see_it_again(tmp_path):
+    scenario = tmp_path / "brief.toml"
+    scenario.write_text("this cannot fly")
+    bench = killed("launcher", "60", "--scenario", str(scenario), "--seed", "7")
+    assert bench.returncode == 1
+    assert "| launcher | 1 | 1 | 1 | 0 |" in bench.stdout
+    assert "--seed 7: launcher after 60.000 s: it had ended before it was killed" in bench.stdout
