@@ -4,7 +4,7 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo help test test-all test-pythons test-wheel coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel coverage lint types imports picture bench clean
 
 demo: $(READY) ## fly the corridor over processes
 	$(BIN)/affinet run corridor
@@ -14,6 +14,9 @@ help: ## this list
 
 test: lint types imports ## everything that must hold, in minutes
 	$(BIN)/pytest -n 2 --dist loadgroup
+
+test-room: $(READY) ## a room's own tests, in seconds, without flights over processes: make test-room ROOM=netem/medium
+	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
 test-all: lint types imports ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
