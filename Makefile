@@ -28,7 +28,10 @@ test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose mod
 	$(BIN)/python tests/programs/wheel.py
 
 coverage: $(READY) ## which lines the tests in this process run, by room, into docs/coverage.md
-	$(BIN)/pytest -n 2 --timeout 600 -m "not slow and not xdist_group" --cov --cov-report=json:.coverage.json --cov-report=
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest -n 2 --timeout 600 -m "not slow and not xdist_group"
+	$(BIN)/coverage combine -q
+	$(BIN)/coverage json -q -o .coverage.json
 	$(BIN)/python docs/covered.py .coverage.json
 
 lint: $(READY) ## ruff: errors, and the one format
