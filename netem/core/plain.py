@@ -15,6 +15,8 @@ T = TypeVar("T")
 # Kinds of numbers that will do for an array of a kind.
 _KINDS = {"b": "b", "i": "i", "u": "iu", "f": "iuf"}
 
+_WHOLE = 2**53  # up to here every whole number is a float
+
 
 class PlainError(ValueError):
     """What was wrong in a plain value, and in which field."""
@@ -88,4 +90,6 @@ def shown(given: Any) -> str:
 
 
 def _holds(dtype: np.dtype[Any], array: np.ndarray[Any, Any]) -> bool:
+    if dtype.kind == "f" and array.dtype.kind in "iu":
+        return bool(((array <= _WHOLE) & (array >= -_WHOLE)).all())
     return dtype.kind not in "iu" or bool((array.astype(dtype) == array).all())

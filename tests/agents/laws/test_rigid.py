@@ -140,7 +140,7 @@ def test_only_the_edges_that_are_missing_are_named():
 
 def test_everybody_starts_about_the_origin_leaders_too():
     world = plan_of("rigid", "formation.spread=0.5").world
-    starts = np.array([replace(world, seed=seed).begin().position for seed in range(500)])
+    starts = np.array([replace(world, run_seed=seed).begin().position for seed in range(500)])
     assert starts.std(axis=(0, 2)) == pytest.approx(0.5, rel=0.1)
     assert np.abs(starts.mean(axis=0)).max() < 0.1
     correlation = np.corrcoef(starts.reshape(500, 20).T)
