@@ -15,9 +15,7 @@ from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.finding import Finding
 from netem.faults.fault import Fault, Verb
-from netem.loading.calling import Calling, name_of
 from netem.loading.choice import Choice
-from netem.processes.user_code import UserCodeError, definition
 
 
 def chosen(given: Scenario) -> tuple[Choice, Choice]:
@@ -96,8 +94,9 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
 
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
-    _check_says(law, "order", (1, 2, 3, 4), "1 if it steers velocities, 2 if accelerations, 3 if jerks, 4 if snaps")
-    _check_says(law, "by_stress", (True, False), "whether it weighs edges by the stress")
+    orders = "1 if it steers velocities, 2 if accelerations, 3 if jerks, 4 if snaps"
+    registry.refuse_other(law, "order", (1, 2, 3, 4).__contains__, orders)
+    registry.refuse_other(law, "by_stress", (True, False).__contains__, "whether it weighs edges by the stress")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if given.formation.leaders and law.order > 2:
@@ -109,11 +108,3 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
             f"dynamics.model: {given.agents.law} steers {steers}, and bodies are {given.dynamics.model}s; "
             f"set it to {fits!r}, or choose another law"
         )
-
-
-def _check_says(law: Law[Any], name: str, values: tuple[int, ...], what: str) -> None:
-    with Calling(law, name):
-        said = getattr(law, name, None)
-    if said not in values:
-        has_none = f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
-        raise UserCodeError(name_of(type(law)), has_none, definition(type(law)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from affinet.scenario.profiles import IMPAIRMENTS, LinkProfile, Own
 from analysis.models.arrays import Array
 from netem.core.links import Links
 from netem.impairments.own import OwnLoss
-from netem.loading.calling import Calling, name_of
 from netem.loading.choice import Choice
 from netem.medium.own_losses import OwnLosses
-from netem.processes.user_code import UserCodeError, definition
 
 _MOST_DRAWS = 1024
 
@@ -79,19 +76,13 @@ def try_out(losses: Sequence[OwnLoss], links: Links, dt: float, nominal: Array, 
 def _chosen(key: str, model: Own, own: OwnModules) -> Choice:
     choice = registry.choose(IMPAIRMENTS, key, model.model, model.parameters, own)
     loss = choice.build()
-    _refuse_other(loss, "by_position", lambda said: type(said) is bool, "whether it depends on where the agents are")
-    _refuse_other(
+    registry.refuse_other(
+        loss, "by_position", lambda said: type(said) is bool, "whether it depends on where the agents are"
+    )
+    registry.refuse_other(
         loss,
         "draws",
         lambda said: type(said) is int and 0 <= said <= _MOST_DRAWS,
         f"how many uniform numbers it wants for each message, 0 to {_MOST_DRAWS}",
     )
     return choice
-
-
-def _refuse_other(loss: Any, name: str, fits: Any, what: str) -> None:
-    with Calling(loss, name):
-        said = getattr(loss, name, None)
-    if not fits(said):
-        has = f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
-        raise UserCodeError(name_of(type(loss)), has, definition(type(loss)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -94,6 +94,28 @@ def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, P
             raise ScenarioError(f"{key}: no such estimator or law; {among(name, sorted(known))}")
         path = known.get(name, name)
         _made(key, name, path, _load(key, path, own.get(name)), table, own.get(name))
+
+
+def refuse_other(algorithm: Any, name: str, fits: Callable[[Any], bool], what: str) -> None:
+    """Refuse an algorithm that does not say what it has to, or says something else.
+
+    Parameters
+    ----------
+    algorithm, name
+        Which, and the attribute by which it says it.
+    fits, what
+        Whether it may say so, and what it says by it, for error messages.
+
+    Raises
+    ------
+    UserCodeError
+        When it fails to say, or says something that does not fit.
+    """
+    with Calling(algorithm, name):
+        said = getattr(algorithm, name, None)
+    if not fits(said):
+        has = f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
+        raise UserCodeError(name_of(type(algorithm)), has, definition(type(algorithm)))
 
 
 @contextmanager
