@@ -17,7 +17,7 @@ from agents.laws.base import Law
 from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
 from agents.loading import returned
 from analysis.models.affine import Manoeuvre
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Mask, chosen
 from analysis.models.pursuit import Sighting
 from netem.core.channels import INPUT
 from netem.loading.calling import Calling
@@ -190,8 +190,3 @@ def renew(state: Any, fresh: Any, which: Mask) -> Any:
     if isinstance(state, tuple):
         return type(state)(*(renew(old, new, which) for old, new in zip(state, fresh, strict=True)))
     return chosen(which, fresh, state)
-
-
-def chosen(which: Mask, one: Any, other: Any) -> Any:
-    """Array `one` where `which` (batch axes) is true, the other elsewhere."""
-    return np.where(which.reshape(which.shape + (1,) * (other.ndim - which.ndim)), one, other)

@@ -254,16 +254,15 @@ class MediumNode:
             self._inboxes[agent].say(messages.pack_exchange(decided.relayed.tick, seq, arriving))
 
     def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
-        who = np.array([said.src])
-        if not self._relay.lies(said.k, said.channel, who).any():
+        if not self._relay.lies(said.k, said.channel, said.src):
             return data
-        return _rewritten(said, lambda fields: self._relay.as_told(said.k, said.channel, who, fields))
+        return _rewritten(said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields))
 
     def _as_it_arrives(self, arriving: Arriving) -> bytes:
         data = self._relay.said(arriving.content)[arriving.src, self._brief.channels[arriving.channel]]
-        mark = np.array([arriving.mark], dtype=np.uint8)
-        if not changed_on_the_way(mark).any():
+        if not changed_on_the_way(arriving.mark):
             return data
+        mark = np.array([arriving.mark], dtype=np.uint8)
         content, channel, link = (np.array([row]) for row in (arriving.content, arriving.channel, arriving.link))
         said = messages.unpack(messages.Broadcast, data)
         return _rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))

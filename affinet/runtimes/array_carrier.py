@@ -12,7 +12,7 @@ from agents.agent import AgentAction, AgentState, renew
 from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
-from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks
@@ -139,8 +139,7 @@ class ArrayCarrier:
         gathered = np.zeros(0)
         for number, tick in enumerate(spoken):
             values = self._relay.said(tick)[channel][field][self._links.neighbours]
-            chosen = (content == tick).reshape(content.shape + (1,) * (values.ndim - content.ndim))
-            gathered = np.where(chosen, values, np.zeros_like(values) if number == 0 else gathered)
+            gathered = chosen(content == tick, values, np.zeros_like(values) if number == 0 else gathered)
         return gathered
 
     def _changed(self, fields: dict[str, Any], row: int, content: Integers, mark: Marks) -> dict[str, Any]:

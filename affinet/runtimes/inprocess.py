@@ -14,7 +14,7 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.array_carrier import ArrayCarrier, BatchActed
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, chosen
 from netem.core.clock import Lockstep
 from netem.faults.timeline import Timeline
 from netem.medium.in_flight import Entry
@@ -110,10 +110,6 @@ class InProcessSwarm:
             covariance=np.where(real[..., None], estimate.spread, 0.0),
             psi=np.where(awake, estimate.psi, np.nan),
             feasible=np.where(awake, UNTOLD if estimate.feasible is None else estimate.feasible, UNTOLD),
-            reports={name: _of_the_awake(said, awake) for name, said in estimate.reports.items()},
+            reports={name: chosen(~awake, np.nan, said) for name, said in estimate.reports.items()},
             entry=instant.acted.relayed.entry,
         )
-
-
-def _of_the_awake(said: Array, awake: Mask) -> Array:
-    return np.where(awake.reshape(-1, *(1,) * (said.ndim - 1)), said, np.nan)

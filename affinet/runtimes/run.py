@@ -111,8 +111,8 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     failure, timeline, accounts = flight.failure, plan.timeline, None
     try:
         if book.exists():
-            timeline = timeline.facing(journal.injected(journal.read(book)))
-            accounts = journal.accounts(book)
+            table = journal.read(book)
+            timeline, accounts = timeline.facing(journal.injected(table)), journal.accounts(table)
         for trigger, tick in flight.fired.items():
             timeline = timeline.fired([trigger], tick)
     except journal.JournalError as error:

@@ -41,7 +41,7 @@ def evidence(out: Path) -> Evidence:
         plan,
         timeline,
         arrays,
-        accounts=journal.accounts(out / JOURNAL),
+        accounts=journal.accounts(journal.read(out / JOURNAL)),
         uninstructed=summary["messages"]["uninstructed"],
         failure=None,
         user_code=summary["user_code"],

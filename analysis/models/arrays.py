@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+
+def chosen(which: Mask, one: Any, other: Any) -> Any:
+    """Array `one` where `which` (batch axes) is true, the other (batch axes, *) elsewhere; `one` may be a number."""
+    return np.where(which.reshape(which.shape + (1,) * (other.ndim - which.ndim)), one, other)

@@ -79,32 +79,23 @@ def read(path: Path, schema: Any) -> Any:
     TableError
         When there is none, or it has other columns.
     """
-    stream = _opened(path, schema)
-    return pa.Table.from_batches([batch for batch, _ in _batches(stream)], schema=stream.schema)
-
-
-def read_note(path: Path, schema: Any) -> Any:
-    """The last note in the table, None where there is none.
-
-    Raises
-    ------
-    TableError
-        As for `read`.
-    """
-    last = None
-    for _, beside in _batches(_opened(path, schema)):
-        last = beside or last
-    return None if last is None else json.loads(last[_NOTE])
-
-
-def _opened(path: Path, schema: Any) -> Any:
     try:
         stream = pa.ipc.open_stream(pa.memory_map(str(path)))
     except (OSError, pa.ArrowInvalid) as error:
         raise TableError(f"{path}: no such table: {error}") from error
     if stream.schema.names != schema.names:
         raise TableError(f"{path}: its columns are {stream.schema.names}, not {schema.names}")
-    return stream
+    batches, note = [], None
+    for batch, beside in _batches(stream):
+        batches.append(batch)
+        note = beside or note
+    return pa.Table.from_batches(batches, schema=stream.schema).replace_schema_metadata(note)
+
+
+def note(table: Any) -> Any:
+    """The last note in a table that was read, None where there is none."""
+    beside = (table.schema.metadata or {}).get(_NOTE)
+    return None if beside is None else json.loads(beside)
 
 
 def _batches(stream: Any) -> Iterator[tuple[Any, Any]]:

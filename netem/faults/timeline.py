@@ -90,7 +90,7 @@ class Conditions:
         """Those of a verb."""
         return [one for one in self.acting if one.fault.verb is verb]
 
-    @property
+    @cached_property
     def liars(self) -> tuple[Fault, ...]:
         """Faults by which agents lie."""
         return tuple(one.fault for one in self.under(Verb.LIE))

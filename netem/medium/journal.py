@@ -88,7 +88,7 @@ class Writer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with system_errors.afterwards(self._write, self.close):
+        with system_errors.afterwards(self.close):
             if error is not None:
                 raise error
 
@@ -100,9 +100,9 @@ class Writer:
             self._write()
 
     def close(self) -> None:
-        """End the file."""
-        with system_errors.about(self._path):
-            self._stream.close()
+        """Write what is left, and end the file."""
+        with system_errors.about(self._path), system_errors.afterwards(self._stream.close):
+            self._write()
 
     def _write(self) -> None:
         if not self._entered:
@@ -203,18 +203,9 @@ def read(path: Path) -> Any:
         raise JournalError(str(error)) from error
 
 
-def accounts(path: Path) -> Accounts | None:
-    """The accounts of a run, as far as its journal was written; None where it holds no tick.
-
-    Raises
-    ------
-    JournalError
-        When it is no journal.
-    """
-    try:
-        plain = arrow.read_note(path, SCHEMA)
-    except arrow.TableError as error:
-        raise JournalError(str(error)) from error
+def accounts(table: Any) -> Accounts | None:
+    """The accounts of a run, as far as its journal was written; None where it holds no tick."""
+    plain = arrow.note(table)
     return None if plain is None else from_plain(Accounts, plain)
 
 

@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 from netem.core.plain import to_plain
 from netem.faults import control, lie
 from netem.faults.control import Answer, Order
@@ -23,6 +23,8 @@ from netem.medium.medium import Medium
 from netem.medium.verdict import Fate
 
 Said = TypeVar("Said")
+
+_STALE = int(Mark.STALE)  # an enumeration member is compared ten times as slowly
 
 
 class Relayed(NamedTuple):
@@ -139,17 +141,16 @@ class Relay(Generic[Said]):
         changed, self._told = injected != self._told, injected
         return Relayed(tick, self.timeline.at(tick), verdicts, delivery, injected if changed else None)
 
-    def lies(self, tick: int, channel: str, agents: Integers) -> Mask:
-        """Which of these agents (m,) say on this channel what is not so, shape (m,)."""
-        liars = self.timeline.at(tick).liars if channel == lie.CHANNEL else ()
-        return np.isin(agents, [agent for liar in liars for agent in liar.agents])
+    def lies(self, tick: int, channel: str, agent: int) -> bool:
+        """Whether this agent says on this channel what is not so."""
+        return any(agent in liar.agents for liar in self._liars(tick, channel))
 
     def as_told(self, tick: int, channel: str, agents: Integers, fields: Mapping[str, Any]) -> dict[str, Any]:
         """The named fields (m, ...) that these agents (m,) broadcast, with the lies of those who lie."""
         told = dict(fields)
-        for liar in self.timeline.at(tick).liars if channel == lie.CHANNEL else ():
+        for liar in self._liars(tick, channel):
             lies, false = np.isin(agents, liar.agents), lie.told(told, liar)
-            told = {name: np.where(_over(lies, true), false[name], true) for name, true in told.items()}
+            told = {name: chosen(lies, false[name], true) for name, true in told.items()}
         return told
 
     def keep(self, tick: int, said: Said) -> None:
@@ -181,11 +182,10 @@ class Relay(Generic[Said]):
         oldest = self._state.oldest_sent(tick) - 1  # a stale message says what was said the tick before it was sent
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
 
-
-def changed_on_the_way(mark: Marks) -> Mask:
-    """Where a message arrives as something that nobody said, by marks of any shape."""
-    return mark > Mark.STALE
+    def _liars(self, tick: int, channel: str) -> tuple[Fault, ...]:
+        return self.timeline.at(tick).liars if channel == lie.CHANNEL else ()
 
 
-def _over(mask: Mask, field: Any) -> Mask:
-    return mask.reshape(mask.shape + (1,) * (field.ndim - mask.ndim))
+def changed_on_the_way(mark: Marks | int) -> Any:
+    """Whether a message arrives as something that nobody said, by its mark, or where, by marks of any shape."""
+    return mark > _STALE

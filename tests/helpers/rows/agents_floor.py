@@ -68,7 +68,6 @@ def _completed(relative, known, measured, seen, theta, spread):
 
 
 CASES = {
-    "agents.agent.chosen": of(agent.chosen, truth(), real(9, 2), real(9, 2)),
     "agents.agent.renew": of(
         lambda new, one, other: agent.renew(LastMeasured(one, one), LastMeasured(other, one), new),
         truth(),

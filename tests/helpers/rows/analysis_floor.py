@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.metrics import consistency, errors, indicator, localization
-from analysis.models import affine, algebra, elementary, graph, information, jacobi, jets, pursuit, sensor
+from analysis.models import affine, algebra, arrays, elementary, graph, information, jacobi, jets, pursuit, sensor
 from rows.case import covariance, of, real, share, truth, whole
 
 MANY = 500  # numbers that round apart once in a thousand times
@@ -30,6 +30,7 @@ def _of_edges(function):
 
 
 CASES = {
+    "analysis.models.arrays.chosen": of(arrays.chosen, truth(), real(9, 2), real(9, 2)),
     "analysis.models.elementary.whole_power": of(lambda x: elementary.whole_power(x, 3), real(), rows=MANY),
     "analysis.models.elementary.whole_powers": of(lambda x: elementary.whole_powers(x, 4), real(), rows=MANY),
     "analysis.models.elementary.power": of(elementary.power, share(), real(), rows=MANY),

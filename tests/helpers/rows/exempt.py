@@ -29,7 +29,7 @@ EXEMPT = {
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
         netem.medium.verdict.stronger
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
-        netem.medium.medium.Medium.offered netem.medium.relay.Relay.lies netem.medium.relay.Relayed.arriving
+        netem.medium.medium.Medium.offered netem.medium.relay.Relayed.arriving
         netem.medium.relay.Relayed.awake netem.medium.relay.Relayed.seen netem.medium.relay.changed_on_the_way
         netem.core.links.Links.degree netem.core.links.Links.present netem.core.links.Links.slots
         netem.core.links.Links.neighbours netem.core.links.Links.back netem.core.links.Links.touching
