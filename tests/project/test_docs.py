@@ -10,7 +10,7 @@ import pytest
 from flying import PROCESSES, digest_of, plan_of
 from paths import ROOT
 
-from affinet.planning import plan as planning
+from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, sections, verbs
 from affinet.studies import study
