@@ -18,7 +18,7 @@ from netem.impairments.rate import Rate
 from netem.medium.by_tick import ImpairmentsByTick
 from netem.medium.in_flight import Verdicts
 from netem.medium.medium import Medium
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 _TABLE = np.array([0.004, 0.010, 0.011, 0.015, 0.040, 0.120])
 _PARETO_SHAPE = 1.0 + (1.0 + (0.040 / 0.010) ** 2) ** 0.5
@@ -127,7 +127,7 @@ def _balance(air: Medium, ticks: int) -> float:
     for tick in range(ticks):
         state, verdicts = air.judge(state, tick, everything, None)
         state, delivery = air.deliver(state, tick, verdicts)
-        arrived = int((verdicts.fate == Fate.DELIVERED).sum()) + delivery.late
+        arrived = int((verdicts.kind == Verdict.DELIVERED).sum()) + delivery.late
         sum_ += links + int((verdicts.copy_due >= 0).sum()) - arrived
     return sum_ - state.in_flight
 
@@ -154,7 +154,7 @@ def _corruption(verdicts: int, seed: int) -> Iterator[Row]:
     shares = np.array([1.0 - sum(chances.values()), *chances.values()])
     yield against.counts("kinds", shares[:-1], np.bincount(mark.ravel(), minlength=5))
     yield against.exactly("stale in the first tick", 0.0, float((made.mark[0] == Mark.STALE).sum()))
-    yield against.exactly("messages that arrive", 1.0, float((made.fate == Fate.DELIVERED).mean()))
+    yield against.exactly("messages that arrive", 1.0, float((made.kind == Verdict.DELIVERED).mean()))
 
 
 def _rate(verdicts: int, seed: int) -> Iterator[Row]:
@@ -164,7 +164,7 @@ def _rate(verdicts: int, seed: int) -> Iterator[Row]:
         limit = Rate(np.full(size, rate), np.full(size, burst), np.full(size, queue))
         made = flown.fly(flown.medium(seed, links, rate=limit, message_bits=np.array([bits])), ticks)
         yield from _queue(Against("rate", f"{rate:g} bit/s, burst {burst:g}, queue {queue:g} bit"), made, rate, queue)
-        passed = (made.fate != Fate.OVERFLOW).sum(axis=0) * bits
+        passed = (made.kind != Verdict.OVERFLOW).sum(axis=0) * bits
         whole = rate * (ticks - 1) * flown.DT + burst + queue
         worst = float(passed.ravel()[np.abs(passed - whole).argmax()])
         yield Against("rate", f"saturated by {bits / flown.DT:g} bit/s").within(
@@ -177,7 +177,7 @@ def _rate(verdicts: int, seed: int) -> Iterator[Row]:
 
 def _queue(against: Against, made: Verdicts, rate: float, queue: float) -> Iterator[Row]:
     """A full queue: what comes out, and how long it took."""
-    passed, ticks = made.fate[:, 0] != Fate.OVERFLOW, len(made.fate)
+    passed, ticks = made.kind[:, 0] != Verdict.OVERFLOW, len(made.kind)
     half = ticks // 2
     through = passed[half:].sum(axis=0) * 512.0 / ((ticks - half) * flown.DT)
     off = 512.0 / ((ticks - half) * flown.DT)

@@ -96,7 +96,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 k=500,
                 src=HUB,
                 seq=500,
-                fates=np.ones((4, links), np.uint8),
+                verdicts=np.ones((4, links), np.uint8),
                 odd=nothing,
                 apart=nothing,
                 late=0,

@@ -13,7 +13,7 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.faults.fault import Fault, Verb
 from netem.impairments.chain import Chain, all_together
 from netem.impairments.loss import bernoulli, bursts, gilbert_elliott, markov
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 # Bursts longer than one message, or there is nothing to compare; and the share that is cut short.
 _ENOUGH, _HARDLY = 25, 0.002
@@ -78,13 +78,13 @@ def _by_message(case: Case, verdicts: int, seed: int) -> tuple[Mask, Array]:
     air = flown.medium(seed, links, chains=flown.layers(links, *case.chains, by_packet=case.by_packet))
     if not case.by_packet:
         made = flown.fly(air, ticks)
-        return made.fate[:, 0] == Fate.LOST, (made.due[:, 0] - np.arange(float(ticks))[:, None]) * flown.DT
+        return made.kind[:, 0] == Verdict.LOST, (made.due[:, 0] - np.arange(float(ticks))[:, None]) * flown.DT
     ticks = 2 * ticks + 400
     offered = np.random.default_rng(seed).random((ticks, 1, len(links))) < 0.5
     made = flown.fly(air, ticks, offered)
     few = int(offered.sum(axis=0).min())
     when = np.argsort(~offered[:, 0], axis=0, kind="stable")[:few]
-    lost = np.take_along_axis(made.fate[:, 0], when, axis=0) == Fate.LOST
+    lost = np.take_along_axis(made.kind[:, 0], when, axis=0) == Verdict.LOST
     waited = np.take_along_axis(made.due[:, 0], when, axis=0) - when
     return lost, np.asarray(waited * flown.DT, dtype=np.float64)
 
@@ -92,7 +92,7 @@ def _by_message(case: Case, verdicts: int, seed: int) -> tuple[Mask, Array]:
 def _stationary(against: Against, case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     links = flown.pairs(max(100, verdicts // 64))
     air = flown.medium(seed, links, chains=flown.layers(links, *case.chains, by_packet=case.by_packet))
-    lost = flown.fly(air, 64).fate[:, 0] == Fate.LOST
+    lost = flown.fly(air, 64).kind[:, 0] == Verdict.LOST
     chain = all_together(case.chains)
     yield against.share("loss of the first message", chain.mean_loss, lost[0])
     yield against.share("loss of the 64th", chain.mean_loss, lost[63])
@@ -138,8 +138,8 @@ def _scripted(verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     everywhere = tuple(links.index)
     faults = [Fault(Verb.LOSE, 0, None, pairs=everywhere, probability=loss) for loss in (0.1, 0.3)]
-    fate = flown.fly(flown.medium(seed, links, faults=faults), ticks).fate
+    kind = flown.fly(flown.medium(seed, links, faults=faults), ticks).kind
     against = Against("scripted loss", "0.1 and 0.3 at once")
-    yield against.share("mean loss", 1.0 - 0.9 * 0.7, fate == Fate.SCRIPTED)
-    heard = flown.fly(flown.medium(seed, links, ("sense", "input", "theta"), faults=faults), 50).fate
-    yield against.exactly("channels of one fate", 1.0, float((heard == heard[:, :1]).all(axis=1).mean()))
+    yield against.share("mean loss", 1.0 - 0.9 * 0.7, kind == Verdict.SCRIPTED)
+    heard = flown.fly(flown.medium(seed, links, ("sense", "input", "theta"), faults=faults), 50).kind
+    yield against.exactly("channels of one verdict", 1.0, float((heard == heard[:, :1]).all(axis=1).mean()))

@@ -16,7 +16,7 @@ from netem.impairments.jamming import Zone
 from netem.impairments.reach import Reach, ReachLaw
 from netem.impairments.schedule import Schedule
 from netem.impairments.trace import Trace
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 
 def check(verdicts: int, seed: int) -> Iterator[Row]:
@@ -58,7 +58,9 @@ def _passing(
     links, ticks = flown.size(verdicts)
     position, length = _apart(links, distances)
     reach = _reach(links, law, inner, outer, shadowing, coherence)
-    return flown.fly(flown.medium(seed, links, reaches=(reach,)), ticks, position=position).fate != Fate.RANGE, length
+    return flown.fly(
+        flown.medium(seed, links, reaches=(reach,)), ticks, position=position
+    ).kind != Verdict.RANGE, length
 
 
 def _ramp(verdicts: int, seed: int) -> Iterator[Row]:
@@ -89,14 +91,16 @@ def _log_distance(verdicts: int, seed: int, coherence: int) -> Iterator[Row]:
     passing = passing[: len(passing) // coherence * coherence, 0]
     by_pair = passing.reshape(-1, coherence, passing.shape[-1] // 2, 2).swapaxes(1, 2)
     spells = by_pair.reshape(*by_pair.shape[:2], -1)
-    yield against.exactly("one fate in a spell of a pair", 1.0, float((spells == spells[..., :1]).all(axis=-1).mean()))
+    yield against.exactly(
+        "one verdict in a spell of a pair", 1.0, float((spells == spells[..., :1]).all(axis=-1).mean())
+    )
     for distance in distances:
         due = float(ndtr(10.0 * 3.0 * np.log10(20.0 / distance) / 4.0))
         yield against.share(f"availability at {distance:g} m", due, spells[:, length[::2] == distance, 0])
 
 
 def _zones(verdicts: int, seed: int) -> Iterator[Row]:
-    """Few links and many ticks: a zone has one fate a tick."""
+    """Few links and many ticks: a zone has one verdict a tick."""
     links, against = flown.pairs(100), Against("jammed zone", "share 0.3, and one of 0.5 beside it")
     ticks = -(-verdicts // len(links))
     x = np.resize([0.0, 3.0, 0.0, 9.0, 20.0, 20.0, 50.0, 50.0], links.agents)
@@ -105,13 +109,13 @@ def _zones(verdicts: int, seed: int) -> Iterator[Row]:
         Zone(np.array([centre, 0.0]), 5.0, share, np.ones(len(links), dtype=bool), True, True)
         for centre, share in ((0.0, 0.3), (20.0, 0.5))
     )
-    fate = flown.fly(flown.medium(seed, links, ("sense", "theta"), zones=zones), ticks, position=position).fate
-    jammed = fate == Fate.JAMMED
+    kind = flown.fly(flown.medium(seed, links, ("sense", "theta"), zones=zones), ticks, position=position).kind
+    jammed = kind == Verdict.JAMMED
     first, second = jammed[..., heard <= 5.0], jammed[..., heard == 20.0]
     for name, inside, share in (("first", first, 0.3), ("second", second, 0.5)):
         inside = inside.reshape(ticks, -1)
-        one_fate = (inside == inside[:, :1]).all(axis=1).mean()
-        yield against.exactly(f"{name}: all inside share their fate", 1.0, float(one_fate))
+        one_verdict = (inside == inside[:, :1]).all(axis=1).mean()
+        yield against.exactly(f"{name}: all inside share their verdict", 1.0, float(one_verdict))
         yield against.share(f"{name}: share of ticks", share, inside[:, 0])
     yield against.exactly("jammed outside", 0.0, float(jammed[..., (heard > 5.0) & (heard != 20.0)].sum()))
     scores = [(on[:, 0, 0] - share) / (share * (1.0 - share)) ** 0.5 for on, share in ((first, 0.3), (second, 0.5))]
@@ -129,17 +133,19 @@ def _schedules(verdicts: int, seed: int) -> Iterator[Row]:
         ("slots of 2 ticks", schedule.slotted(links, 2), links.src - 1 == (ticks[:, None] // 2) % links.agents),
     ):
         air = flown.medium(seed, links, schedules=(Schedule(*turns, True, True),))
-        opened = flown.fly(air, len(ticks)).fate[:, 0] != Fate.CLOSED
+        opened = flown.fly(air, len(ticks)).kind[:, 0] != Verdict.CLOSED
         against = Against("schedule", f"{name}, {len(links)} links of 20 agents")
         yield against.exactly("verdicts as the clock says", 1.0, float((opened == due).mean()))
     links = flown.pairs(100)
     ticks = np.arange(-(-verdicts // len(links)))
     period, begins, lasts = (np.full(len(links), n) for n in (7, 0, 3))
     part_time = Schedule(period, begins, lasts, True, True)
-    fate = flown.fly(flown.medium(seed, links, schedules=(part_time,)), len(ticks)).fate[:, 0]
-    against, whole = Against("schedule", "3 of 7 ticks"), len(fate) // 7 * 7
-    yield against.exactly("verdicts as the clock says", 1.0, float(((ticks % 7 < 3) == (fate != Fate.CLOSED).T).mean()))
-    chain, closed = schedule.turning(7, 3), float((fate[:whole] == Fate.CLOSED).mean())
+    kind = flown.fly(flown.medium(seed, links, schedules=(part_time,)), len(ticks)).kind[:, 0]
+    against, whole = Against("schedule", "3 of 7 ticks"), len(kind) // 7 * 7
+    yield against.exactly(
+        "verdicts as the clock says", 1.0, float(((ticks % 7 < 3) == (kind != Verdict.CLOSED).T).mean())
+    )
+    chain, closed = schedule.turning(7, 3), float((kind[:whole] == Verdict.CLOSED).mean())
     yield against.within("mean loss", chain.mean_loss, closed, 1e-12, "")
     yield against.within("mean burst", chain.mean_burst, 4.0, 1e-12, "")
 
@@ -162,14 +168,14 @@ def _listed(verdicts: int, seed: int) -> Iterator[Row]:
     offered = rng.random((ticks, 2, len(links))) < 0.5
     everywhere = np.column_stack([listed, np.ones_like(listed)])
     air = flown.medium(seed, links, ("input", "theta"), listed=everywhere, coupled=False)
-    fate = flown.fly(air, ticks, offered).fate
+    kind = flown.fly(air, ticks, offered).kind
     number, wanted = np.cumsum(offered, axis=0) - 1, set(map(tuple, listed.tolist()))
     due = np.zeros_like(offered)
     for tick, channel, link in zip(*np.nonzero(offered), strict=True):
         due[tick, channel, link] = (link, number[tick, channel, link]) in wanted
     against = Against("list", f"{len(listed)} messages of {len(links)} links")
-    yield against.exactly("messages dropped", float(due.sum()), float((fate == Fate.LISTED).sum()))
-    yield against.exactly("exactly those", 1.0, float(((fate == Fate.LISTED) == due).mean()))
+    yield against.exactly("messages dropped", float(due.sum()), float((kind == Verdict.LISTED).sum()))
+    yield against.exactly("exactly those", 1.0, float(((kind == Verdict.LISTED) == due).mean()))
 
 
 def _trace(verdicts: int, seed: int) -> Iterator[Row]:
@@ -180,7 +186,7 @@ def _trace(verdicts: int, seed: int) -> Iterator[Row]:
     every, time = np.arange(len(links)), np.repeat(when * flown.DT, len(links))
     measured = trace.MeasuredAvailability(time, np.tile(every, changes), due.ravel())
     read = Trace(*trace.table(measured, links, every >= 0, flown.DT, ticks), True, True)
-    lost = flown.fly(flown.medium(seed, links, traces=(read,)), ticks).fate[:, 0] == Fate.LOST
+    lost = flown.fly(flown.medium(seed, links, traces=(read,)), ticks).kind[:, 0] == Verdict.LOST
     against = Against("trace", f"{changes} changes on each of {len(links)} links")
     hits = np.add.reduceat(~lost, when, axis=0)
     trials = np.diff(np.append(when, ticks))[:, None] * np.ones(len(links))
@@ -189,6 +195,6 @@ def _trace(verdicts: int, seed: int) -> Iterator[Row]:
     yield against.normal("mean availability", mean, float(1.0 - lost.mean()), spread / lost.size)
     yield against.shares("availability, each time and link", due, hits, trials)
     sure = Trace(when, np.where(due > 0.5, 1.0, 0.0), True, True)
-    lost = flown.fly(flown.medium(seed, links, traces=(sure,)), ticks).fate[:, 0] == Fate.LOST
+    lost = flown.fly(flown.medium(seed, links, traces=(sure,)), ticks).kind[:, 0] == Verdict.LOST
     held = sure.availability[np.repeat(np.arange(changes), trials[:, 0].astype(int))]
     yield against.exactly("of 0 and 1: verdicts as it says", 1.0, float((lost == (held == 0.0)).mean()))

@@ -191,7 +191,7 @@ class ZenohCarrier:
 
 def _entry(journal: messages.Journal) -> Entry:
     return Entry(
-        fates=journal.fates,
+        verdicts=journal.verdicts,
         odd=journal.odd.reshape(-1, 5),
         apart=journal.apart.reshape(-1, 4),
         late=journal.late,

@@ -176,15 +176,15 @@ def _add(draft: _Draft, number: int, entry: Event) -> None:
 
 def _shapes(draft: _Draft, number: int, entry: Any, key: str) -> list[Fault]:
     """The faults of an entry, without their times."""
-    lot, formation = ChoiceKey(draft.given.seed, number + 1), draft.formation
+    choice, formation = ChoiceKey(draft.given.seed, number + 1), draft.formation
 
     def on(named: Sequence[str]) -> Pairs:
         with said_at(f"{key}.links"):
-            return selectors.pairs(named, formation, draft.links, lot)
+            return selectors.pairs(named, formation, draft.links, choice)
 
     def whom(named: Sequence[int | str]) -> tuple[int, ...]:
         with said_at(f"{key}.agents"):
-            return selectors.agents(named, formation, lot)
+            return selectors.agents(named, formation, choice)
 
     def groups(split: list[list[int]] | str) -> tuple[tuple[int, ...], ...]:
         return tuple(map(tuple, split if isinstance(split, list) else selectors.groups(split, formation)))

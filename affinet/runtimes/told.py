@@ -48,7 +48,7 @@ _OF_ALL: Mapping[str, Mapping[str, Check]] = {
     "failed": {"reason": _is_text},
 }
 _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
-_MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
+MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "netem": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "centre": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
@@ -70,7 +70,7 @@ def read(role: str, line: bytes) -> Event:
     NotItsOwn
         When it is no event that this role may tell.
     """
-    may_say = _MAY_SAY[role]
+    may_say = MAY_SAY[role]
     try:
         said = json.loads(line)
     except (ValueError, RecursionError):

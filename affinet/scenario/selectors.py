@@ -129,7 +129,7 @@ def edge(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def rows(selector: str, formation: Formation, links: Links, lot: ChoiceKey | None = None) -> list[int]:
+def rows(selector: str, formation: Formation, links: Links, key: ChoiceKey | None = None) -> list[int]:
     """Rows of the links that a selector names, in the order of the links.
 
     An agent or a role alone names all links from it and to it.
@@ -140,17 +140,17 @@ def rows(selector: str, formation: Formation, links: Links, lot: ChoiceKey | Non
         Of links, as a scenario says it.
     formation, links
         Who flies, and over which links.
-    lot
+    key
         What a random selector draws by.
 
     Raises
     ------
     ValueError
-        When it is no selector, names agents that do not exist, matches no link, or is random without a `lot`.
+        When it is no selector, names agents that do not exist, matches no link, or is random without a `key`.
     """
     check(selector)
     if match := _RANDOM.fullmatch(selector):
-        return _drawn(int(match[1]), np.arange(len(links)), links.src, links.dst, lot, "links")
+        return _drawn(int(match[1]), np.arange(len(links)), links.src, links.dst, key, "links")
     if selector in _OF_GRAPH:
         return sorted(links.index[way] for i, j in _edges(selector, formation) for way in ((i, j), (j, i)))
     if match := _PAIR.fullmatch(selector):
@@ -169,7 +169,7 @@ def rows(selector: str, formation: Formation, links: Links, lot: ChoiceKey | Non
 
 
 def pairs(
-    selectors: Sequence[str], formation: Formation, links: Links, lot: ChoiceKey | None = None
+    selectors: Sequence[str], formation: Formation, links: Links, key: ChoiceKey | None = None
 ) -> tuple[tuple[int, int], ...]:
     """The directed links (src, dst) that any of the selectors names, each once.
 
@@ -179,7 +179,7 @@ def pairs(
         Of links, as a scenario says them.
     formation, links
         Who flies, and over which links.
-    lot
+    key
         What random selectors draw by.
 
     Raises
@@ -187,11 +187,11 @@ def pairs(
     ValueError
         As `rows` does.
     """
-    chosen = dict.fromkeys(row for selector in selectors for row in rows(selector, formation, links, lot))
+    chosen = dict.fromkeys(row for selector in selectors for row in rows(selector, formation, links, key))
     return tuple((int(links.src[row]), int(links.dst[row])) for row in chosen)
 
 
-def agents(selectors: Iterable[int | str], formation: Formation, lot: ChoiceKey) -> tuple[int, ...]:
+def agents(selectors: Iterable[int | str], formation: Formation, key: ChoiceKey) -> tuple[int, ...]:
     """The agents that any of the selectors names, each once.
 
     Raises
@@ -199,7 +199,7 @@ def agents(selectors: Iterable[int | str], formation: Formation, lot: ChoiceKey)
     ValueError
         When one is no selector, names an agent that does not exist, or nobody.
     """
-    return tuple(dict.fromkeys(agent for selector in selectors for agent in _whom(selector, formation, lot)))
+    return tuple(dict.fromkeys(agent for selector in selectors for agent in _whom(selector, formation, key)))
 
 
 def groups(split: str, formation: Formation) -> tuple[tuple[int, ...], ...]:
@@ -213,13 +213,13 @@ def groups(split: str, formation: Formation) -> tuple[tuple[int, ...], ...]:
     return tuple(everybody[side].tolist()), tuple(everybody[~side].tolist())
 
 
-def _whom(selector: int | str, formation: Formation, lot: ChoiceKey) -> list[int]:
+def _whom(selector: int | str, formation: Formation, key: ChoiceKey) -> list[int]:
     if isinstance(selector, int):
         return sorted(_named(str(selector), formation))
     check_agents(selector)
     if match := _RANDOM_AGENTS.fullmatch(selector):
         among = np.array(sorted(_named(match[2] or "all", formation)))
-        return [int(among[row]) for row in _drawn(int(match[1]), np.arange(len(among)), among, 0, lot, "agents")]
+        return [int(among[row]) for row in _drawn(int(match[1]), np.arange(len(among)), among, 0, key, "agents")]
     if selector == "cut-vertices":
         return _some(cuts.cut_vertices(formation.agents, formation.edges), "no agent's loss disconnects the others")
     if selector == "critical":
@@ -258,14 +258,14 @@ def _some(found: list[T], otherwise: str) -> list[T]:
 
 
 def _drawn(
-    number: int, candidates: Integers, src: ArrayLike, dst: ArrayLike, lot: ChoiceKey | None, what: str
+    number: int, candidates: Integers, src: ArrayLike, dst: ArrayLike, key: ChoiceKey | None, what: str
 ) -> list[int]:
     """So many of the candidates, by draws that are a function of each alone."""
-    if lot is None:
+    if key is None:
         raise ValueError("a random choice is for the timeline only")
     if not 1 <= number <= len(candidates):
         raise ValueError(f"cannot choose {number} of {len(candidates)} {what}")
-    draw = uniform(lot.seed, Purpose.SELECTION, tick=lot.entry, src=src, dst=dst)[..., 0]
+    draw = uniform(key.seed, Purpose.SELECTION, tick=key.entry, src=src, dst=dst)[..., 0]
     return sorted(candidates[np.argsort(draw)[:number]].tolist())
 
 

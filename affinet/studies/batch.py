@@ -159,8 +159,8 @@ class _Places:
     def measure(self, instant: BatchTick, timeline: Timeline) -> None:
         """Take in the measurements of a tick; all runs have the faults of one."""
         if self._wanted:
-            measured, fates = self._of_runs(instant.measured), self._of_runs(instant.acted.relayed.verdicts.fate[0])
-            self._first.tick(timeline, instant.tick, measured, fates)
+            measured, verdicts = self._of_runs(instant.measured), self._of_runs(instant.acted.relayed.verdicts.kind[0])
+            self._first.tick(timeline, instant.tick, measured, verdicts)
             self._recent.append(self._of_runs(instant.acted.action.estimate.reports[channels.PLACE]))
             self._since += 1
 
@@ -192,7 +192,7 @@ class _Places:
 def _looked_at(plan: Plan, present: Mask, moment: Moment) -> dict[str, Array]:
     """What is kept of a tick of all runs of a plan."""
     of_agents = {name: getattr(moment, name) for name in ("position", "measured", "estimate", "covariance", "known")}
-    looked_at = seen(plan.world, present.reshape(-1), moment.entry.fates[0], of_agents)
+    looked_at = seen(plan.world, present.reshape(-1), moment.entry.verdicts[0], of_agents)
     return {name: metric.of(looked_at) for name, metric in METRICS.items()}
 
 

@@ -17,7 +17,7 @@ from affinet.scenario import loading as scenarios
 from affinet.scenario.sections import Scenario
 from affinet.verdicts.checking import Checker
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.outcome import Verdict
+from affinet.verdicts.outcome import RunVerdict
 from netem.processes.user_code import UserCodeError
 
 _KEPT = 4
@@ -92,7 +92,7 @@ class Swarm:
         """
         return replace(self, scenario=scenarios.extended(self.scenario, [{"verb": verb} | keys]))
 
-    def fly(self, verdict: Verdict = "pass") -> FlownRun:
+    def fly(self, verdict: RunVerdict = "pass") -> FlownRun:
         """Fly it.
 
         Parameters

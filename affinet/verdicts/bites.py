@@ -16,7 +16,7 @@ from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import Medium
 from netem.medium.relay import Relay
-from netem.medium.verdict import FATE_OF, Fate, Fates
+from netem.medium.verdict import VERDICT_OF, Verdict, VerdictCodes
 from world.books.history import Arrays
 
 
@@ -89,23 +89,23 @@ class _Rejudged:
     @cached_property
     def arrivals(self) -> Integers:
         """When every message offered arrives, -1 where it is dropped at once, shape (T, C, L)."""
-        return self._judged_again(self.timeline, len(self.arrays["fates"]))
+        return self._judged_again(self.timeline, len(self.arrays["verdicts"]))
 
     def arrivals_without(self, number: int) -> Integers:
         """The same had one fault not been, up to its end."""
         links, faults = self.timeline.links, self.timeline.faults
         others = [other for place, other in enumerate(faults) if place != number]
-        ticks = len(self.arrays["fates"][: faults[number].end])
+        ticks = len(self.arrays["verdicts"][: faults[number].end])
         return self._judged_again(Timeline(links, others, self.timeline.triggers), ticks)
 
     def _judged_again(self, timeline: Timeline, ticks: int) -> Integers:
-        fates, position = self.arrays["fates"], self.arrays["position"]
+        verdicts, position = self.arrays["verdicts"], self.arrays["position"]
         relay = Relay[None](Medium(self.plan.scenario.seed, self.plan.channels, self.plan.profiles, timeline))
-        arrivals = np.empty((ticks, *fates.shape[1:]), dtype=np.int64)
+        arrivals = np.empty((ticks, *verdicts.shape[1:]), dtype=np.int64)
         for tick in range(ticks):
-            verdicts = relay.decide_on(tick, fates[tick] != Fate.SILENT, position[tick]).verdicts
+            decided = relay.decide_on(tick, verdicts[tick] != Verdict.SILENT, position[tick]).verdicts
             relay.finish(tick)
-            arrivals[tick] = np.where(verdicts.fate <= Fate.DELAYED, verdicts.due, -1)
+            arrivals[tick] = np.where(decided.kind <= Verdict.DELAYED, decided.due, -1)
         return arrivals
 
 
@@ -120,30 +120,30 @@ def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
         return 0, "messages"
     ticks = len(arrays["error"])
     span = range(fault.start, ticks if fault.end is None else min(ticks, fault.end))
-    fates = arrays["fates"][fault.start : fault.end]
+    verdicts = arrays["verdicts"][fault.start : fault.end]
     held = timeline.held(number)
     match fault.verb:
         case Verb.CLOCK:
             wrong = lambda tick: plan.told_mission & ~timeline.at(tick).idle & (timeline.clock(tick) != tick)  # noqa: E731
             return _agent_ticks(span, fault, wrong), "ticks of agents that fly by the clock"
         case Verb.BIAS:
-            return int((_working(timeline, span, fates) & held).sum()), "measurements"
+            return int((_working(timeline, span, verdicts) & held).sum()), "measurements"
         case Verb.OUTLIER:
             hits = np.reshape(
                 [plan.world.outliers(tick, timeline.at(tick)) & held for tick in span], (len(span), len(held))
             )
-            return int((_working(timeline, span, fates) & hits.astype(bool)).sum()), "measurements"
+            return int((_working(timeline, span, verdicts) & hits.astype(bool)).sum()), "measurements"
         case Verb.LIE:
-            return _told(plan, fault, fates), "messages"
+            return _told(plan, fault, verdicts), "messages"
         case Verb.LOSE | Verb.DROPOUT | Verb.DELAY | Verb.DEGRADE if plan.journal is None:
             return _otherwise(flown, number), "messages"
         case Verb.DEGRADE:
-            return int((fates[:, :, held] > Fate.DELIVERED).sum()), "messages"
-    if fault.verb in FATE_OF:
-        return int((fates[:, :, held] == FATE_OF[fault.verb]).sum()), "messages"
+            return int((verdicts[:, :, held] > Verdict.DELIVERED).sum()), "messages"
+    if fault.verb in VERDICT_OF:
+        return int((verdicts[:, :, held] == VERDICT_OF[fault.verb]).sum()), "messages"
     if fault.agents:
         return _agent_ticks(span, fault, lambda tick: ~timeline.at(tick).still), "ticks of agents"
-    return int((fates[:, 0, held] == Fate.DELIVERED).sum()), "measurements"
+    return int((verdicts[:, 0, held] == Verdict.DELIVERED).sum()), "measurements"
 
 
 def _agent_ticks(span: range, fault: Fault, which: Any) -> int:
@@ -151,10 +151,10 @@ def _agent_ticks(span: range, fault: Fault, which: Any) -> int:
     return sum(int(which(tick)[agents].sum()) for tick in span)
 
 
-def _working(timeline: Timeline, span: range, fates: Fates) -> Mask:
+def _working(timeline: Timeline, span: range, verdicts: VerdictCodes) -> Mask:
     """Measurements that arrived, and are not those of a sensor that repeats itself, shape (T, L)."""
     frozen = [timeline.at(tick).frozen for tick in span]
-    working: Mask = (fates[:, 0] == Fate.DELIVERED) & ~np.reshape(frozen, fates[:, 0].shape).astype(bool)
+    working: Mask = (verdicts[:, 0] == Verdict.DELIVERED) & ~np.reshape(frozen, verdicts[:, 0].shape).astype(bool)
     return working
 
 
@@ -165,9 +165,9 @@ def _otherwise(flown: _Rejudged, number: int) -> int:
     return int(changed[flown.timeline.faults[number].start :].sum())
 
 
-def _told(plan: Plan, fault: Fault, fates: Any) -> int:
+def _told(plan: Plan, fault: Fault, verdicts: Any) -> int:
     if lie.CHANNEL not in plan.channels:
         return 0
     said: Mask = np.isin(plan.world.links.src, fault.agents)
-    told = fates[:, plan.channels.index(lie.CHANNEL), said]
-    return int(((told == Fate.DELIVERED) | (told == Fate.DELAYED)).sum())
+    told = verdicts[:, plan.channels.index(lie.CHANNEL), said]
+    return int(((told == Verdict.DELIVERED) | (told == Verdict.DELAYED)).sum())

@@ -10,7 +10,7 @@ from affinet.scenario.words import among
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
-from affinet.verdicts.outcome import Verdict
+from affinet.verdicts.outcome import RunVerdict
 from analysis.metrics import consistency, localization
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
@@ -263,7 +263,7 @@ def localized(level: float, by: float = 0.0) -> Checker:
             return CheckResult(name, "vacuous", None, "nobody said where it is")
         span = span_of(evidence, by, None)
         known = FirstMeasurements.of(
-            evidence.plan.world, evidence.timeline, evidence.arrays["measured"], evidence.arrays["fates"][:, 0]
+            evidence.plan.world, evidence.timeline, evidence.arrays["measured"], evidence.arrays["verdicts"][:, 0]
         )
         off = localization.distance(evidence.arrays[channels.PLACE][span.start : span.stop], known.edges())
         if np.isnan(off).all():
@@ -292,10 +292,10 @@ def smooth(share: float) -> Checker:
     return Checker(name, check)
 
 
-def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> Verdict:
+def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> RunVerdict:
     """The verdict of a test: a failure outweighs what proved nothing, and that outweighs a pass."""
     verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
-    ranked: tuple[Verdict, ...] = ("fail", "vacuous", "pass")
+    ranked: tuple[RunVerdict, ...] = ("fail", "vacuous", "pass")
     return next(verdict for verdict in ranked if verdict in verdicts)
 
 

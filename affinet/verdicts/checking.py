@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.outcome import Verdict
+from affinet.verdicts.outcome import RunVerdict
 from netem.loading.calling import Calling
 from netem.loading.returned import WrongReturn, kind
 
@@ -36,7 +36,7 @@ class CheckResult:
     """
 
     checker: str
-    verdict: Verdict
+    verdict: RunVerdict
     tick: int | None
     says: str
 
@@ -87,7 +87,7 @@ class Checker:
 
         def check(evidence: Evidence) -> CheckResult:
             found = self(evidence)
-            turned: dict[Verdict, Verdict] = {"pass": "fail", "fail": "pass", "vacuous": "vacuous"}
+            turned: dict[RunVerdict, RunVerdict] = {"pass": "fail", "fail": "pass", "vacuous": "vacuous"}
             verdict = turned[found.verdict]
             return CheckResult(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
 
@@ -136,7 +136,7 @@ def every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[
     return CheckResult(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {why(tick)}")
 
 
-def _joined(sign: str, one: Checker, other: Checker, worst: tuple[Verdict, ...]) -> Checker:
+def _joined(sign: str, one: Checker, other: Checker, worst: tuple[RunVerdict, ...]) -> Checker:
     name = f"({one.name} {sign} {other.name})"
 
     def check(evidence: Evidence) -> CheckResult:

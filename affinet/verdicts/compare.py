@@ -15,7 +15,7 @@ from world.books import history
 from world.books.history import Arrays
 
 _OF_LINKS = ("measured",)
-_OF_CHANNELS = ("fates", "newest")
+_OF_CHANNELS = ("verdicts", "newest")
 # In the order in which a tick makes them, so that a cause is named before what follows from it; what estimators report and the
 # input come after.
 _MADE = (
@@ -23,7 +23,7 @@ _MADE = (
     "position",
     "error",
     "measured",
-    "fates",
+    "verdicts",
     "newest",
     "copies",
     "late",

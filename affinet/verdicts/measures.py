@@ -34,7 +34,7 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
     """
     with np.errstate(over="ignore", invalid="ignore"):
         if channels.PLACE in plan.reports:
-            known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["fates"][:, 0])
+            known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
             off = localization.distance(arrays[channels.PLACE], known.edges())
             return {"localization_error": figures(off[~np.isnan(off)])}
         if plan.world.pursuit is not None and reported(plan.reports):

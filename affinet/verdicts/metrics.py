@@ -78,7 +78,7 @@ METRICS: Mapping[str, Metric] = {
 }
 
 
-def seen(world: World, present: Mask, fates: Any, of_agents: Mapping[str, Any]) -> Seen:
+def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any]) -> Seen:
     """What is looked at of the swarms of a world.
 
     Parameters
@@ -87,13 +87,13 @@ def seen(world: World, present: Mask, fates: Any, of_agents: Mapping[str, Any]) 
         Of the swarms.
     present
         Which agents take part, shape (..., S N).
-    fates
+    verdicts
         What became of the measurements, shape (..., L).
     of_agents
         `position`, `measured`, `estimate`, `covariance` and `known`, as in `world.books.history.Moment`.
     """
     size = world.formation.agents // world.swarms
-    edges = of_swarms(world, fates=fates, **of_agents)
+    edges = of_swarms(world, verdicts=verdicts, **of_agents)
 
     def by_swarm(array: Any, axis: int) -> Any:
         return array.reshape(*array.shape[:axis], world.swarms, size, *array.shape[array.ndim + axis + 1 :])
@@ -107,5 +107,5 @@ def of_run(evidence: Evidence, name: str, span: range) -> Array:
     told = {what: arrays[what][part] for what in ("measured", "estimate", "covariance")}
     awake = (evidence.awake & evidence.present)[part, :, None]
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
-    looked_at = seen(evidence.plan.world, evidence.present[part], arrays["fates"][part, 0], whole)
+    looked_at = seen(evidence.plan.world, evidence.present[part], arrays["verdicts"][part, 0], whole)
     return METRICS[name].of(looked_at)[..., 0]

@@ -19,7 +19,7 @@ from affinet.verdicts.measures import Figures
 from netem.faults.timeline import Timeline
 from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.medium import JOURNAL
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from netem.processes import system_errors
 from world.books import history
 from world.books.history import Arrays, digest
@@ -27,7 +27,7 @@ from world.books.history import Arrays, digest
 SUMMARY = "summary.json"
 _LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
 
-Verdict = Literal["pass", "fail", "vacuous"]
+RunVerdict = Literal["pass", "fail", "vacuous"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Outcome:
     they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early.
     """
 
-    verdict: Verdict
+    verdict: RunVerdict
     reasons: tuple[str, ...]
     user_code: bool
     digest: str | None
@@ -137,7 +137,7 @@ def judge(
     idle = [bite for bite in faults if not bite.touched]
     empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
     empty += _untracked(arrays)
-    verdict: Verdict = "fail" if wrong else "vacuous" if empty else "pass"
+    verdict: RunVerdict = "fail" if wrong else "vacuous" if empty else "pass"
     reasons = wrong or empty
     return Outcome(
         verdict=verdict,
@@ -211,7 +211,7 @@ def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | 
 
 def accounts_of(arrays: Arrays, in_flight: int) -> Accounts:
     """The accounts of a run that is known by its arrays, after which so many messages are under way."""
-    ledger = Ledger.of(arrays["fates"], arrays["copies"], arrays["late"], arrays["dropped"])
+    ledger = Ledger.of(arrays["verdicts"], arrays["copies"], arrays["late"], arrays["dropped"])
     return Accounts(len(arrays["error"]), ledger, in_flight)
 
 
@@ -221,7 +221,7 @@ def _untracked(arrays: Arrays | None) -> list[str]:
     ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
     if nobody:
         return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
-    if (arrays["fates"][:, 1:] == Fate.SILENT).all():
+    if (arrays["verdicts"][:, 1:] == Verdict.SILENT).all():
         return ["nobody was awake in any tick: it proved nothing"]
     return []
 

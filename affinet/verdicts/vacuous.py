@@ -12,7 +12,7 @@ from netem.faults import lie
 from netem.faults.fault import BY_CHANCE, OF_SENSORS, Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
-from netem.medium.verdict import FATE_OF, Fate
+from netem.medium.verdict import VERDICT_OF, Verdict
 from world.books.history import Arrays
 
 
@@ -43,7 +43,7 @@ def why(plan: Plan, timeline: Timeline, arrays: Arrays, number: int) -> str:
             return _right_clocks(plan, timeline, fault, span)
         case Verb.LIE if lie.CHANNEL not in plan.channels:
             return f"nobody tells a Theta: the estimator {plan.scenario.agents.estimator!r} has none to tell"
-    if fault.agents and fault.verb is not Verb.LIE and fault.verb not in FATE_OF:
+    if fault.agents and fault.verb is not Verb.LIE and fault.verb not in VERDICT_OF:
         return "its agents held still, dead or departed, while it lasted"
     return _fared(plan, fault, timeline.held(number), arrays, span)
 
@@ -68,20 +68,20 @@ def _right_clocks(plan: Plan, timeline: Timeline, fault: Fault, span: range) -> 
 
 def _fared(plan: Plan, fault: Fault, held: Mask, arrays: Arrays, span: range) -> str:
     """What became of the messages that it could have touched."""
-    fates = arrays["fates"][span.start : span.stop]
+    verdicts = arrays["verdicts"][span.start : span.stop]
     if fault.verb in OF_SENSORS:
-        what, fared = "measurements", fates[:, :1, held]
+        what, fared = "measurements", verdicts[:, :1, held]
     elif fault.verb is Verb.LIE:
         said = np.isin(plan.world.links.src, fault.agents)
-        what, fared = "messages", fates[:, [plan.channels.index(lie.CHANNEL)]][:, :, said]
+        what, fared = "messages", verdicts[:, [plan.channels.index(lie.CHANNEL)]][:, :, said]
     else:
-        what, fared = "messages", fates[:, :, held]
-    offered = Counter(fared[fared != Fate.SILENT].tolist())
+        what, fared = "messages", verdicts[:, :, held]
+    offered = Counter(fared[fared != Verdict.SILENT].tolist())
     where = fault.links() if fault.pairs else "its links"
     if not offered:
         return f"{where} carried nothing while it lasted"
-    became = ", ".join(f"{number} {Fate(fate).label}" for fate, number in sorted(offered.items()))
+    became = ", ".join(f"{number} {Verdict(verdict).label}" for verdict, number in sorted(offered.items()))
     fared_alike = f"of the {offered.total()} {what} on {where} meanwhile ({became})"
-    if fault.verb in BY_CHANCE and offered[Fate.DELIVERED]:
+    if fault.verb in BY_CHANCE and offered[Verdict.DELIVERED]:
         return f"its probability, {fault.probability:g}, struck none {fared_alike}"
     return f"it changed nothing {fared_alike}"

@@ -14,13 +14,13 @@ import numpy as np
 
 from agents.estimate import Estimate
 from agents.exchange import Channels, Field, Fields
-from netem.core import channels as air
+from netem.core import channels
 from netem.loading.returned import ARRAYS, BOOL, FLOAT, Shape, WrongReturn, array, kind, shown, written
 
 _NUMBERS = "biuf"
 _WIDEST = 8  # bytes of a number that a message can carry
 _MOST_AXES, _MOST_NUMBERS = 8, 65536
-_RESERVED = frozenset({air.SENSE, air.MEASUREMENT, air.INPUT, air.CENTRE})
+_RESERVED = frozenset({channels.SENSE, channels.MEASUREMENT, channels.INPUT, channels.CENTRE})
 
 
 def declared(given: Any) -> Channels:
@@ -31,7 +31,7 @@ def declared(given: Any) -> Channels:
         if not isinstance(channel, str):
             raise WrongReturn(f"a channel is called by a text, not {channel!r}")
         try:
-            air.check(channel)
+            channels.check(channel)
         except ValueError as error:
             raise WrongReturn(str(error)) from error
         if channel in _RESERVED:

@@ -24,7 +24,7 @@ _SPAN = 64
 
 
 class TickImpairments(NamedTuple):
-    """The air of one tick, or of many with a leading axis.
+    """Impairments of one tick, or of many with a leading axis.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class ImpairmentsByTick:
     seed
         Of the run.
     links, profile
-        Whose air it is.
+        Whose impairments they are.
     codes
         The channels' words in the counters of draws, shape (C',).
     sensing

@@ -1,4 +1,4 @@
-"""The air between two ticks: what is under way, and how it arrives.
+"""Messages in flight: what is under way, and how it arrives.
 
 A loss acts on a message when it is offered. What happens to messages under way afterwards is decided here: those whose receiver
 dies or departs are dropped, and a cut or partition drops, delivers or holds them, as it says.
@@ -12,16 +12,16 @@ import numpy as np
 
 from analysis.models.arrays import Integers, Mask
 from netem.impairments.corrupt import Mark, Marks
-from netem.medium.verdict import PASSED, Fate, Fates
+from netem.medium.verdict import PASSED, Verdict, VerdictCodes
 
 # Rows of `MediumState.under_way`.
 _DUE, _SENT, _CELL, _CONTENT, _MARK, _NUMBER = range(6)
 _MARK_BITS = 3
 # Columns of `Entry.odd` and `Entry.dropped`.
-_COPY_DUE, _FATE = 4, 4
+_COPY_DUE, _WHY = 4, 4
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
-_DELIVERED, _DELAYED, _STALE = int(Fate.DELIVERED), int(Fate.DELAYED), int(Mark.STALE)
+_DELIVERED, _DELAYED, _STALE = int(Verdict.DELIVERED), int(Verdict.DELAYED), int(Mark.STALE)
 
 _NO_CELLS = np.empty(0, dtype=np.int64)
 _NO_DROPPED = np.empty((0, 5), dtype=np.int64)
@@ -35,7 +35,7 @@ class Verdicts(NamedTuple):
 
     Parameters
     ----------
-    fate
+    kind
         DELIVERED, DELAYED, or why it was dropped.
     due
         The tick in whose exchange it arrives; of no meaning where it was dropped.
@@ -45,7 +45,7 @@ class Verdicts(NamedTuple):
         When its copy arrives, -1 where there is none.
     """
 
-    fate: Fates
+    kind: VerdictCodes
     due: Integers
     mark: Marks
     copy_due: Integers
@@ -77,7 +77,7 @@ class MediumState(NamedTuple):
 
     @classmethod
     def empty(cls, shape: tuple[int, int], memories: tuple[Any, ...]) -> MediumState:
-        """The air before the first tick, over (channels, links)."""
+        """Nothing in flight, over (channels, links)."""
         return cls(
             under_way=np.empty((6, 0), dtype=np.int64),
             offered=np.zeros(shape, dtype=np.int64),
@@ -112,7 +112,7 @@ class Delivery(NamedTuple):
     late
         How many of those were under way: from earlier ticks, or copies.
     dropped
-        Messages dropped under way: rows of (sent tick, channel row, link row, number, fate), shape (d, 5).
+        Messages dropped under way: rows of (sent tick, channel row, link row, number, verdict), shape (d, 5).
     released
         Messages that were held and arrive now: rows of (sent tick, channel row, link row, number), shape (r, 4).
     """
@@ -131,8 +131,8 @@ class Entry(NamedTuple):
 
     Parameters
     ----------
-    fates
-        Verdicts, shape (C, L).
+    verdicts
+        What was decided of each message, shape (C, L).
     odd
         Messages that passed late, twice or corrupted, rows of `out_of_the_ordinary`.
     apart, late, dropped, released
@@ -141,7 +141,7 @@ class Entry(NamedTuple):
         All faults injected so far, in plain form, when one was injected or healed.
     """
 
-    fates: Fates
+    verdicts: VerdictCodes
     odd: Integers
     apart: Integers
     late: int
@@ -155,30 +155,32 @@ class Entry(NamedTuple):
         return int(np.count_nonzero(self.odd[:, _COPY_DUE] >= 0))
 
     @property
-    def dropped_by_fate(self) -> Integers:
-        """How many messages under way were dropped, by fate, shape (fates,)."""
-        return np.bincount(self.dropped[:, _FATE], minlength=len(Fate))
+    def dropped_by_verdict(self) -> Integers:
+        """How many messages under way were dropped, by verdict, shape (verdicts,)."""
+        return np.bincount(self.dropped[:, _WHY], minlength=len(Verdict))
 
 
-def deliver(air: MediumState, tick: int, verdicts: Verdicts, doom: Fates, holds: Mask) -> tuple[MediumState, Delivery]:
+def deliver(
+    state: MediumState, tick: int, verdicts: Verdicts, doom: VerdictCodes, holds: Mask
+) -> tuple[MediumState, Delivery]:
     """What arrives in a tick: the messages just passed, and those under way that are due.
 
     Parameters
     ----------
-    air
+    state
         After the verdicts of this tick.
     tick, verdicts
         Now, and what was decided.
     doom, holds
         Why messages under way on each link are dropped, or PASSED, and where they wait, shape (L,).
     """
-    on_time = verdicts.fate == _DELIVERED
+    on_time = verdicts.kind == _DELIVERED
     plain = on_time & (verdicts.mark == 0)
-    delayed, copied = np.flatnonzero(verdicts.fate == _DELAYED), np.flatnonzero(verdicts.copy_due >= 0)
+    delayed, copied = np.flatnonzero(verdicts.kind == _DELAYED), np.flatnonzero(verdicts.copy_due >= 0)
     marked = np.flatnonzero(on_time & ~plain)
-    if not (air.in_flight or len(delayed) or len(copied) or len(marked)):
-        return air, Delivery(np.where(plain, tick, -1), verdicts.mark, plain, *_NOTHING)
-    rows = np.concatenate([air.under_way, _setting_out(tick, air, verdicts, delayed, copied)], axis=1)
+    if not (state.in_flight or len(delayed) or len(copied) or len(marked)):
+        return state, Delivery(np.where(plain, tick, -1), verdicts.mark, plain, *_NOTHING)
+    rows = np.concatenate([state.under_way, _setting_out(tick, state, verdicts, delayed, copied)], axis=1)
     dropped, rows = _drop(rows, doom)
     arrives = rows[_DUE] <= tick
     if holds.any():
@@ -188,12 +190,12 @@ def deliver(air: MediumState, tick: int, verdicts: Verdicts, doom: Fates, holds:
     released = _messages(arriving[:, held], len(doom)) if held.any() else _NO_RELEASED
     late = arriving.shape[1]
     if len(marked):
-        corrupted = _setting_out(tick, air, verdicts, marked, _NO_CELLS)
+        corrupted = _setting_out(tick, state, verdicts, marked, _NO_CELLS)
         arriving = np.concatenate([arriving, corrupted], axis=1)
     newest, mark, apart = _sorted_in(np.where(plain, tick, -1), arriving)
     if len(dropped):
-        air = air._replace(last_due=_without(air.last_due, dropped))
-    return air._replace(under_way=waiting), Delivery(newest, mark, plain, apart, late, dropped, released)
+        state = state._replace(last_due=_without(state.last_due, dropped))
+    return state._replace(under_way=waiting), Delivery(newest, mark, plain, apart, late, dropped, released)
 
 
 def newest_of(plain: Integers, apart: Integers) -> Integers:
@@ -213,7 +215,7 @@ def newest_of(plain: Integers, apart: Integers) -> Integers:
 
 def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
-    passed = (verdicts.fate == _DELIVERED) | (verdicts.fate == _DELAYED)
+    passed = (verdicts.kind == _DELIVERED) | (verdicts.kind == _DELAYED)
     odd = passed & ((verdicts.due != tick) | (verdicts.mark != 0) | (verdicts.copy_due >= 0))
     if not odd.any():
         return _NOTHING_ODD
@@ -222,7 +224,7 @@ def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     return np.stack([channel, link, *details], axis=-1).astype(np.int64)
 
 
-def _setting_out(tick: int, air: MediumState, verdicts: Verdicts, passed: Integers, copied: Integers) -> Integers:
+def _setting_out(tick: int, state: MediumState, verdicts: Verdicts, passed: Integers, copied: Integers) -> Integers:
     """Messages that passed, and copies, by their cells, as columns of `MediumState.under_way`."""
     whole = len(passed)
     rows = np.zeros((6, whole + len(copied)), dtype=np.int64)
@@ -231,11 +233,11 @@ def _setting_out(tick: int, air: MediumState, verdicts: Verdicts, passed: Intege
     rows[_MARK, :whole] = verdicts.mark.take(passed)
     rows[_SENT] = tick
     rows[_CONTENT] = tick - (rows[_MARK] == _STALE)
-    rows[_NUMBER] = air.offered.take(rows[_CELL]) - 1
+    rows[_NUMBER] = state.offered.take(rows[_CELL]) - 1
     return rows
 
 
-def _drop(rows: Integers, doom: Fates) -> tuple[Integers, Integers]:
+def _drop(rows: Integers, doom: VerdictCodes) -> tuple[Integers, Integers]:
     """The messages dropped, as rows of `Delivery.dropped`, and the columns of the others."""
     if doom.min() == PASSED:
         return _NO_DROPPED, rows

@@ -25,12 +25,12 @@ from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts
 from netem.medium.ledger import NOTHING, Accounts, Ledger
-from netem.medium.verdict import BY_THE_AIR, Fate
+from netem.medium.verdict import BY_THE_AIR, Verdict
 from netem.processes import system_errors
 
 VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")
 _DELIVERED, _DELAYED, _DROPPED, _COPIED, _RELEASED = range(5)
-_REASON = np.array([fate.label for fate in Fate])
+_REASON = np.array([kind.label for kind in Verdict])
 _MARK = np.array([mark.label for mark in Mark])
 
 SCHEMA = pa.schema(
@@ -120,21 +120,21 @@ class Writer:
             self._stream.write(self._table(_Rows(*columns), events), self.accounts)
 
     def _of_tick(self, tick: int, entry: Entry) -> list[_Rows]:
-        due, mark, copy_due = _dense(tick, entry.fates.shape, entry.odd)
-        channel, link = np.nonzero(entry.fates != Fate.SILENT)
-        fate = entry.fates[channel, link].astype(np.int64)
+        due, mark, copy_due = _dense(tick, entry.verdicts.shape, entry.odd)
+        channel, link = np.nonzero(entry.verdicts != Verdict.SILENT)
+        kind = entry.verdicts[channel, link].astype(np.int64)
         seq = self._offered[channel, link]
-        passed = fate <= Fate.DELAYED
-        verdict = np.where(passed, fate - Fate.DELIVERED + _DELIVERED, _DROPPED)
+        passed = kind <= Verdict.DELAYED
+        verdict = np.where(passed, kind - Verdict.DELIVERED + _DELIVERED, _DROPPED)
         arrives = np.where(passed, due[channel, link], -1)
-        offered = _Rows(np.full_like(link, tick), channel, link, seq, verdict, fate, arrives, mark[channel, link])
+        offered = _Rows(np.full_like(link, tick), channel, link, seq, verdict, kind, arrives, mark[channel, link])
         doubled, on = np.nonzero(copy_due >= 0)
-        copies = _rows(tick, doubled, on, self._offered[doubled, on], _COPIED, Fate.DELAYED, copy_due[doubled, on])
+        copies = _rows(tick, doubled, on, self._offered[doubled, on], _COPIED, Verdict.DELAYED, copy_due[doubled, on])
         _, ch, li, number, why = entry.dropped.reshape(-1, 5).T
         lost = _rows(tick, ch, li, number, _DROPPED, why, np.full_like(ch, -1))
         _, ch, li, number = entry.released.reshape(-1, 4).T
-        freed = _rows(tick, ch, li, number, _RELEASED, Fate.DELAYED, np.full_like(ch, tick))
-        self._offered += entry.fates != Fate.SILENT
+        freed = _rows(tick, ch, li, number, _RELEASED, Verdict.DELAYED, np.full_like(ch, tick))
+        self._offered += entry.verdicts != Verdict.SILENT
         return [offered, copies, lost, freed]
 
     def _table(self, rows: _Rows, events: dict[int, str]) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class Writer:
             "channel": named(rows.channel, self._channels),
             "seq": rows.seq,
             "verdict": named(rows.verdict, VERDICTS),
-            "reason": named(rows.fate, _REASON, rows.fate < Fate.DEAD),
+            "reason": named(rows.kind, _REASON, rows.kind < Verdict.DEAD),
             "deliver_tick": pa.array(rows.deliver_tick, pa.int32(), mask=rows.deliver_tick < 0),
             "mark": named(rows.mark, _MARK, rows.mark == Mark.NONE),
             "event": event,
@@ -156,10 +156,10 @@ class Writer:
 
 def _ledger(entries: Sequence[Entry]) -> Ledger:
     return Ledger.of(
-        fates=np.stack([entry.fates for entry in entries]),
+        verdicts=np.stack([entry.verdicts for entry in entries]),
         copies=np.array([entry.copies for entry in entries]),
         late=np.array([entry.late for entry in entries]),
-        dropped=np.stack([entry.dropped_by_fate for entry in entries]),
+        dropped=np.stack([entry.dropped_by_verdict for entry in entries]),
     )
 
 
@@ -169,16 +169,16 @@ class _Rows(NamedTuple):
     link: Integers
     seq: Integers
     verdict: Integers
-    fate: Integers
+    kind: Integers
     deliver_tick: Integers
     mark: Integers
 
 
-def _rows(tick: int, channel: Integers, link: Integers, seq: Integers, verdict: int, fate: Any, due: Integers) -> _Rows:
+def _rows(tick: int, channel: Integers, link: Integers, seq: Integers, verdict: int, kind: Any, due: Integers) -> _Rows:
     def every(value: Any) -> Integers:
         return np.broadcast_to(np.asarray(value, dtype=np.int64), link.shape)
 
-    return _Rows(every(tick), channel, link, seq, every(verdict), every(fate), due, every(Mark.NONE))
+    return _Rows(every(tick), channel, link, seq, every(verdict), every(kind), due, every(Mark.NONE))
 
 
 def _dense(tick: int, shape: tuple[int, ...], odd: Integers) -> tuple[Integers, Integers, Integers]:
@@ -271,9 +271,9 @@ def carried(table: Any, links: Links, *, sensing: bool) -> Carried:
     names = [name for name in table["channel"].unique().to_pylist() if (name == SENSE) is sensing]
     if not names:
         raise JournalError(f"the journal has no verdicts on {'sensing' if sensing else 'communication'}")
-    fate = Recorded(table, links, names).fate
-    offered, lost = fate != Fate.SILENT, np.isin(fate, BY_THE_AIR)
-    by_air = lost | (fate == Fate.DELIVERED) | (fate == Fate.DELAYED)
+    kind = Recorded(table, links, names).kind
+    offered, lost = kind != Verdict.SILENT, np.isin(kind, BY_THE_AIR)
+    by_air = lost | (kind == Verdict.DELIVERED) | (kind == Verdict.DELAYED)
     share = 1.0 - lost.sum(axis=1) / np.maximum(offered.sum(axis=1), 1)
     return Carried(share, offered.any(axis=(0, 1)), ~by_air.any(axis=1))
 
@@ -292,7 +292,7 @@ class Recorded:
     def __init__(self, table: Any, links: Links, channels: Sequence[str]) -> None:
         tick, src, dst, due = (table[name].fill_null(-1).to_numpy() for name in ("tick", "src", "dst", "deliver_tick"))
         verdict = places(table["verdict"], VERDICTS)
-        fate = np.maximum(places(table["reason"], _REASON), 0)
+        kind = np.maximum(places(table["reason"], _REASON), 0)
         channel = places(table["channel"], channels)
         seq = table["seq"].to_numpy()
         size = links.agents + 1
@@ -301,7 +301,7 @@ class Recorded:
         here = (src < size) & (dst < size)
         link = np.where(here, row_of[np.where(here, src, 0), np.where(here, dst, 0)], -1)
         shape = (int(tick.max(initial=-1)) + 1, len(channels), len(links))
-        self.fate = np.zeros(shape, dtype=np.uint8)
+        self.kind = np.zeros(shape, dtype=np.uint8)
         self.due = np.broadcast_to(np.arange(shape[0])[:, None, None], shape).copy()
         self.mark = np.zeros(shape, dtype=np.uint8)
         self.copy_due = np.full(shape, -1)
@@ -309,8 +309,8 @@ class Recorded:
         # A row of a message under way is not the first of its number.
         first = known & _first_of_message(channel, link, seq, len(links), verdict)
         at = tick[first], channel[first], link[first]
-        passed = np.where(verdict == _DELAYED, Fate.DELAYED, Fate.DELIVERED)
-        self.fate[at] = np.where(verdict == _DROPPED, fate, passed)[first]
+        passed = np.where(verdict == _DELAYED, Verdict.DELAYED, Verdict.DELIVERED)
+        self.kind[at] = np.where(verdict == _DROPPED, kind, passed)[first]
         self.due[at] = np.where(due < 0, tick, due)[first]
         self.mark[at] = np.maximum(places(table["mark"], _MARK), 0)[first]
         doubled = known & (verdict == _COPIED)
@@ -324,12 +324,12 @@ class Recorded:
         JournalError
             When a message is offered of which the journal says nothing.
         """
-        if tick >= len(self.fate):
+        if tick >= len(self.kind):
             raise JournalError(f"the journal ends before tick {tick}")
-        fate = np.where(offered, self.fate[tick], np.uint8(Fate.SILENT))
-        if (offered & (fate == Fate.SILENT)).any():
+        kind = np.where(offered, self.kind[tick], np.uint8(Verdict.SILENT))
+        if (offered & (kind == Verdict.SILENT)).any():
             raise JournalError(f"the journal has no verdict on some messages of tick {tick}: were other agents flown?")
-        return Verdicts(fate, self.due[tick], self.mark[tick], np.where(offered, self.copy_due[tick], -1))
+        return Verdicts(kind, self.due[tick], self.mark[tick], np.where(offered, self.copy_due[tick], -1))
 
 
 def _first_of_message(channel: Integers, link: Integers, seq: Integers, links: int, verdict: Integers) -> Mask:

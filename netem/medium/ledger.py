@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.models.arrays import Integers
-from netem.medium.verdict import REASONS, Fate, Fates
+from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 
 Counts = Integers
 
@@ -22,26 +22,26 @@ class Ledger:
     dropped: dict[str, int]
 
     @classmethod
-    def of(cls, fates: Fates, copies: Counts, late: Counts, dropped: Counts) -> Ledger:
+    def of(cls, verdicts: VerdictCodes, copies: Counts, late: Counts, dropped: Counts) -> Ledger:
         """The accounts of a run.
 
         Parameters
         ----------
-        fates
+        verdicts
             Verdicts on what was offered, shape (ticks, C, L).
         copies
             Duplicates made in each tick, shape (ticks,).
         late
             Messages and copies that each tick delivered from under way, shape (ticks,).
         dropped
-            Messages under way that each tick dropped, by fate, shape (ticks, fates).
+            Messages under way that each tick dropped, by verdict, shape (ticks, verdicts).
         """
-        offered = np.bincount(fates.ravel(), minlength=len(Fate))
+        offered = np.bincount(verdicts.ravel(), minlength=len(Verdict))
         lost = offered + dropped.sum(axis=0)
         return cls(
-            offered=int(offered.sum() - offered[Fate.SILENT]),
+            offered=int(offered.sum() - offered[Verdict.SILENT]),
             copies=int(copies.sum()),
-            delivered=int(offered[Fate.DELIVERED] + late.sum()),
+            delivered=int(offered[Verdict.DELIVERED] + late.sum()),
             dropped={reason.label: int(lost[reason]) for reason in REASONS if lost[reason]},
         )
 

@@ -22,14 +22,14 @@ from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
 from netem.medium.in_flight import MediumState, Verdicts
 from netem.medium.own_losses import OwnLosses
-from netem.medium.verdict import PASSED, Fate, Fates, stronger
+from netem.medium.verdict import PASSED, Verdict, VerdictCodes, stronger
 
 _SHARED_DRAW = 0
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
-_SILENT, _DELIVERED, _DELAYED = (np.uint8(fate) for fate in (Fate.SILENT, Fate.DELIVERED, Fate.DELAYED))
-_CLOSED, _RANGE, _JAMMED = (np.uint8(fate) for fate in (Fate.CLOSED, Fate.RANGE, Fate.JAMMED))
-_LISTED, _LOST, _OVERFLOW = (np.uint8(fate) for fate in (Fate.LISTED, Fate.LOST, Fate.OVERFLOW))
+_SILENT, _DELIVERED, _DELAYED = (np.uint8(kind) for kind in (Verdict.SILENT, Verdict.DELIVERED, Verdict.DELAYED))
+_CLOSED, _RANGE, _JAMMED = (np.uint8(kind) for kind in (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED))
+_LISTED, _LOST, _OVERFLOW = (np.uint8(kind) for kind in (Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW))
 _STALE = np.uint8(Mark.STALE)
 
 
@@ -106,20 +106,20 @@ class LinkModel:
 
     def judge(
         self,
-        air: MediumState,
+        state: MediumState,
         memory: Memory,
         tick: int,
         offered: Mask,
         position: Array | None,
-        imposed: Fates,
+        imposed: VerdictCodes,
         delay_s: Array | None,
     ) -> tuple[Memory, Verdicts]:
         """The verdict on every message offered in a tick, as `Medium.judge` gives it.
 
         Parameters
         ----------
-        air, memory, tick, offered, position
-            The air and the memory as the tick before left them, and what is offered in this one.
+        state, memory, tick, offered, position
+            The medium's state and the model's memory as the tick before left them, and what is offered in this one.
         imposed
             What the timeline holds: a reason, or PASSED, shape (C, L) or (L,).
         delay_s
@@ -128,13 +128,13 @@ class LinkModel:
         impairments = self._by_tick.at(tick)
         packets = self._packet_chains(memory, tick, offered)
         reason = np.full(self._shape, PASSED)
-        for fate, held in self._layers(air, tick, impairments, packets, position):
-            np.copyto(reason, fate, where=held)
+        for kind, held in self._layers(state, tick, impairments, packets, position):
+            np.copyto(reason, kind, where=held)
         reason = stronger(reason, imposed)
         passed = offered & (reason == PASSED)
         extra_s = packets.extra_s if delay_s is None else packets.extra_s + delay_s
         by_message = delay_s is not None or bool(self._packet_layers)
-        debt, overflow, due, waited_s = self._due(air, memory.debt, tick, impairments, extra_s, passed, by_message)
+        debt, overflow, due, waited_s = self._due(state, memory.debt, tick, impairments, extra_s, passed, by_message)
         if overflow is not None:
             np.copyto(reason, _OVERFLOW, where=overflow)
             passed &= ~overflow
@@ -142,7 +142,7 @@ class LinkModel:
         np.copyto(reason, _DELAYED, where=passed & (due > tick))
         np.copyto(reason, _SILENT, where=~offered)
         copy_due = self._copies(tick, impairments, passed, due, waited_s)
-        verdicts = Verdicts(reason, due, self._marks(air, impairments, passed), copy_due)
+        verdicts = Verdicts(reason, due, self._marks(state, impairments, passed), copy_due)
         return Memory(debt, packets.states), verdicts
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
@@ -156,7 +156,7 @@ class LinkModel:
         return self._by_tick.draw(purpose, ticks, 1)[..., 0]
 
     def _layers(
-        self, air: MediumState, tick: int, impairments: TickImpairments, packets: _Packets, position: Array | None
+        self, state: MediumState, tick: int, impairments: TickImpairments, packets: _Packets, position: Array | None
     ) -> Iterator[tuple[np.uint8, Mask]]:
         """The layers that change from tick to tick, and what each holds: the weakest first."""
         if self.profile.spatial and position is None:
@@ -167,7 +167,7 @@ class LinkModel:
         for own, on in self._own:
             yield _LOST, own.lost(tick, position) & on
         if len(self.profile.listed):
-            yield _LISTED, self._listed(air.offered)
+            yield _LISTED, self._listed(state.offered)
         if position is not None:
             for zone, on in zip(self.profile.zones, impairments.jams.tolist(), strict=True):
                 if on:
@@ -205,7 +205,7 @@ class LinkModel:
 
     def _due(
         self,
-        air: MediumState,
+        state: MediumState,
         debt: Array,
         tick: int,
         impairments: TickImpairments,
@@ -223,13 +223,13 @@ class LinkModel:
             wait = np.where(self._comms, np.maximum(wait, self.profile.least_delay), 0)
         due = tick + wait
         if self.keeps_order:
-            due = np.where(self._ordered, np.maximum(due, air.last_due), due)
+            due = np.where(self._ordered, np.maximum(due, state.last_due), due)
         return debt, overflow, due, extra_s
 
-    def _marks(self, air: MediumState, impairments: TickImpairments, passed: Mask) -> Marks:
+    def _marks(self, state: MediumState, impairments: TickImpairments, passed: Mask) -> Marks:
         if not self._corrupts:
             return self._unmarked
-        return impairments.mark * (passed & ((impairments.mark != _STALE) | air.spoke))
+        return impairments.mark * (passed & ((impairments.mark != _STALE) | state.spoke))
 
     def _copies(
         self, tick: int, impairments: TickImpairments, passed: Mask, due: Integers, waited_s: Array

@@ -22,13 +22,13 @@ from netem.faults.timeline import Conditions, Timeline
 from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
 from netem.medium.link_model import LinkModel, Memory
-from netem.medium.verdict import PASSED, Fate, Fates, doom, standing, stronger
+from netem.medium.verdict import PASSED, Verdict, VerdictCodes, doom, standing, stronger
 
 JOURNAL = "journal.arrows"  # in a run directory
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED, _PAUSED, _SCRIPTED, _DROPOUT = (
-    np.uint8(fate) for fate in (Fate.DELIVERED, Fate.DELAYED, Fate.PAUSED, Fate.SCRIPTED, Fate.DROPOUT)
+    np.uint8(kind) for kind in (Verdict.DELIVERED, Verdict.DELAYED, Verdict.PAUSED, Verdict.SCRIPTED, Verdict.DROPOUT)
 )
 
 
@@ -63,8 +63,8 @@ class _Under(NamedTuple):
         Whether some are lost by chance, not measured by chance, delayed, or ruled by another profile.
     """
 
-    standing: Fates
-    doom: Fates
+    standing: VerdictCodes
+    doom: VerdictCodes
     holds: Mask
     stalls: Mask | None
     loses: bool
@@ -74,7 +74,7 @@ class _Under(NamedTuple):
 
 
 class Medium:
-    """The air of one run: its profiles, a timeline, and a seed.
+    """What carries the messages of one run: its profiles, a timeline, and a seed.
 
     Parameters
     ----------
@@ -111,19 +111,21 @@ class Medium:
         self._cached: _Under
 
     def begin(self) -> MediumState:
-        """The air before the first tick."""
+        """The state before the first tick."""
         return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
 
     def offered(self, awake: Mask) -> Mask:
         """Where messages are offered when these agents (N,) speak on all their links, shape (C, L); all sensors sense."""
         return awake[self._links.src - 1] | self._sensing
 
-    def judge(self, air: MediumState, tick: int, offered: Mask, position: Array | None) -> tuple[MediumState, Verdicts]:
+    def judge(
+        self, state: MediumState, tick: int, offered: Mask, position: Array | None
+    ) -> tuple[MediumState, Verdicts]:
         """The verdict on every message offered in a tick.
 
         Parameters
         ----------
-        air
+        state
             As the tick before left it.
         tick
             Of the offer.
@@ -133,22 +135,22 @@ class Medium:
             The agents', shape (N, D), in metres; only a spatial profile needs them.
         """
         if self._recorded:
-            return air._replace(offered=air.offered + offered), self._recorded.verdicts(tick, offered)
+            return state._replace(offered=state.offered + offered), self._recorded.verdicts(tick, offered)
         now = self.timeline.at(tick)
         under = self._under(now)
-        memories, verdicts = self._by_profile(air, tick, offered, position, now, under)
+        memories, verdicts = self._by_profile(state, tick, offered, position, now, under)
         if under.stalls is not None:
-            np.copyto(verdicts.fate, _DELAYED, where=under.stalls & (verdicts.fate == _DELIVERED))
-        last_due = air.last_due
+            np.copyto(verdicts.kind, _DELAYED, where=under.stalls & (verdicts.kind == _DELIVERED))
+        last_due = state.last_due
         if self._keeps_order:
-            passed = (verdicts.fate == _DELIVERED) | (verdicts.fate == _DELAYED)
+            passed = (verdicts.kind == _DELIVERED) | (verdicts.kind == _DELAYED)
             last_due = np.where(passed, np.maximum(verdicts.due, verdicts.copy_due), last_due)
-        return MediumState(air.under_way, air.offered + offered, offered, last_due, memories), verdicts
+        return MediumState(state.under_way, state.offered + offered, offered, last_due, memories), verdicts
 
-    def deliver(self, air: MediumState, tick: int, verdicts: Verdicts) -> tuple[MediumState, Delivery]:
+    def deliver(self, state: MediumState, tick: int, verdicts: Verdicts) -> tuple[MediumState, Delivery]:
         """What arrives in this tick: the messages just passed, and those under way that are due."""
         under = self._under(self.timeline.at(tick))
-        return deliver(air, tick, verdicts, under.doom, under.holds)
+        return deliver(state, tick, verdicts, under.doom, under.holds)
 
     @property
     def ahead(self) -> bool:
@@ -167,17 +169,17 @@ class Medium:
         return np.array([self._link_models[n].profile.bias[row] for n, row in zip(ruling, link, strict=True)])
 
     def _by_profile(
-        self, air: MediumState, tick: int, offered: Mask, position: Array | None, now: Conditions, under: _Under
+        self, state: MediumState, tick: int, offered: Mask, position: Array | None, now: Conditions, under: _Under
     ) -> tuple[tuple[Memory, ...], Verdicts]:
         imposed, delay_s = self._imposed(tick, now, under), now.delay_s if under.delays else None
         own, *others = self._link_models
         if not under.degrades:
-            memory, verdicts = own.judge(air, air.memories[0], tick, offered, position, imposed, delay_s)
-            rested = (model.rest(memory) for model, memory in zip(others, air.memories[1:], strict=True))
+            memory, verdicts = own.judge(state, state.memories[0], tick, offered, position, imposed, delay_s)
+            rested = (model.rest(memory) for model, memory in zip(others, state.memories[1:], strict=True))
             return (memory, *rested), verdicts
         judged = [
-            model.judge(air, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
-            for number, (model, memory) in enumerate(zip(self._link_models, air.memories, strict=True))
+            model.judge(state, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
+            for number, (model, memory) in enumerate(zip(self._link_models, state.memories, strict=True))
         ]
         whole = judged[0][1]
         for number, (_, verdicts) in enumerate(judged[1:], start=1):
@@ -185,7 +187,7 @@ class Medium:
             whole = _merged(ruled, verdicts, whole)
         return tuple(memory for memory, _ in judged), whole
 
-    def _imposed(self, tick: int, now: Conditions, under: _Under) -> Fates:
+    def _imposed(self, tick: int, now: Conditions, under: _Under) -> VerdictCodes:
         """What the timeline makes of messages: a reason, or PASSED, shape (C, L) or (L,)."""
         reason = under.standing
         if under.drops_out:
@@ -221,7 +223,7 @@ class Medium:
 
 def _merged(ruled: Mask, one: Verdicts, other: Verdicts) -> Verdicts:
     return Verdicts(
-        fate=np.where(ruled, one.fate, other.fate),
+        kind=np.where(ruled, one.kind, other.kind),
         due=np.where(ruled, one.due, other.due),
         mark=np.where(ruled, one.mark, other.mark),
         copy_due=np.where(ruled, one.copy_due, other.copy_due),

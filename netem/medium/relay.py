@@ -20,7 +20,7 @@ from netem.faults.timeline import Conditions, Timeline
 from netem.impairments.corrupt import Mark, Marks, corrupted_fields
 from netem.medium.in_flight import Delivery, Entry, Verdicts, out_of_the_ordinary
 from netem.medium.medium import Medium
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 Said = TypeVar("Said")
 
@@ -56,7 +56,7 @@ class Relayed(NamedTuple):
     @property
     def seen(self) -> Mask:
         """Links whose measurement reaches the agent that made it, shape (L,)."""
-        return self.verdicts.fate[0] == Fate.DELIVERED
+        return self.verdicts.kind[0] == Verdict.DELIVERED
 
     @property
     def arriving(self) -> Integers:
@@ -72,7 +72,7 @@ class Relayed(NamedTuple):
         """What is written down of it."""
         delivery = self.delivery
         return Entry(
-            fates=self.verdicts.fate,
+            verdicts=self.verdicts.kind,
             odd=out_of_the_ordinary(self.tick, self.verdicts),
             apart=delivery.apart,
             late=delivery.late,

@@ -11,12 +11,12 @@ from netem.core.links import Links
 from netem.faults.fault import Verb
 from netem.faults.timeline import Conditions
 
-Fates = NDArray[np.uint8]
+VerdictCodes = NDArray[np.uint8]
 
 PASSED = np.uint8(255)  # no layer holds the message
 
 
-class Fate(IntEnum):
+class Verdict(IntEnum):
     """What became of a message; from DEAD on, the reason it was dropped.
 
     The numbers stand in arrays and digests and never change: another reason takes the next one, and its place in
@@ -46,55 +46,63 @@ class Fate(IntEnum):
         return self.name.lower()
 
 
-FATE_OF = {
-    Verb.KILL: Fate.DEAD,
-    Verb.PAUSE: Fate.PAUSED,
-    Verb.DEPART: Fate.DEPARTED,
-    Verb.CUT: Fate.CUT,
-    Verb.PARTITION: Fate.PARTITION,
-    Verb.LOSE: Fate.SCRIPTED,
-    Verb.DROPOUT: Fate.DROPOUT,
-    Verb.DELAY: Fate.DELAYED,
+VERDICT_OF = {
+    Verb.KILL: Verdict.DEAD,
+    Verb.PAUSE: Verdict.PAUSED,
+    Verb.DEPART: Verdict.DEPARTED,
+    Verb.CUT: Verdict.CUT,
+    Verb.PARTITION: Verdict.PARTITION,
+    Verb.LOSE: Verdict.SCRIPTED,
+    Verb.DROPOUT: Verdict.DROPOUT,
+    Verb.DELAY: Verdict.DELAYED,
 }
 STRONGEST_FIRST = (
-    *(Fate.DEAD, Fate.PAUSED, Fate.DEPARTED, Fate.CUT, Fate.PARTITION, Fate.SCRIPTED, Fate.DROPOUT),
-    *(Fate.CLOSED, Fate.RANGE, Fate.JAMMED, Fate.LISTED, Fate.LOST, Fate.OVERFLOW),
+    *(
+        Verdict.DEAD,
+        Verdict.PAUSED,
+        Verdict.DEPARTED,
+        Verdict.CUT,
+        Verdict.PARTITION,
+        Verdict.SCRIPTED,
+        Verdict.DROPOUT,
+    ),
+    *(Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW),
 )
-REASONS = tuple(fate for fate in Fate if fate >= Fate.DEAD)
-BY_THE_AIR = (Fate.CLOSED, Fate.RANGE, Fate.JAMMED, Fate.LISTED, Fate.LOST, Fate.OVERFLOW)
+REASONS = tuple(kind for kind in Verdict if kind >= Verdict.DEAD)
+BY_THE_AIR = (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW)
 
 _RANK = np.full(256, len(STRONGEST_FIRST), dtype=np.uint8)
 _RANK[list(STRONGEST_FIRST)] = np.arange(len(STRONGEST_FIRST))
 
 
-def stronger(one: Fates, other: Fates) -> Fates:
+def stronger(one: VerdictCodes, other: VerdictCodes) -> VerdictCodes:
     """Of two reasons, or PASSED, the one under which a message is booked that both hold, elementwise."""
     return np.where(_RANK[one] <= _RANK[other], one, other)
 
 
-def standing(links: Links, now: Conditions) -> Fates:
+def standing(links: Links, now: Conditions) -> VerdictCodes:
     """What the timeline makes of a message offered on each link, shape (L,): a reason, or PASSED."""
     reason = np.full(len(links), PASSED)
-    for fate, held in (
-        (Fate.PARTITION, now.partitioned),
-        (Fate.CUT, now.cut),
-        (Fate.DEPARTED, links.touching(now.departed)),
-        (Fate.DEAD, links.touching(now.dead)),
+    for kind, held in (
+        (Verdict.PARTITION, now.partitioned),
+        (Verdict.CUT, now.cut),
+        (Verdict.DEPARTED, links.touching(now.departed)),
+        (Verdict.DEAD, links.touching(now.dead)),
     ):
-        reason[held] = fate
+        reason[held] = kind
     return reason
 
 
-def doom(links: Links, now: Conditions) -> Fates:
+def doom(links: Links, now: Conditions) -> VerdictCodes:
     """What the timeline makes of a message under way on each link, shape (L,): a reason to drop it, or PASSED."""
     receiver = links.dst - 1
     reason = np.full(len(links), PASSED)
-    for fate, held in (
-        (Fate.PARTITION, now.partition_drops),
-        (Fate.CUT, now.cut_drops),
-        (Fate.DEPARTED, now.departed[receiver]),
-        (Fate.PAUSED, now.pause_drops),
-        (Fate.DEAD, now.dead[receiver]),
+    for kind, held in (
+        (Verdict.PARTITION, now.partition_drops),
+        (Verdict.CUT, now.cut_drops),
+        (Verdict.DEPARTED, now.departed[receiver]),
+        (Verdict.PAUSED, now.pause_drops),
+        (Verdict.DEAD, now.dead[receiver]),
     ):
-        reason[held] = fate
+        reason[held] = kind
     return reason

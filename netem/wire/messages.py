@@ -16,7 +16,7 @@ import numpy as np
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core.plain import as_array, located, plainly, shown
 from netem.faults.control import Answer, Order
-from netem.medium.verdict import Fates
+from netem.medium.verdict import VerdictCodes
 
 T = TypeVar("T")
 
@@ -150,16 +150,17 @@ class Told(_Message, frozen=True, kw_only=True):
 class Journal(_Message, frozen=True, kw_only=True):
     """Medium to world: the verdicts of tick k.
 
-    `fates` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Fate`; `odd` the messages
-    that passed late, twice or corrupted, rows of `air.out_of_the_ordinary`; `apart`, `late`, `dropped` and `released` say how
-    messages under way arrived or were dropped, as in `air.Delivery`; `handed` how many broadcasts were put into each agent's
-    inbox, shape (N,); `injected` all faults injected so far, in plain form, when one was injected or healed.
+    `verdicts` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Verdict`; `odd` the
+    messages that passed late, twice or corrupted, rows of `in_flight.out_of_the_ordinary`; `apart`, `late`, `dropped` and
+    `released` say how messages under way arrived or were dropped, as in `in_flight.Delivery`; `handed` how many broadcasts
+    were put into each agent's inbox, shape (N,); `injected` all faults injected so far, in plain form, when one was injected
+    or healed.
     """
 
     k: int
     src: str
     seq: int
-    fates: Fates
+    verdicts: VerdictCodes
     odd: Integers
     apart: Integers
     late: int

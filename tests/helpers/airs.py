@@ -96,13 +96,13 @@ def fly(medium, offered, position=None):
     return flown
 
 
-def fates_of(seed, channels, profile, timeline, ticks):
+def verdicts_of(seed, channels, profile, timeline, ticks):
     """What becomes of a message on every channel and link in every tick, shape (ticks, C, L)."""
     medium = Medium(seed, channels, [profile], timeline)
     flown = fly(
         medium, np.broadcast_to(everything(channels, timeline.links), (ticks, len(channels), len(timeline.links)))
     )
-    return np.stack([tick.verdicts.fate for tick in flown])
+    return np.stack([tick.verdicts.kind for tick in flown])
 
 
 # ---- mixtures

@@ -24,7 +24,7 @@ def flown(*overrides):
 
 def known(run):
     world, arrays = run.plan.world, run.arrays
-    return FirstMeasurements.of(world, run.timeline, arrays["measured"], arrays["fates"][:, 0]).edges()
+    return FirstMeasurements.of(world, run.timeline, arrays["measured"], arrays["verdicts"][:, 0]).edges()
 
 
 ROW = (

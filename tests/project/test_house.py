@@ -11,6 +11,12 @@ import pytest
 import yaml
 from paths import ROOT
 
+from affinet.runtimes import told
+from agents.brief import Brief
+from agents.process import AgentBrief
+from netem.wire import messages
+from netem.wire.session import Login
+
 PAGES = sorted(
     page
     for page in ROOT.rglob("*.md")
@@ -306,3 +312,17 @@ def test_docstrings_that_are_none_are_found(tmp_path):
         "late": [],
         "Fields": ["describes ['a'], takes ['a', 'b']"],
     }
+
+
+PROTOCOL = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+OF_AN_AGENT = (AgentBrief, Login, Brief, messages.SenseInbox, messages.Broadcast, messages.ExchangeInbox, messages.Act)
+
+
+@pytest.mark.parametrize("record", OF_AN_AGENT, ids=lambda record: record.__name__)
+def test_the_protocol_names_every_field_that_an_agent_meets(record):
+    unnamed = [name for name in record.__annotations__ if not re.search(rf"[`\"]{name}[`\"]", PROTOCOL)]
+    assert not unnamed
+
+
+def test_the_protocol_names_every_event_that_an_agent_may_tell():
+    assert [event for event in told.MAY_SAY["agent"] if f'{{"event": "{event}"' not in " ".join(PROTOCOL.split())] == []

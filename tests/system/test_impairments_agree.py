@@ -118,7 +118,7 @@ def check(number, tmp_path):
     again = replace(reseeded, journal=tmp_path / "processes" / JOURNAL)
     flown(again, "inprocess", tmp_path / "again")
     arrays, repeated = (history.load(tmp_path / run / "arrays.npz") for run in ("processes", "again"))
-    for name in ("fates", "newest", "copies", "late", "dropped"):
+    for name in ("verdicts", "newest", "copies", "late", "dropped"):
         assert np.array_equal(arrays[name], repeated[name]), name
     assert journal.read(tmp_path / "again" / JOURNAL).equals(books[0])
 

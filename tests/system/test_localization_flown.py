@@ -13,14 +13,14 @@ from analysis.metrics import localization
 from analysis.metrics.localization import centroid, optimal, ringing
 from analysis.models import jacobi
 from analysis.models.jacobi import weights
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 
 def by_hand(run):
     """The edges of what was measured first, searched for tick by tick and link by link."""
     links, sensor, made = run.plan.world.links, run.plan.world.sensor, []
     for row, (src, dst) in enumerate(zip(links.src.tolist(), links.dst.tolist(), strict=True)):
-        arrived = np.flatnonzero(run.arrays["fates"][:, 0, row] == Fate.DELIVERED)
+        arrived = np.flatnonzero(run.arrays["verdicts"][:, 0, row] == Verdict.DELIVERED)
         if len(arrived):
             y = run.arrays["measured"][arrived[0], row]
             made.append(Measurement(dst - 1, src - 1, y, sensor.spread(y)))

@@ -16,7 +16,7 @@ from affinet.runtimes.side_by_side import side_by_side
 from affinet.studies.batch import fly_all
 from analysis.models.information import position, unpacked
 from netem.core.channels import TARGET
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books.history import History
 
 
@@ -169,7 +169,7 @@ def fused_in_flight(graph, *air):
     run = rehearse(plan_of(NAME, *COARSE, *GRAPHS[graph], MEAN, "time.duration=0.5", *air))
     links, told = run.plan.world.links, run.plan.channels.index(TARGET)
     heard = np.broadcast_to(np.eye(10), (50, 10, 10)).copy()
-    heard[:, links.dst - 1, links.src - 1] = run.arrays["fates"][:, told] == Fate.DELIVERED
+    heard[:, links.dst - 1, links.src - 1] = run.arrays["verdicts"][:, told] == Verdict.DELIVERED
     return run.arrays, heard / heard.sum(axis=-1, keepdims=True)
 
 

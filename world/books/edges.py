@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.models.arrays import Array, Mask
-from netem.medium.verdict import Fate, Fates
+from netem.medium.verdict import Verdict, VerdictCodes
 from world.physics import sensors
 from world.physics.world import World
 
@@ -37,7 +37,14 @@ class EdgesByTick(NamedTuple):
 
 
 def of_swarms(
-    world: World, *, position: Array, measured: Array, fates: Fates, estimate: Array, covariance: Array, known: Mask
+    world: World,
+    *,
+    position: Array,
+    measured: Array,
+    verdicts: VerdictCodes,
+    estimate: Array,
+    covariance: Array,
+    known: Mask,
 ) -> EdgesByTick:
     """Edges of all agents of a world, each agent in its swarm.
 
@@ -47,7 +54,7 @@ def of_swarms(
         Of the swarms.
     position
         Of all agents, shape (..., S N, D), in metres.
-    measured, fates
+    measured, verdicts
         What the sensors said of every link, shape (..., L, D), in metres, and what became of it, shape (..., L).
     estimate, covariance, known
         As in `world.books.history.Moment`, shape (..., S N, n, *).
@@ -70,5 +77,5 @@ def of_swarms(
         if positions
         else np.broadcast_to(np.eye(said.shape[-1]), (*said.shape, said.shape[-1])),
         known=each(known, -2),
-        seen=each(positions & known & (fates == Fate.DELIVERED)[..., slots], -2),
+        seen=each(positions & known & (verdicts == Verdict.DELIVERED)[..., slots], -2),
     )

@@ -19,7 +19,7 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
-from netem.medium.verdict import Fate, Fates
+from netem.medium.verdict import Verdict, VerdictCodes
 from netem.processes import system_errors
 from world.physics.world import Scene, World
 
@@ -37,7 +37,7 @@ _BY_TICK = {
     "covariance": ("f", 4),
     "psi": ("f", 2),
     "feasible": ("i", 2),
-    "fates": ("u", 3),
+    "verdicts": ("u", 3),
     "newest": ("i", 3),
     "copies": ("i", 1),
     "late": ("i", 1),
@@ -96,7 +96,7 @@ class Moments:
         The first tick.
     position, measured, input, estimate, known, covariance, psi, feasible, reports
         As of a `Moment`.
-    fates
+    verdicts
         Verdicts on what was offered, shape (T, C, L).
     target
         Where the manoeuvre wants the agents, shape (T, N, D), in metres.
@@ -107,7 +107,7 @@ class Moments:
     copies, late
         How many messages were doubled, and how many arrived late, shape (T,).
     dropped
-        How many were dropped under way, by fate, shape (T, fates).
+        How many were dropped under way, by verdict, shape (T, verdicts).
     """
 
     first: int
@@ -120,7 +120,7 @@ class Moments:
     psi: Array
     feasible: NDArray[np.int8]
     reports: Mapping[str, Array]
-    fates: Fates
+    verdicts: VerdictCodes
     newest: NDArray[np.int32]
     copies: Integers
     late: Integers
@@ -139,7 +139,7 @@ def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments
     ticks = np.arange(first, first + len(moments))
     where, target = (np.array([getattr(moment, name) for moment in moments]) for name in ("position", "target"))
     entries = [moment.entry for moment in moments]
-    fates = np.array([entry.fates for entry in entries], dtype=np.uint8)
+    verdicts = np.array([entry.verdicts for entry in entries], dtype=np.uint8)
     return Moments(
         first=first,
         position=where,
@@ -151,18 +151,18 @@ def gather(timeline: Timeline, first: int, moments: Sequence[Moment]) -> Moments
         psi=np.array([moment.psi for moment in moments]),
         feasible=np.array([moment.feasible for moment in moments], dtype=np.int8),
         reports={name: np.array([moment.reports[name] for moment in moments]) for name in moments[0].reports},
-        fates=fates,
-        newest=_newest(ticks, fates, entries),
+        verdicts=verdicts,
+        newest=_newest(ticks, verdicts, entries),
         copies=np.array([entry.copies for entry in entries]),
         late=np.array([entry.late for entry in entries]),
-        dropped=np.array([entry.dropped_by_fate for entry in entries]),
+        dropped=np.array([entry.dropped_by_verdict for entry in entries]),
         target=target,
         error=tracking_error(where, target, timeline.present(ticks.tolist())),
     )
 
 
-def _newest(ticks: Integers, fates: Fates, entries: Sequence[Entry]) -> NDArray[np.int32]:
-    newest = np.where(fates == Fate.DELIVERED, ticks[:, None, None], -1)
+def _newest(ticks: Integers, verdicts: VerdictCodes, entries: Sequence[Entry]) -> NDArray[np.int32]:
+    newest = np.where(verdicts == Verdict.DELIVERED, ticks[:, None, None], -1)
     for row, entry in enumerate(entries):
         marked = entry.odd[entry.odd[:, _MARK] != Mark.NONE]
         newest[row, marked[:, 0], marked[:, 1]] = -1
@@ -210,11 +210,11 @@ class History:
         self.psi = np.full((ticks, agents), np.nan)
         self.feasible = np.full((ticks, agents), UNTOLD, dtype=np.int8)
         self.reports = {name: np.full((ticks, agents, *shape), np.nan) for name, shape in reports.items()}
-        self.fates = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
+        self.verdicts = np.zeros((ticks, channels, len(links)), dtype=np.uint8)
         self.newest = np.full((ticks, channels, len(links)), -1, dtype=np.int32)
         self.copies = np.zeros(ticks, dtype=np.int64)
         self.late = np.zeros(ticks, dtype=np.int64)
-        self.dropped = np.zeros((ticks, len(Fate)), dtype=np.int64)
+        self.dropped = np.zeros((ticks, len(Verdict)), dtype=np.int64)
 
     def extend(self, moments: Moments, next_position: Array) -> None:
         """Take in the next ticks, and where they led."""
@@ -305,7 +305,7 @@ def _digested(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
     for name, array in sorted(arrays.items()):
         if name == "dropped":
             yield from (
-                (f"{name} {Fate(number).label}", array[:, number])
+                (f"{name} {Verdict(number).label}", array[:, number])
                 for number in np.flatnonzero(array.any(axis=0)).tolist()
             )
         else:

@@ -14,7 +14,7 @@ from analysis.models.arrays import Array, Mask
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
 from netem.faults.timeline import Timeline
-from netem.medium.verdict import Fate, Fates
+from netem.medium.verdict import Verdict, VerdictCodes
 from world.physics.world import World
 
 
@@ -45,18 +45,18 @@ class FirstMeasurements:
         self.seen = np.zeros((*self.batch, len(self.links)), dtype=bool)
 
     @classmethod
-    def of(cls, world: World, timeline: Timeline, measured: Array, fates: Fates) -> FirstMeasurements:
+    def of(cls, world: World, timeline: Timeline, measured: Array, verdicts: VerdictCodes) -> FirstMeasurements:
         """Those of a whole run: measurements (T, L, D) in every tick, and their verdicts (T, L)."""
         first = cls(world.links, world.sensor, (), world.formation.dimension)
         for tick in range(len(measured)):
-            first.tick(timeline, tick, measured[tick], fates[tick])
+            first.tick(timeline, tick, measured[tick], verdicts[tick])
         return first
 
-    def tick(self, timeline: Timeline, tick: int, measured: Array, fates: Fates) -> None:
+    def tick(self, timeline: Timeline, tick: int, measured: Array, verdicts: VerdictCodes) -> None:
         """Take in a tick of the runs, each as in the timeline: measurements (..., L, D), and their verdicts (..., L)."""
         if fresh := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
             self.seen = self.seen & ~np.isin(self.links.dst, [*fresh])
-        self.take(measured, fates == Fate.DELIVERED)
+        self.take(measured, verdicts == Verdict.DELIVERED)
 
     def take(self, measured: Array, delivered: Mask) -> None:
         """Keep what is new of a tick: measurements (..., L, D), and which arrived (..., L)."""

@@ -48,8 +48,10 @@ class Places:
     def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:
         """Consecutive ticks, of which those `kept` are recorded."""
         known = self._first.seen.sum()
-        for tick, measured, fates in zip(moments.ticks.tolist(), moments.measured, moments.fates[:, 0], strict=True):
-            self._first.tick(timeline, tick, measured, fates)
+        for tick, measured, verdicts in zip(
+            moments.ticks.tolist(), moments.measured, moments.verdicts[:, 0], strict=True
+        ):
+            self._first.tick(timeline, tick, measured, verdicts)
         place, position = moments.reports[PLACE][kept], moments.position[kept] - self._origin
         edges = self._first.edges()
         here = localization.centroid(position, weights(edges))[:, None]

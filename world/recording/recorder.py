@@ -18,7 +18,7 @@ from analysis.metrics import consistency
 from analysis.metrics.errors import procrustes_error
 from analysis.models.arrays import Array
 from netem.faults.timeline import Conditions, Timeline
-from netem.medium.verdict import REASONS, Fate, Fates
+from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
 from world.books.edges import of_swarms
 from world.books.history import Moments
@@ -33,25 +33,25 @@ from world.recording.target import Pursued
 _LEADER, _FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
 _DEAD, _PAUSED, _DEPARTED, _VANISHED = 0x7A1F1FFF, 0xB388FFFF, 0x6E6E6EFF, 0x00000000
 _LINK_COLOURS = {
-    Fate.SILENT: 0x00000000,
-    Fate.DELIVERED: 0x3DDC84FF,
-    Fate.DELAYED: 0x9AD0FFFF,
-    Fate.DEAD: 0x7A1F1FFF,
-    Fate.PAUSED: 0xB388FFFF,
-    Fate.DEPARTED: 0x6E6E6EFF,
-    Fate.CUT: 0xFF3B30FF,
-    Fate.PARTITION: 0xC86BFFFF,
-    Fate.SCRIPTED: 0xFF6B6BFF,
-    Fate.DROPOUT: 0xFF80ABFF,
-    Fate.CLOSED: 0x4A4A4AFF,
-    Fate.RANGE: 0x8D6E63FF,
-    Fate.JAMMED: 0xFFEB3BFF,
-    Fate.LISTED: 0xFFCC80FF,
-    Fate.LOST: 0xFF9F1CFF,
-    Fate.OVERFLOW: 0x26C6DAFF,
+    Verdict.SILENT: 0x00000000,
+    Verdict.DELIVERED: 0x3DDC84FF,
+    Verdict.DELAYED: 0x9AD0FFFF,
+    Verdict.DEAD: 0x7A1F1FFF,
+    Verdict.PAUSED: 0xB388FFFF,
+    Verdict.DEPARTED: 0x6E6E6EFF,
+    Verdict.CUT: 0xFF3B30FF,
+    Verdict.PARTITION: 0xC86BFFFF,
+    Verdict.SCRIPTED: 0xFF6B6BFF,
+    Verdict.DROPOUT: 0xFF80ABFF,
+    Verdict.CLOSED: 0x4A4A4AFF,
+    Verdict.RANGE: 0x8D6E63FF,
+    Verdict.JAMMED: 0xFFEB3BFF,
+    Verdict.LISTED: 0xFFCC80FF,
+    Verdict.LOST: 0xFF9F1CFF,
+    Verdict.OVERFLOW: 0x26C6DAFF,
 }
 _FLUSH_S = 20.0
-_COUNTED = (Fate.DELIVERED, Fate.DELAYED, *REASONS)
+_COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 
 
 class Recorder:
@@ -126,7 +126,7 @@ class Recorder:
         time = [rr.TimeColumn(TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
         position, target = moments.position[kept] - self._origin, moments.target[kept] - self._origin
         self._log_agents(time, [timeline.at(tick) for tick in moments.ticks[kept].tolist()], position)
-        self._log_graph(time, position, target, moments.fates[kept, 0])
+        self._log_graph(time, position, target, moments.verdicts[kept, 0])
         self._scalars("metrics/tracking_error", time, moments.error[kept, None])
         present = timeline.present(moments.ticks[kept].tolist())
         shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
@@ -205,7 +205,8 @@ class Recorder:
             (
                 "metrics/messages",
                 rr.SeriesLines(
-                    names=[fate.label for fate in _COUNTED], colors=[_LINK_COLOURS[fate] for fate in _COUNTED]
+                    names=[verdict.label for verdict in _COUNTED],
+                    colors=[_LINK_COLOURS[verdict] for verdict in _COUNTED],
                 ),
             ),
         ]
@@ -239,7 +240,7 @@ class Recorder:
             self._world,
             position=moments.position[kept],
             measured=moments.measured[kept],
-            fates=moments.fates[kept, 0],
+            verdicts=moments.verdicts[kept, 0],
             estimate=moments.estimate[kept],
             covariance=moments.covariance[kept],
             known=moments.known[kept],
@@ -252,7 +253,7 @@ class Recorder:
 
     def _messages_per_tick(self, moments: Moments) -> Array:
         starts = np.arange(0, len(moments.ticks), self._every)
-        counts = np.stack([(moments.fates == fate).sum(axis=(1, 2)) for fate in _COUNTED], axis=-1)
+        counts = np.stack([(moments.verdicts == verdict).sum(axis=(1, 2)) for verdict in _COUNTED], axis=-1)
         lengths = np.diff(np.append(starts, len(moments.ticks)))
         means: Array = np.add.reduceat(counts, starts, axis=0) / lengths[:, None]
         return means
@@ -269,14 +270,14 @@ class Recorder:
         states = [now.vanished, now.dead, now.departed, now.paused]
         return np.select(states, [_VANISHED, _DEAD, _DEPARTED, _PAUSED], flying).astype(np.uint32)
 
-    def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, fates: Fates) -> None:
+    def _log_graph(self, time: list[rr.TimeColumn], flown: Array, wanted: Array, verdicts: VerdictCodes) -> None:
         position, target = spatial(flown), spatial(wanted)
         links = self._links
         receiver, sender = position[:, links.dst - 1], position[:, links.src - 1]
         # Half an edge for each direction: the half at an agent shows whether that agent hears and sees the other.
         halves = np.stack([(receiver + sender) / 2, receiver], axis=-2)
-        palette = np.array([_LINK_COLOURS[fate] for fate in Fate], dtype=np.uint32)
-        self._segments("swarm/graph/functional", time, halves, palette[fates])
+        palette = np.array([_LINK_COLOURS[verdict] for verdict in Verdict], dtype=np.uint32)
+        self._segments("swarm/graph/functional", time, halves, palette[verdicts])
         self._segments("swarm/graph/nominal", time, position[:, self._edges])
         self._segments("swarm/target", time, target[:, self._edges])
 

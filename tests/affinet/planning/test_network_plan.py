@@ -10,7 +10,7 @@ from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, selectors
 from affinet.scenario.sections import ScenarioError
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 CALM = ("network.availability=1.0", "time.duration=1")
 
@@ -171,18 +171,18 @@ def test_a_trace_is_flown(tmp_path):
     ]
     (tmp_path / "trace.csv").write_text(HEADER + "\n".join(rows) + "\n")
     flown = rehearse(planned(*traced(tmp_path / "trace.csv"))).arrays
-    expected = np.full((100, 4, 24), int(Fate.DELIVERED))
-    expected[50:, :, links.src == 4] = Fate.LOST
-    assert np.array_equal(flown["fates"], expected)
+    expected = np.full((100, 4, 24), int(Verdict.DELIVERED))
+    expected[50:, :, links.src == 4] = Verdict.LOST
+    assert np.array_equal(flown["verdicts"], expected)
 
 
 def test_the_losses_of_an_earlier_run_are_a_trace(tmp_path):
     lossy = planned("network.availability=0.6", 'timeline=[{verb="cut",at=0.2,until=0.4,links=["1-2"]}]')
     fly(lossy, "inprocess", tmp_path / "before", lambda *_: None)
-    again = rehearse(planned(*traced(tmp_path / "before"), "seed=9")).arrays["fates"]
-    lost = rehearse(lossy).arrays["fates"] == Fate.LOST
+    again = rehearse(planned(*traced(tmp_path / "before"), "seed=9")).arrays["verdicts"]
+    lost = rehearse(lossy).arrays["verdicts"] == Verdict.LOST
     assert 0.3 < lost.mean() < 0.5
-    assert np.array_equal(again == Fate.LOST, lost)
+    assert np.array_equal(again == Verdict.LOST, lost)
 
 
 def test_a_run_shorter_than_this_one_is_no_trace(tmp_path):

@@ -12,7 +12,7 @@ from affinet.scenario.sections import ScenarioError
 from netem.core.links import Links
 from netem.medium import journal
 from netem.medium.medium import JOURNAL
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books import history
 
 BEFORE = ("time.dt=0.01", "time.duration=1", "record.enabled=false", "network.availability=0.6")
@@ -44,15 +44,15 @@ def worth(plan, ticks):
 def flown(out, *overrides):
     plan = plan_of("corridor", *BEFORE, *overrides)
     fly(plan, "inprocess", out, lambda *_: None)
-    return plan, history.load(out / history.FILE)["fates"]
+    return plan, history.load(out / history.FILE)["verdicts"]
 
 
 @pytest.fixture(scope="module")
 def before(tmp_path_factory):
     """A run of 100 ticks of 0.01 s, and what the air let pass in each, shape (T, L)."""
     out = tmp_path_factory.mktemp("recorded") / "before"
-    _, fates = flown(out)
-    return out, (fates[:, 0] == Fate.DELIVERED).astype(float)
+    _, verdicts = flown(out)
+    return out, (verdicts[:, 0] == Verdict.DELIVERED).astype(float)
 
 
 # ---- its clock
@@ -134,12 +134,12 @@ def test_links_of_which_it_says_nothing_are_refused(before):
 
 def test_of_a_larger_swarm_the_links_that_are_here_are_taken(tmp_path):
     """Before: one agent too many, and nothing of the journal counted: everything passed."""
-    plan, fates = flown(tmp_path / "run", HEXA)
+    plan, verdicts = flown(tmp_path / "run", HEXA)
     both = [pair for pair in plan.world.links.index if max(pair) < 10 and min(pair) <= 2]
     links = Links.both_ways(9, both)
     carried = journal.carried(journal.read(tmp_path / "run" / JOURNAL), links, sensing=True)
     rows = [plan.world.links.index[pair] for pair in links.index]
-    assert np.array_equal(carried.share, fates[:, 0, rows] == Fate.DELIVERED)
+    assert np.array_equal(carried.share, verdicts[:, 0, rows] == Verdict.DELIVERED)
     assert carried.known.all()
 
 
@@ -161,10 +161,10 @@ def test_of_other_links_those_of_the_same_numbers_are_taken_with_a_note(before):
 
 
 def test_where_nothing_was_offered_or_a_fault_held_it_a_note_says_so(tmp_path):
-    _, fates = flown(tmp_path / "run", 'timeline=[{verb="cut",at=0.2,until=0.45,links=["all"]}]')
+    _, verdicts = flown(tmp_path / "run", 'timeline=[{verb="cut",at=0.2,until=0.45,links=["all"]}]')
     plan = traced(tmp_path / "run", "time.dt=0.01")
     assert (worth(plan, 100)[20:45] == 1.0).all()
-    assert np.array_equal(worth(plan, 100) == 0.0, fates[:, 0] == Fate.LOST)
+    assert np.array_equal(worth(plan, 100) == 0.0, verdicts[:, 0] == Verdict.LOST)
     assert notes(plan) == [
         "profile 't': run: in 25.00% of its ticks and links nothing was offered, or a fault held it: there all passes"
     ]
@@ -172,11 +172,11 @@ def test_where_nothing_was_offered_or_a_fault_held_it_a_note_says_so(tmp_path):
 
 def test_communication_is_worth_what_its_channels_carried(tmp_path):
     """Before: the channel that was first in the journal stood for all."""
-    plan, fates = flown(tmp_path / "run", "network.coupled=false")
+    plan, verdicts = flown(tmp_path / "run", "network.coupled=false")
     assert len(plan.channels) > 2
     sensing, comms = traced(tmp_path / "run", "time.dt=0.01", "network.coupled=false").profiles[0].traces
     assert (sensing.sensing, comms.comms) == (True, True)
-    carried = fates[:, 1:] == Fate.DELIVERED
+    carried = verdicts[:, 1:] == Verdict.DELIVERED
     at = np.searchsorted(comms.ticks, np.arange(100), side="right") - 1
     np.testing.assert_allclose(comms.availability[at], carried.mean(axis=1), atol=1e-12)
 
@@ -215,10 +215,10 @@ def test_a_degraded_link_alone_needs_rows(csv):
     csv.write_text("time,src,dst,availability\n0,1,2,0\n0,2,1,0\n")
     degrade = 'timeline=[{verb="degrade",at=0.5,links=["1-2"],profile="t"}]'
     plan = traced(csv, 'network.profile="perfect"', "time.dt=0.05", degrade)
-    fates, links = rehearse(plan).arrays["fates"], plan.world.links
+    verdicts, links = rehearse(plan).arrays["verdicts"], plan.world.links
     lost = np.zeros((20, len(links)), dtype=bool)
     lost[10:, [links.index[1, 2], links.index[2, 1]]] = True
-    assert np.array_equal(fates[:, 0] == Fate.LOST, lost)
+    assert np.array_equal(verdicts[:, 0] == Verdict.LOST, lost)
     assert notes(plan) == [
         "profile 't': trace.csv: its last row is of 0 s, and each value holds to the end of the run (1 s)"
     ]

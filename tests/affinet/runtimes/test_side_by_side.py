@@ -11,7 +11,7 @@ from affinet.studies.batch import fly_all
 from agents.algebra import kalman
 from agents.estimators.rkf import RelativeKalmanFilter
 from analysis.metrics import consistency, errors
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books.history import History
 
 SEEDS = (1, 7, 2**63 + 5)
@@ -71,7 +71,7 @@ def test_every_run_of_a_batch_is_the_run_alone(name, air):
         agents, links = slice(size * place, size * (place + 1)), slice(width * place, width * (place + 1))
         for array in ("position", "input", "estimate", "covariance", "psi", "known"):
             np.testing.assert_array_equal(flown[array][:, agents], alone[array], array)
-        for array in ("fates", "newest"):
+        for array in ("verdicts", "newest"):
             np.testing.assert_array_equal(flown[array][..., links], alone[array], array)
         np.testing.assert_array_equal(flown["measured"][:, links], alone["measured"])
         assert np.isfinite(alone["position"]).all()
@@ -137,7 +137,7 @@ def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_t
     F, Q = kalman.motion("constant-acceleration", 2, dt, RelativeKalmanFilter().sigma_w)
     for row, seed in enumerate(seeds):
         arrays = rehearse(plan_of(*lossy, f"seed={seed}")).arrays
-        heard = arrays["fates"][:, 0] == Fate.DELIVERED
+        heard = arrays["verdicts"][:, 0] == Verdict.DELIVERED
         assert 0.4 < heard.mean() < 0.6
         # The filters once more, link by link, with innovations as they come.
         means, covariances = kalman.unknown((len(links),), 2, (10.0, 2.0, 1.0))

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 FLOORS = ("netem", "agents", "world", "analysis")
-_ARRAYS = r"\b(Array|Arrays|ArrayLike|NDArray|ndarray|Mask|Integers|Words|Fates|Marks|Counts|Fields|Reading)\b"
+_ARRAYS = r"\b(Array|Arrays|ArrayLike|NDArray|ndarray|Mask|Integers|Words|VerdictCodes|Marks|Counts|Fields|Reading)\b"
 
 
 def functions() -> dict[str, Any]:

@@ -53,12 +53,12 @@ def _carried_off(body, position, motion, flown, push):
     return tuple(one.reshape(*position.shape[:-1], *one.shape[1:]) for one in moved)
 
 
-def _of_swarms(position, measured, fates, estimate, spread, known):
+def _of_swarms(position, measured, verdicts, estimate, spread, known):
     return edges.of_swarms(
         _plan().world,
         position=position,
         measured=measured,
-        fates=fates,
+        verdicts=verdicts,
         estimate=estimate,
         covariance=spread,
         known=known,

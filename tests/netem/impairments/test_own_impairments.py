@@ -15,7 +15,7 @@ from affinet.runtimes.side_by_side import side_by_side
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
 from netem.core.draws import Purpose, uniform
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from netem.processes.user_code import UserCodeError
 
 pytestmark = PROCESSES
@@ -78,8 +78,8 @@ def fading(tmp_path):
     return tmp_path, write(tmp_path, FADING)
 
 
-def fates(plan):
-    return rehearse(plan).arrays["fates"]
+def verdicts(plan):
+    return rehearse(plan).arrays["verdicts"]
 
 
 @pytest.mark.parametrize("coupled", [True, False])
@@ -129,21 +129,21 @@ def test_a_loss_by_an_entry_point_of_a_package_flies_over_processes(tmp_path):
         summary = json.loads((tmp_path / runtime / "summary.json").read_text())
         digests[runtime] = summary["digest"]
     assert digests["inprocess"] == digests["processes"]
-    book = np.load(tmp_path / "processes" / "arrays.npz")["fates"]
+    book = np.load(tmp_path / "processes" / "arrays.npz")["verdicts"]
     dark = np.arange(len(book)) * 0.05 % 0.5 >= 0.25
-    assert (book[dark] == Fate.LOST).all()
-    assert not (book[~dark] == Fate.LOST).any()
+    assert (book[dark] == Verdict.LOST).all()
+    assert not (book[~dark] == Verdict.LOST).any()
 
 
 def test_one_loss_takes_no_draw_of_another(fading):
     folder, name = fading
     night = {"model": f"{name}:ByNight", "day": 0.1}
     plain, together = (
-        fates(planned({"model": "bernoulli", "p": 0.3}, *more, folder=folder)) for more in ((), (night,))
+        verdicts(planned({"model": "bernoulli", "p": 0.3}, *more, folder=folder)) for more in ((), (night,))
     )
-    assert (together[plain == Fate.LOST] == Fate.LOST).all()
-    assert (together == Fate.LOST).sum() > (plain == Fate.LOST).sum()
-    once, twice = (fates(planned(*[night] * number, folder=folder)) == Fate.LOST for number in (1, 2))
+    assert (together[plain == Verdict.LOST] == Verdict.LOST).all()
+    assert (together == Verdict.LOST).sum() > (plain == Verdict.LOST).sum()
+    once, twice = (verdicts(planned(*[night] * number, folder=folder)) == Verdict.LOST for number in (1, 2))
     assert (twice & once == once).all()
     assert twice.sum() > 1.3 * once.sum()  # in the dark 3/4 are lost, where one draw for both would lose 1/2
 
@@ -163,8 +163,8 @@ def test_runs_side_by_side_are_those_flown_alone(fading):
     folder, name = fading
     plan = planned({"model": f"{name}:BySquare"}, {"model": f"{name}:ByNight", "day": 0.3}, folder=folder)
     seed = plan.scenario.seed
-    both = rehearse(side_by_side(plan, [seed, seed + 1])).arrays["fates"]
-    assert np.array_equal(both[..., : len(plan.world.links)], fates(plan))
+    both = rehearse(side_by_side(plan, [seed, seed + 1])).arrays["verdicts"]
+    assert np.array_equal(both[..., : len(plan.world.links)], verdicts(plan))
 
 
 REFUSALS = [

@@ -32,7 +32,7 @@ from netem.impairments.rate import Rate
 from netem.medium.in_flight import Verdicts, newest_of, out_of_the_ordinary
 from netem.medium.ledger import Accounts, Ledger
 from netem.medium.medium import Medium
-from netem.medium.verdict import FATE_OF, REASONS, Fate
+from netem.medium.verdict import REASONS, VERDICT_OF, Verdict
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])
 SIZE = len(LINKS)
@@ -85,12 +85,12 @@ def releases(flown):
 # ---- agents that go
 
 
-@pytest.mark.parametrize(("verb", "fate"), [(Verb.KILL, Fate.DEAD), (Verb.DEPART, Fate.DEPARTED)])
-def test_what_is_under_way_to_an_agent_that_goes_is_dropped_at_once_for_that(verb, fate):
+@pytest.mark.parametrize(("verb", "kind"), [(Verb.KILL, Verdict.DEAD), (Verb.DEPART, Verdict.DEPARTED)])
+def test_what_is_under_way_to_an_agent_that_goes_is_dropped_at_once_for_that(verb, kind):
     flown = fly(medium(quiet(delays=taking([3] * SIZE)), Fault(verb, 5, 6, agents=(2,))), always(12))
     toward_2 = np.flatnonzero(LINKS.dst == 2)
     expected = [
-        [sent, channel, row, sent, fate] for sent in (2, 3, 4) for channel in (INPUT, THETA) for row in toward_2
+        [sent, channel, row, sent, kind] for sent in (2, 3, 4) for channel in (INPUT, THETA) for row in toward_2
     ]
     assert {tick: sorted(rows) for tick, rows in drops(flown).items()} == {5: sorted(expected)}
     for row in toward_2:
@@ -105,34 +105,34 @@ def test_what_a_dying_agent_said_before_still_arrives():
 # ---- cuts and partitions
 
 SEVERING = [
-    (Verb.CUT, {"pairs": ((1, 2),)}, Fate.CUT),
-    (Verb.PARTITION, {"groups": ((1, 4), (2, 3))}, Fate.PARTITION),
+    (Verb.CUT, {"pairs": ((1, 2),)}, Verdict.CUT),
+    (Verb.PARTITION, {"groups": ((1, 4), (2, 3))}, Verdict.PARTITION),
 ]
-SEVERED = pytest.mark.parametrize(("verb", "what", "fate"), SEVERING, ids=["cut", "partition"])
+SEVERED = pytest.mark.parametrize(("verb", "what", "kind"), SEVERING, ids=["cut", "partition"])
 
 
 @SEVERED
-def test_a_cut_or_partition_drops_what_is_under_way_unless_it_says_otherwise(verb, what, fate):
+def test_a_cut_or_partition_drops_what_is_under_way_unless_it_says_otherwise(verb, what, kind):
     fault = Fault(verb, 5, 7, **what)
     flown = fly(medium(quiet(delays=taking([3] * SIZE)), fault), always(12))
     held = np.flatnonzero(Timeline(LINKS, [fault]).held(0))
-    expected = [[sent, channel, row, sent, fate] for sent in (2, 3, 4) for channel in (INPUT, THETA) for row in held]
+    expected = [[sent, channel, row, sent, kind] for sent in (2, 3, 4) for channel in (INPUT, THETA) for row in held]
     assert {tick: sorted(rows) for tick, rows in drops(flown).items()} == {5: sorted(expected)}
     assert arrivals(flown) == [(3, 0), (4, 1), (10, 7), (11, 8)]
     assert (fault.under_way, releases(flown)) == (UnderWay.DROP, {})
 
 
 @SEVERED
-def test_what_is_under_way_on_a_severed_link_is_delivered_when_it_is_due_where_that_is_wanted(verb, what, fate):
+def test_what_is_under_way_on_a_severed_link_is_delivered_when_it_is_due_where_that_is_wanted(verb, what, kind):
     fault = Fault(verb, 5, 7, **what, under_way=UnderWay.DELIVER)
     flown = fly(medium(quiet(delays=taking([3] * SIZE)), fault), always(12))
     assert drops(flown) == releases(flown) == {}
     assert arrivals(flown) == [(tick, tick - 3) for tick in (3, 4, 5, 6, 7, 10, 11)]
-    assert (np.array([flown[tick].verdicts.fate[INPUT, ROW] for tick in (5, 6)]) == fate).all()
+    assert (np.array([flown[tick].verdicts.kind[INPUT, ROW] for tick in (5, 6)]) == kind).all()
 
 
 @SEVERED
-def test_what_is_under_way_on_a_severed_link_is_held_until_it_heals_where_that_is_wanted(verb, what, fate):
+def test_what_is_under_way_on_a_severed_link_is_held_until_it_heals_where_that_is_wanted(verb, what, kind):
     fault = Fault(verb, 5, 9, **what, under_way=UnderWay.HOLD)
     flown = fly(medium(quiet(delays=taking([3] * SIZE)), fault), always(14))
     assert drops(flown) == {}
@@ -141,7 +141,7 @@ def test_what_is_under_way_on_a_severed_link_is_held_until_it_heals_where_that_i
     expected = [[sent, channel, row, sent] for sent in (2, 3, 4) for channel in (INPUT, THETA) for row in held]
     assert {tick: sorted(rows) for tick, rows in releases(flown).items()} == {9: sorted(expected)}
     assert flown[9].delivery.newest[INPUT, ROW] == 4
-    assert (np.array([flown[tick].verdicts.fate[INPUT, ROW] for tick in range(5, 9)]) == fate).all()
+    assert (np.array([flown[tick].verdicts.kind[INPUT, ROW] for tick in range(5, 9)]) == kind).all()
     assert all(flown[tick].air.in_flight > 0 for tick in range(5, 9))
 
 
@@ -170,14 +170,14 @@ def test_of_two_faults_on_a_link_the_one_that_drops_prevails():
     hold = Fault(Verb.CUT, 2, 9, pairs=((1, 2),), under_way=UnderWay.HOLD)
     drop = Fault(Verb.CUT, 5, 6, pairs=((1, 2),))
     flown = fly(medium(quiet(delays=taking([2] * SIZE)), hold, drop), only(12, 1))
-    assert drops(flown) == {5: [[1, INPUT, ROW, 0, Fate.CUT]]}
+    assert drops(flown) == {5: [[1, INPUT, ROW, 0, Verdict.CUT]]}
     assert arrivals(flown) == []
 
 
 def test_a_message_held_for_a_receiver_that_dies_is_dropped_for_that():
     hold = Fault(Verb.CUT, 2, 9, pairs=((1, 2),), under_way=UnderWay.HOLD)
     flown = fly(medium(quiet(delays=taking([2] * SIZE)), hold, Fault(Verb.KILL, 6, 7, agents=(2,))), only(12, 1))
-    assert drops(flown) == {6: [[1, INPUT, ROW, 0, Fate.DEAD]]}
+    assert drops(flown) == {6: [[1, INPUT, ROW, 0, Verdict.DEAD]]}
     assert arrivals(flown) == []
 
 
@@ -190,7 +190,7 @@ def test_a_message_under_way_is_booked_under_the_fault_that_drops_it():
     cut = Fault(Verb.CUT, 2, 9, pairs=((1, 2),), under_way=UnderWay.DELIVER)
     split = Fault(Verb.PARTITION, 2, 9, groups=((1, 4), (2, 3)))
     flown = fly(medium(quiet(delays=taking([2] * SIZE)), cut, split), only(12, 1))
-    assert drops(flown) == {2: [[1, INPUT, ROW, 0, Fate.PARTITION]]}
+    assert drops(flown) == {2: [[1, INPUT, ROW, 0, Verdict.PARTITION]]}
 
 
 # ---- copies
@@ -345,22 +345,22 @@ def test_messages_queue_and_overflow_as_computed_by_hand():
     # Half a message leaves in a tick; the n-th that is taken leaves after 2 (n + 1) ticks, all together from tick 0.
     # Before tick k the queue holds what was taken, less k / 2; a message is refused where it would make more than 3.
     flown = fly(medium(limited(1 / 2, queue=3)), only(12, *range(12)))
-    due = {k: int(v.due[INPUT, ROW]) for k, (v, _, _) in enumerate(flown) if v.fate[INPUT, ROW] != Fate.OVERFLOW}
+    due = {k: int(v.due[INPUT, ROW]) for k, (v, _, _) in enumerate(flown) if v.kind[INPUT, ROW] != Verdict.OVERFLOW}
     assert due == {0: 2, 1: 4, 2: 6, 3: 8, 4: 10, 6: 12, 8: 14, 10: 16}
-    assert [k for k, (v, _, _) in enumerate(flown) if v.fate[INPUT, ROW] == Fate.OVERFLOW] == [5, 7, 9, 11]
+    assert [k for k, (v, _, _) in enumerate(flown) if v.kind[INPUT, ROW] == Verdict.OVERFLOW] == [5, 7, 9, 11]
 
 
 def test_an_idle_link_saves_up_its_burst_and_no_more():
     # The bucket holds two messages: two pass at once, the third waits; six idle ticks fill the bucket, not more.
     flown = fly(medium(limited(1 / 2, queue=9, burst=2)), only(13, 0, 1, 2, 3, 9, 10, 11, 12))
-    waits = [int(v.due[INPUT, ROW]) - k for k, (v, _, _) in enumerate(flown) if v.fate[INPUT, ROW] != Fate.SILENT]
+    waits = [int(v.due[INPUT, ROW]) - k for k, (v, _, _) in enumerate(flown) if v.kind[INPUT, ROW] != Verdict.SILENT]
     # Debt after each, in messages: -1, -1/2, 0, 1/2; full again: -1, -1/2, 0, 1/2.
     assert waits == [0, 0, 0, 1] * 2
 
 
 def test_channels_of_a_link_share_its_queue_in_their_order_and_sensing_has_none():
     verdicts = fly(medium(limited(1, queue=1.5)), always(1))[0].verdicts
-    assert (verdicts.fate == [[Fate.DELIVERED], [Fate.DELAYED], [Fate.OVERFLOW]]).all()
+    assert (verdicts.kind == [[Verdict.DELIVERED], [Verdict.DELAYED], [Verdict.OVERFLOW]]).all()
     assert (verdicts.due[INPUT] == 1).all()
 
 
@@ -375,9 +375,9 @@ def test_a_link_without_a_limit_has_no_queue():
     some = limited(1 / 2, queue=1)
     rates, queues = (np.where(np.arange(SIZE) == ROW, np.inf, value) for value in (some.rate.rate, some.rate.queue))
     flown = fly(medium(replace(some, rate=replace(some.rate, rate=rates, queue=queues))), always(20))
-    fates = np.array([tick.verdicts.fate[INPUT:] for tick in flown])
-    assert (fates[..., ROW] == Fate.DELIVERED).all()
-    assert (np.delete(fates, ROW, axis=-1) != Fate.DELIVERED).all()
+    kinds = np.array([tick.verdicts.kind[INPUT:] for tick in flown])
+    assert (kinds[..., ROW] == Verdict.DELIVERED).all()
+    assert (np.delete(kinds, ROW, axis=-1) != Verdict.DELIVERED).all()
 
 
 # ---- marks
@@ -434,12 +434,12 @@ class Scripted:
         self._by_tick = by_tick
 
     def verdicts(self, tick, offered):
-        fate, due = np.where(offered, np.uint8(Fate.LOST), np.uint8(Fate.SILENT)), np.full(offered.shape, tick)
+        kind, due = np.where(offered, np.uint8(Verdict.LOST), np.uint8(Verdict.SILENT)), np.full(offered.shape, tick)
         mark, copy_due = np.zeros(offered.shape, dtype=np.uint8), np.full(offered.shape, -1)
         if tick in self._by_tick:
             due[INPUT, ROW], mark[INPUT, ROW], copy_due[INPUT, ROW] = self._by_tick[tick]
-            fate[INPUT, ROW] = Fate.DELIVERED if due[INPUT, ROW] == tick else Fate.DELAYED
-        return Verdicts(fate, due, mark, copy_due)
+            kind[INPUT, ROW] = Verdict.DELIVERED if due[INPUT, ROW] == tick else Verdict.DELAYED
+        return Verdicts(kind, due, mark, copy_due)
 
 
 @pytest.mark.parametrize(
@@ -491,20 +491,20 @@ TICKS = 30
 @given(case=cases(TICKS))
 def test_offered_and_copies_are_delivered_dropped_or_in_flight(case):
     _, offered, flown = fly_case(case, CHANNELS, TICKS)
-    fates = np.array([tick.verdicts.fate for tick in flown])
+    kinds = np.array([tick.verdicts.kind for tick in flown])
     late, released = (np.array([value(tick.delivery) for tick in flown]) for value in (lambda d: d.late, len_released))
-    dropped = np.stack([np.bincount(tick.delivery.dropped[:, 4], minlength=len(Fate)) for tick in flown])
+    dropped = np.stack([np.bincount(tick.delivery.dropped[:, 4], minlength=len(Verdict)) for tick in flown])
     copies = np.array([(tick.verdicts.copy_due >= 0).sum() for tick in flown])
     in_flight = flown[-1].air.in_flight
 
-    assert ((fates == Fate.SILENT) == ~offered).all()
-    assert (fates == Fate.DELAYED).sum() + copies.sum() == late.sum() + dropped.sum() + in_flight
+    assert ((kinds == Verdict.SILENT) == ~offered).all()
+    assert (kinds == Verdict.DELAYED).sum() + copies.sum() == late.sum() + dropped.sum() + in_flight
     assert (released <= late).all()
 
-    ledger = Ledger.of(fates, copies, late, dropped)
+    ledger = Ledger.of(kinds, copies, late, dropped)
     assert (ledger.offered, ledger.copies) == (offered.sum(), copies.sum())
-    assert ledger.delivered == (fates == Fate.DELIVERED).sum() + late.sum()
-    assert sum(ledger.dropped.values()) == (fates >= Fate.DEAD).sum() + dropped.sum()
+    assert ledger.delivered == (kinds == Verdict.DELIVERED).sum() + late.sum()
+    assert sum(ledger.dropped.values()) == (kinds >= Verdict.DEAD).sum() + dropped.sum()
     assert ledger.offered + ledger.copies == ledger.delivered + sum(ledger.dropped.values()) + in_flight
     assert Accounts(len(flown), ledger, in_flight).close
     assert not Accounts(len(flown), ledger, in_flight + 1).close
@@ -517,7 +517,7 @@ def len_released(delivery):
 def under_way_of(tick, verdicts, number):
     """What a tick's verdicts put under way: (due, sent, channel, link, content, mark, number)."""
     rows = []
-    for channel, link in np.argwhere(verdicts.fate == Fate.DELAYED).tolist():
+    for channel, link in np.argwhere(verdicts.kind == Verdict.DELAYED).tolist():
         mark = int(verdicts.mark[channel, link])
         content = tick - (mark == Mark.STALE)
         rows.append((int(verdicts.due[channel, link]), tick, channel, link, content, mark, int(number[channel, link])))
@@ -544,7 +544,7 @@ def test_every_message_under_way_arrives_once_when_it_is_due_or_meets_a_fault_th
         arriving = [m for m in flying if m[0] <= tick and UnderWay.HOLD not in policies[m[3]]]
         for message in arriving:
             flying.remove(message)
-        corrupted = np.argwhere((verdicts.fate == Fate.DELIVERED) & (verdicts.mark != Mark.NONE)).tolist()
+        corrupted = np.argwhere((verdicts.kind == Verdict.DELIVERED) & (verdicts.mark != Mark.NONE)).tolist()
         marks = [(c, link, int(verdicts.mark[c, link])) for c, link in corrupted]
         apart = [(content, link, c, mark) for _, _, c, link, content, mark, _ in arriving]
         apart += [(tick - (mark == Mark.STALE), link, c, mark) for c, link, mark in marks]
@@ -552,11 +552,11 @@ def test_every_message_under_way_arrives_once_when_it_is_due_or_meets_a_fault_th
         assert [tuple(row) for row in delivery.apart.tolist()] == sorted(apart)
         assert (delivery.late, air.in_flight) == (len(arriving), len(flying))
         assert Counter(map(tuple, delivery.dropped[:, :4].tolist())) == Counter(m[1:4] + m[6:] for m in dropped)
-        for *_, link, _, fate in delivery.dropped.tolist():
-            assert fate == gone[link] if gone[link] else fate in {FATE_OF[fault.verb] for fault in on[link]}
+        for *_, link, _, kind in delivery.dropped.tolist():
+            assert kind == gone[link] if gone[link] else kind in {VERDICT_OF[fault.verb] for fault in on[link]}
         late = [m[1:4] + m[6:] for m in arriving if m[0] < tick]
         assert Counter(map(tuple, delivery.released.tolist())) == Counter(late)
-        assert (delivery.plain == ((verdicts.fate == Fate.DELIVERED) & (verdicts.mark == Mark.NONE))).all()
+        assert (delivery.plain == ((verdicts.kind == Verdict.DELIVERED) & (verdicts.mark == Mark.NONE))).all()
         assert_newest(tick, delivery)
         number += offered[tick]
 
@@ -587,10 +587,10 @@ def absent(timeline, tick, agent):
     """Why nothing more reaches an agent, if so."""
     verbs = {fault.verb for fault in timeline.faults if fault.active(tick) and agent in fault.agents}
     if Verb.KILL in verbs:
-        return Fate.DEAD
+        return Verdict.DEAD
     if any(fault.under_way is UnderWay.DROP for fault in pausing(timeline, tick, agent)):
-        return Fate.PAUSED
-    return Fate.DEPARTED if Verb.DEPART in verbs else None
+        return Verdict.PAUSED
+    return Verdict.DEPARTED if Verb.DEPART in verbs else None
 
 
 def test_the_mixtures_have_everything_in_them():
@@ -606,24 +606,24 @@ def test_the_mixtures_have_everything_in_them():
         Fault(Verb.DROPOUT, 0, None, pairs=tuple(links.index), probability=0.05),
         Fault(Verb.LOSE, 0, None, pairs=tuple(links.index), probability=0.05),
     ]
-    fates, marks, under_way, released, copies = Counter(), Counter(), Counter(), 0, 0
+    kinds, marks, under_way, released, copies = Counter(), Counter(), Counter(), 0, 0
     for coupled in (True, False):
         standing = mixture(3, IMPAIRMENTS, links, CHANNELS, coupled=coupled)
         offered = chatter(3, CHANNELS, links, 100, 0.7)
         for verdicts, delivery, _ in fly(
             Medium(3, CHANNELS, [standing], Timeline(links, faults)), offered, roaming(3, 5, 100)
         ):
-            fates.update(verdicts.fate.ravel().tolist())
+            kinds.update(verdicts.kind.ravel().tolist())
             marks.update(verdicts.mark.ravel().tolist())
             under_way.update(delivery.dropped[:, 4].tolist())
             released += len(delivery.released)
             copies += int((verdicts.copy_due >= 0).sum())
-    assert set(fates) == set(Fate)
+    assert set(kinds) == set(Verdict)
     assert set(marks) == set(Mark)
-    assert set(under_way) == {Fate.DEAD, Fate.PAUSED, Fate.DEPARTED, Fate.CUT, Fate.PARTITION}
+    assert set(under_way) == {Verdict.DEAD, Verdict.PAUSED, Verdict.DEPARTED, Verdict.CUT, Verdict.PARTITION}
     assert released > 0
     assert copies > 0
-    assert set(REASONS) <= set(fates)
+    assert set(REASONS) <= set(kinds)
 
 
 def test_a_copy_waits_in_the_queue_as_its_message_does():

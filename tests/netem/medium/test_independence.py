@@ -28,14 +28,14 @@ from netem.impairments.chain import Chain, ChainLayer
 from netem.impairments.corrupt import Mark
 from netem.medium.by_tick import ImpairmentsByTick
 from netem.medium.medium import Medium
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 CHANNELS = ("sense", "input", "theta")
 TICKS = 24
 RATE = frozenset({"rate"})
 CASES = cases(TICKS, without=RATE)
-FIELDS = ("fate", "due", "mark", "copy_due")
-FATE, DUE, MARK, _ = range(4)
+FIELDS = ("kind", "due", "mark", "copy_due")
+KIND, DUE, MARK, _ = range(4)
 
 
 def verdicts(case, channels=CHANNELS):
@@ -51,7 +51,7 @@ def whole(flown):
 
 
 def passed(found):
-    return (found[..., FATE] == Fate.DELIVERED) | (found[..., FATE] == Fate.DELAYED)
+    return (found[..., KIND] == Verdict.DELIVERED) | (found[..., KIND] == Verdict.DELAYED)
 
 
 def assert_unchanged(case, more, channels=CHANNELS):
@@ -154,19 +154,19 @@ OF_THE_MEDIUM = SEVERING | {Verb.LOSE, Verb.DELAY, Verb.DEGRADE, Verb.DROPOUT, V
 
 def while_it_holds(fault, old, new, toward):
     """Old and new verdicts on the links it takes hold of, those `toward` its agents among them."""
-    silent = old[..., FATE] == Fate.SILENT
-    assert (silent == (new[..., FATE] == Fate.SILENT)).all()
+    silent = old[..., KIND] == Verdict.SILENT
+    assert (silent == (new[..., KIND] == Verdict.SILENT)).all()
     if fault.verb is Verb.DEGRADE:
         return
-    struck = new[..., FATE] >= Fate.DEAD
+    struck = new[..., KIND] >= Verdict.DEAD
     assert not (passed(new) & ~passed(old)).any()
     assert (new[..., MARK][passed(new)] == old[..., MARK][passed(new)]).all()
     match fault.verb:
         case Verb.LOSE:
-            assert (new[..., FATE][struck & passed(old)] == Fate.SCRIPTED).all()
+            assert (new[..., KIND][struck & passed(old)] == Verdict.SCRIPTED).all()
         case Verb.DROPOUT:
             np.testing.assert_array_equal(new[1:], old[1:])
-            assert (new[..., FATE][struck & passed(old)] == Fate.DROPOUT).all()
+            assert (new[..., KIND][struck & passed(old)] == Verdict.DROPOUT).all()
         case Verb.DELAY:
             assert (passed(new) == passed(old)).all()
             np.testing.assert_array_equal(new[0], old[0])
@@ -174,12 +174,12 @@ def while_it_holds(fault, old, new, toward):
             assert (new[..., DUE] >= old[..., DUE]).all()
         case Verb.PAUSE:
             np.testing.assert_array_equal(new[:, ~toward], old[:, ~toward])
-            assert (new[0, toward, FATE] >= Fate.DEAD).all()
+            assert (new[0, toward, KIND] >= Verdict.DEAD).all()
             heard, before = new[1:, toward], old[1:, toward]
             if fault.under_way is UnderWay.DROP:
                 assert not passed(heard).any()
             else:
-                assert (heard[passed(before), FATE] == Fate.DELAYED).all()
+                assert (heard[passed(before), KIND] == Verdict.DELAYED).all()
                 np.testing.assert_array_equal(heard[~passed(before)], before[~passed(before)])
                 np.testing.assert_array_equal(heard[..., DUE:], before[..., DUE:])
         case verb if verb in SEVERING:
@@ -195,7 +195,7 @@ def when_it_is_over(case, fault, old, new):
     if fault.verb not in OF_THE_MEDIUM or "ordered" not in case.has:
         np.testing.assert_array_equal(new, old)
     assert (passed(new) == passed(old)).all()
-    np.testing.assert_array_equal(new[..., FATE][~passed(new)], old[..., FATE][~passed(old)])
+    np.testing.assert_array_equal(new[..., KIND][~passed(new)], old[..., KIND][~passed(old)])
     np.testing.assert_array_equal(new[..., MARK], old[..., MARK])
 
 
@@ -203,8 +203,8 @@ def when_it_is_over(case, fault, old, new):
 def test_the_verdicts_compared_are_many_and_differ(coupled):
     case = Case(3, 4, RING, 3, frozenset(IMPAIRMENTS) - RATE, coupled, least_delay=0, faults=(), talk=0.7)
     found = verdicts(case)
-    drops = {Fate.CLOSED, Fate.RANGE, Fate.JAMMED, Fate.LISTED, Fate.LOST}
-    assert set(np.unique(found[..., FATE])) == {Fate.SILENT, Fate.DELIVERED, Fate.DELAYED} | drops
+    drops = {Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST}
+    assert set(np.unique(found[..., KIND])) == {Verdict.SILENT, Verdict.DELIVERED, Verdict.DELAYED} | drops
     assert set(np.unique(found[..., MARK])) == set(Mark)
     assert (found[..., -1] >= 0).sum() > 5
 
@@ -226,11 +226,11 @@ def toggling(by_packet, *, coupled):
 
 def outcomes(medium, offered):
     """What becomes of the messages that are offered on one link and channel, tick by tick."""
-    air, fates = medium.begin(), []
+    air, kinds = medium.begin(), []
     for tick, offer in enumerate(offered):
         air, verdicts = medium.judge(air, tick, offer, None)
-        fates.append(int(verdicts.fate[1, THERE]))
-    return np.array(fates)
+        kinds.append(int(verdicts.kind[1, THERE]))
+    return np.array(kinds)
 
 
 def speaking_in(*ticks):
@@ -242,16 +242,16 @@ def speaking_in(*ticks):
 @pytest.mark.parametrize("coupled", [True, False])
 @pytest.mark.parametrize("pause", [0, 1, 2, 99])
 def test_a_chain_that_steps_with_messages_is_frozen_while_the_link_is_idle(coupled, pause):
-    fates = outcomes(toggling(True, coupled=coupled), speaking_in(3, 4, 5 + pause, 6 + pause))
-    first, second, third, fourth = fates[fates != Fate.SILENT]
+    kinds = outcomes(toggling(True, coupled=coupled), speaking_in(3, 4, 5 + pause, 6 + pause))
+    first, second, third, fourth = kinds[kinds != Verdict.SILENT]
     assert first == third != second == fourth
 
 
 @pytest.mark.parametrize("coupled", [True, False])
 @pytest.mark.parametrize("pause", [0, 1, 2, 99])
 def test_a_chain_that_steps_with_time_moves_while_the_link_is_idle(coupled, pause):
-    fates = outcomes(toggling(False, coupled=coupled), speaking_in(3, 4, 5 + pause, 6 + pause))
-    first, second, third, fourth = fates[fates != Fate.SILENT]
+    kinds = outcomes(toggling(False, coupled=coupled), speaking_in(3, 4, 5 + pause, 6 + pause))
+    first, second, third, fourth = kinds[kinds != Verdict.SILENT]
     assert first != second
     assert third != fourth
     assert (third == first) == (pause % 2 == 0)
@@ -266,18 +266,18 @@ def test_an_uncoupled_channel_that_is_idle_is_frozen_whatever_the_others_say():
 
 def test_the_messages_of_a_tick_step_a_coupled_chain_once():
     medium, offered = toggling(True, coupled=True), everything(CHANNELS, PAIR)
-    air, fates = medium.begin(), []
+    air, kinds = medium.begin(), []
     for tick in range(4):
         air, verdicts = medium.judge(air, tick, offered, None)
-        fates.append(verdicts.fate.copy())
-    assert all((fate == fate[:1]).all() for fate in fates)
-    assert (fates[0] != fates[1]).all()
-    assert (fates[0] == fates[2]).all()
+        kinds.append(verdicts.kind.copy())
+    assert all((kind == kind[:1]).all() for kind in kinds)
+    assert (kinds[0] != kinds[1]).all()
+    assert (kinds[0] == kinds[2]).all()
 
 
 def test_a_message_that_is_lost_steps_its_chain_too():
-    fates = outcomes(toggling(True, coupled=False), speaking_in(*range(8)))
-    assert (fates[:-1] != fates[1:]).all()
+    kinds = outcomes(toggling(True, coupled=False), speaking_in(*range(8)))
+    assert (kinds[:-1] != kinds[1:]).all()
 
 
 def test_a_link_that_steps_with_messages_leaves_those_that_step_with_time():
@@ -288,15 +288,15 @@ def test_a_link_that_steps_with_messages_leaves_those_that_step_with_time():
     other = PAIR.index[2, 1]
     offered = np.zeros((20, len(CHANNELS), 2), dtype=bool)
     offered[::2, 1] = True
-    fates = []
+    kinds = []
     for medium in (both, by_time):
         air, flown = medium.begin(), []
         for tick, offer in enumerate(offered):
             air, verdicts = medium.judge(air, tick, offer, None)
-            flown.append(verdicts.fate[1])
-        fates.append(np.array(flown))
-    assert (fates[0][:, other] == fates[1][:, other]).all()
-    assert (fates[0][:, THERE] != fates[1][:, THERE]).any()
+            flown.append(verdicts.kind[1])
+        kinds.append(np.array(flown))
+    assert (kinds[0][:, other] == kinds[1][:, other]).all()
+    assert (kinds[0][:, THERE] != kinds[1][:, THERE]).any()
 
 
 # ---- any order of ticks

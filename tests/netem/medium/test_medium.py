@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from airs import BITS, DT, IMPAIRMENTS, constant, fates_of, fly, losing, mixture, quiet_profile, roaming, taking
+from airs import BITS, DT, IMPAIRMENTS, constant, fly, losing, mixture, quiet_profile, roaming, taking, verdicts_of
 from airs import everything as everything_on
 
 from netem.core.links import Links
@@ -18,7 +18,7 @@ from netem.impairments.schedule import Schedule
 from netem.impairments.trace import Trace
 from netem.medium.ledger import Accounts, Ledger
 from netem.medium.medium import Medium
-from netem.medium.verdict import REASONS, Fate
+from netem.medium.verdict import REASONS, Verdict
 
 LINKS = Links.both_ways(5, [(1, 2), (2, 3), (3, 4), (4, 5), (5, 1), (1, 3)])
 CHANNELS = ("sense", "input", "theta")
@@ -48,12 +48,12 @@ def judged(standing, faults=(), seed=1, offered=None, position=None):
     """What becomes of the messages of the first tick, shape (C, L)."""
     flying = medium(standing, faults, seed)
     _, verdicts = flying.judge(flying.begin(), 0, everything() if offered is None else offered, position)
-    return verdicts.fate
+    return verdicts.kind
 
 
 def verdicts(standing, ticks, faults=(), seed=1):
     """What becomes of a message on every channel and link in every tick, shape (ticks, C, L)."""
-    return fates_of(seed, CHANNELS, standing, Timeline(LINKS, faults), ticks)
+    return verdicts_of(seed, CHANNELS, standing, Timeline(LINKS, faults), ticks)
 
 
 # ---- verdicts
@@ -62,17 +62,19 @@ def verdicts(standing, ticks, faults=(), seed=1):
 def test_a_perfect_link_delivers_all_that_is_offered_and_nothing_else():
     offered = everything()
     offered[1, 3] = False
-    fates = judged(quiet_profile(LINKS, CHANNELS), offered=offered)
-    assert fates[1, 3] == Fate.SILENT
-    assert (fates[offered] == Fate.DELIVERED).all()
+    kinds = judged(quiet_profile(LINKS, CHANNELS), offered=offered)
+    assert kinds[1, 3] == Verdict.SILENT
+    assert (kinds[offered] == Verdict.DELIVERED).all()
 
 
 def test_a_link_without_availability_loses_all():
-    assert (verdicts(profile(availability=0.0), 100) == Fate.LOST).all()
+    assert (verdicts(profile(availability=0.0), 100) == Verdict.LOST).all()
 
 
 def test_silence_is_silence_even_on_a_cut_link():
-    assert (judged(profile(), [Fault(Verb.CUT, 0, None, pairs=((1, 2),))], offered=~everything()) == Fate.SILENT).all()
+    assert (
+        judged(profile(), [Fault(Verb.CUT, 0, None, pairs=((1, 2),))], offered=~everything()) == Verdict.SILENT
+    ).all()
 
 
 ROW = LINKS.index[1, 2]
@@ -106,24 +108,24 @@ def with_no_queue(standing):
 
 
 HOLDING_LINK_1_2 = [
-    (Fate.DEAD, Fault(Verb.KILL, 0, None, agents=(2,))),
-    (Fate.PAUSED, Fault(Verb.PAUSE, 0, None, agents=(2,))),
-    (Fate.DEPARTED, Fault(Verb.DEPART, 0, None, agents=(2,))),
-    (Fate.CUT, Fault(Verb.CUT, 0, None, pairs=((1, 2),))),
-    (Fate.PARTITION, Fault(Verb.PARTITION, 0, None, groups=((1,), (2,)))),
-    (Fate.SCRIPTED, Fault(Verb.LOSE, 0, None, pairs=((1, 2),), probability=1.0)),
-    (Fate.DROPOUT, Fault(Verb.DROPOUT, 0, None, pairs=((1, 2),), probability=1.0)),
-    (Fate.CLOSED, with_closed),
-    (Fate.RANGE, with_nothing_in_range),
-    (Fate.JAMMED, with_all_jammed),
-    (Fate.LISTED, with_all_listed),
-    (Fate.LOST, with_all_lost),
-    (Fate.OVERFLOW, with_no_queue),
+    (Verdict.DEAD, Fault(Verb.KILL, 0, None, agents=(2,))),
+    (Verdict.PAUSED, Fault(Verb.PAUSE, 0, None, agents=(2,))),
+    (Verdict.DEPARTED, Fault(Verb.DEPART, 0, None, agents=(2,))),
+    (Verdict.CUT, Fault(Verb.CUT, 0, None, pairs=((1, 2),))),
+    (Verdict.PARTITION, Fault(Verb.PARTITION, 0, None, groups=((1,), (2,)))),
+    (Verdict.SCRIPTED, Fault(Verb.LOSE, 0, None, pairs=((1, 2),), probability=1.0)),
+    (Verdict.DROPOUT, Fault(Verb.DROPOUT, 0, None, pairs=((1, 2),), probability=1.0)),
+    (Verdict.CLOSED, with_closed),
+    (Verdict.RANGE, with_nothing_in_range),
+    (Verdict.JAMMED, with_all_jammed),
+    (Verdict.LISTED, with_all_listed),
+    (Verdict.LOST, with_all_lost),
+    (Verdict.OVERFLOW, with_no_queue),
 ]
 
 
 def test_there_is_a_case_for_every_reason():
-    assert tuple(fate for fate, _ in HOLDING_LINK_1_2) == REASONS
+    assert tuple(kind for kind, _ in HOLDING_LINK_1_2) == REASONS
 
 
 @pytest.mark.parametrize("hidden", range(len(HOLDING_LINK_1_2)))
@@ -134,23 +136,23 @@ def test_a_message_is_booked_under_the_strongest_layer_that_holds_it(hidden, ord
     for impair in layers:
         standing = standing if isinstance(impair, Fault) else impair(standing)
     strongest, _ = HOLDING_LINK_1_2[hidden]
-    fates = judged(standing, faults, position=STANDING)[:, ROW]
-    heard, _ = HOLDING_LINK_1_2[hidden + (strongest == Fate.DROPOUT)]  # only sensors drop out
-    assert (fates[1:] == heard).all()
-    assert fates[0] == (Fate.DELIVERED if strongest == Fate.OVERFLOW else strongest)  # sensing has no queue
+    kinds = judged(standing, faults, position=STANDING)[:, ROW]
+    heard, _ = HOLDING_LINK_1_2[hidden + (strongest == Verdict.DROPOUT)]  # only sensors drop out
+    assert (kinds[1:] == heard).all()
+    assert kinds[0] == (Verdict.DELIVERED if strongest == Verdict.OVERFLOW else strongest)  # sensing has no queue
 
 
 def test_a_dead_agent_is_neither_sensed_nor_heard_nor_reached():
-    fates = judged(profile(), [Fault(Verb.KILL, 0, None, agents=(4,))])
+    kinds = judged(profile(), [Fault(Verb.KILL, 0, None, agents=(4,))])
     touched = (LINKS.src == 4) | (LINKS.dst == 4)
-    assert (fates[:, touched] == Fate.DEAD).all()
-    assert (fates[:, ~touched] == Fate.DELIVERED).all()
+    assert (kinds[:, touched] == Verdict.DEAD).all()
+    assert (kinds[:, ~touched] == Verdict.DELIVERED).all()
 
 
 def test_a_cut_one_way_leaves_the_way_back():
-    fates = judged(profile(), [Fault(Verb.CUT, 0, None, pairs=((1, 2),))])
-    assert (fates[:, LINKS.index[1, 2]] == Fate.CUT).all()
-    assert (fates[:, LINKS.index[2, 1]] == Fate.DELIVERED).all()
+    kinds = judged(profile(), [Fault(Verb.CUT, 0, None, pairs=((1, 2),))])
+    assert (kinds[:, LINKS.index[1, 2]] == Verdict.CUT).all()
+    assert (kinds[:, LINKS.index[2, 1]] == Verdict.DELIVERED).all()
 
 
 def test_layers_are_independent():
@@ -175,18 +177,18 @@ def test_layers_are_independent():
     alone = [verdicts(quiet, TICKS, [fault]) for fault in faults]
     alone += [verdicts(replace(quiet, **{name: layer}), TICKS) for name, layer in layers.items()]
     together = verdicts(replace(quiet, **layers), TICKS, faults)
-    dropped = np.stack([np.where(fates >= Fate.DEAD, fates, 255) for fates in alone])
+    dropped = np.stack([np.where(kinds >= Verdict.DEAD, kinds, 255) for kinds in alone])
     strongest = dropped.min(axis=0)
-    assert (together == np.where(strongest == 255, Fate.DELIVERED, strongest)).all()
-    assert set(np.unique(together)) == {Fate.DELIVERED, *REASONS} - {Fate.RANGE, Fate.JAMMED, Fate.OVERFLOW}
+    assert (together == np.where(strongest == 255, Verdict.DELIVERED, strongest)).all()
+    assert set(np.unique(together)) == {Verdict.DELIVERED, *REASONS} - {Verdict.RANGE, Verdict.JAMMED, Verdict.OVERFLOW}
 
 
 def test_what_is_judged_first_does_not_matter():
     flying = medium(profile(availability=0.5), [Fault(Verb.CUT, 9, 12, pairs=((1, 2),))])
-    forward = [flying.judge(flying.begin(), tick, everything(), None)[1].fate for tick in range(TICKS)]
+    forward = [flying.judge(flying.begin(), tick, everything(), None)[1].kind for tick in range(TICKS)]
     assert len(np.unique(forward, axis=0)) > TICKS / 2
     for tick in reversed(range(TICKS)):
-        assert (flying.judge(flying.begin(), tick, everything(), None)[1].fate == forward[tick]).all()
+        assert (flying.judge(flying.begin(), tick, everything(), None)[1].kind == forward[tick]).all()
 
 
 @pytest.mark.parametrize("impair", [with_nothing_in_range, with_all_jammed])
@@ -203,7 +205,7 @@ def test_a_zone_jams_the_links_it_can_toward_agents_inside_in_its_share_of_ticks
     zone = Zone(np.array([0.0, 1.0]), 3.0, 0.4, rows, sensing=False, comms=True)
     inside = rows & np.isin(LINKS.dst, [1, 2])  # agents 1 and 2 are 0 m and 2.8 m from its centre, agent 3 is 5.7 m
     flown = fly(medium(profile(zones=(zone,), coupled=False)), always(500), np.broadcast_to(STANDING, (500, 5, 2)))
-    jammed = np.array([tick.verdicts.fate == Fate.JAMMED for tick in flown])
+    jammed = np.array([tick.verdicts.kind == Verdict.JAMMED for tick in flown])
     on = jammed.any(axis=(1, 2))
     assert (jammed[on][:, 1:] == inside).all()
     assert not jammed[:, 0].any()
@@ -213,10 +215,10 @@ def test_a_zone_jams_the_links_it_can_toward_agents_inside_in_its_share_of_ticks
 def test_a_disk_holds_the_links_it_can_that_are_too_long():
     rows = LINKS.src != 3
     disk = Reach(ReachLaw.RAMP, rows, 3.0, 3.0, 0.0, 0.0, 1, sensing=True, comms=False)
-    fates = judged(profile(reaches=(disk,), coupled=False), position=STANDING)
+    kinds = judged(profile(reaches=(disk,), coupled=False), position=STANDING)
     neighbours = abs(LINKS.src - LINKS.dst) == 1  # 2.8 m apart, the others more
-    assert (fates[0] == np.where(rows & ~neighbours, Fate.RANGE, Fate.DELIVERED)).all()
-    assert (fates[1:] == Fate.DELIVERED).all()
+    assert (kinds[0] == np.where(rows & ~neighbours, Verdict.RANGE, Verdict.DELIVERED)).all()
+    assert (kinds[1:] == Verdict.DELIVERED).all()
 
 
 # ---- loss
@@ -225,22 +227,22 @@ def test_a_disk_holds_the_links_it_can_that_are_too_long():
 def test_messages_are_lost_at_the_rate_of_their_link():
     availability = np.linspace(0.05, 0.95, SIZE)
     ticks = 2000
-    fates = verdicts(profile(availability, coupled=False), ticks, seed=3)
-    delivered = (fates == Fate.DELIVERED).sum(axis=(0, 1))
+    kinds = verdicts(profile(availability, coupled=False), ticks, seed=3)
+    delivered = (kinds == Verdict.DELIVERED).sum(axis=(0, 1))
     offered = ticks * len(CHANNELS)
     sigma = np.sqrt(offered * availability * (1.0 - availability))
     assert (abs(delivered - offered * availability) < 3 * sigma).all()
 
 
 def test_coupled_channels_share_one_verdict_per_link_and_tick():
-    fates = verdicts(profile(availability=0.5), 200, seed=3)
-    assert (fates == fates[:, :1]).all()
-    assert {Fate.LOST, Fate.DELIVERED} == set(np.unique(fates))
+    kinds = verdicts(profile(availability=0.5), 200, seed=3)
+    assert (kinds == kinds[:, :1]).all()
+    assert {Verdict.LOST, Verdict.DELIVERED} == set(np.unique(kinds))
 
 
 def test_uncoupled_channels_are_lost_independently():
-    fates = verdicts(profile(availability=0.5, coupled=False), 2000, seed=3)
-    heard = fates == Fate.DELIVERED
+    kinds = verdicts(profile(availability=0.5, coupled=False), 2000, seed=3)
+    heard = kinds == Verdict.DELIVERED
     all_three, offered = heard.all(axis=1).sum(), 2000 * SIZE
     assert abs(all_three - offered / 8) < 3 * np.sqrt(offered * 1 / 8 * 7 / 8)
 
@@ -248,15 +250,15 @@ def test_uncoupled_channels_are_lost_independently():
 @pytest.mark.parametrize("sensing", [True, False])
 def test_uncoupled_losses_strike_the_channels_of_their_class_alone(sensing):
     layer = replace(losing(np.zeros(SIZE)), sensing=sensing, comms=not sensing)
-    fates = judged(quiet_profile(LINKS, CHANNELS, chains=(layer,), coupled=False))
+    kinds = judged(quiet_profile(LINKS, CHANNELS, chains=(layer,), coupled=False))
     struck = np.array([sensing, not sensing, not sensing])
-    assert (fates[struck] == Fate.LOST).all()
-    assert (fates[~struck] == Fate.DELIVERED).all()
+    assert (kinds[struck] == Verdict.LOST).all()
+    assert (kinds[~struck] == Verdict.DELIVERED).all()
 
 
 def test_the_two_directions_of_an_edge_are_lost_independently():
-    fates = verdicts(profile(availability=0.5), 4000, seed=3)[:, 0]
-    there, back = (fates[:, LINKS.index[pair]] == Fate.DELIVERED for pair in ((1, 2), (2, 1)))
+    kinds = verdicts(profile(availability=0.5), 4000, seed=3)[:, 0]
+    there, back = (kinds[:, LINKS.index[pair]] == Verdict.DELIVERED for pair in ((1, 2), (2, 1)))
     assert abs((there & back).sum() - 1000) < 3 * np.sqrt(4000 * 1 / 4 * 3 / 4)
 
 
@@ -267,10 +269,14 @@ def test_another_seed_loses_other_messages():
 
 def test_scripted_loss_comes_on_top_of_the_loss_of_the_air():
     lose = Fault(Verb.LOSE, 0, None, pairs=tuple(LINKS.index), probability=0.4)
-    fates = verdicts(profile(availability=0.7, coupled=False), 1000, [lose, lose], seed=3)
-    messages = fates.size
-    for fate, share in ((Fate.SCRIPTED, 1 - 0.6**2), (Fate.LOST, 0.6**2 * 0.3), (Fate.DELIVERED, 0.6**2 * 0.7)):
-        assert abs((fates == fate).sum() - messages * share) < 3 * np.sqrt(messages * share * (1 - share))
+    kinds = verdicts(profile(availability=0.7, coupled=False), 1000, [lose, lose], seed=3)
+    messages = kinds.size
+    for kind, share in (
+        (Verdict.SCRIPTED, 1 - 0.6**2),
+        (Verdict.LOST, 0.6**2 * 0.3),
+        (Verdict.DELIVERED, 0.6**2 * 0.7),
+    ):
+        assert abs((kinds == kind).sum() - messages * share) < 3 * np.sqrt(messages * share * (1 - share))
 
 
 # ---- delay
@@ -335,8 +341,8 @@ def test_a_scripted_delay_delays_what_is_said_on_its_links_while_it_lasts_and_no
     expected = np.zeros((12, len(CHANNELS), SIZE), dtype=int)
     expected[5:8, 1:, ROW] = 3  # 2.5 ticks: the exchange after
     np.testing.assert_array_equal(waits, expected)
-    fates = np.array([tick.verdicts.fate for tick in flown])
-    np.testing.assert_array_equal(fates, np.where(expected > 0, Fate.DELAYED, Fate.DELIVERED))
+    kinds = np.array([tick.verdicts.kind for tick in flown])
+    np.testing.assert_array_equal(kinds, np.where(expected > 0, Verdict.DELAYED, Verdict.DELIVERED))
 
 
 def test_scripted_delays_add_up_with_each_other_and_with_those_of_the_air():
@@ -507,12 +513,12 @@ def test_what_is_sent_to_a_paused_agent_waits_and_arrives_in_order_when_it_goes_
 
 @pytest.mark.parametrize("policy", [UnderWay.HOLD, UnderWay.DROP])
 def test_a_paused_agent_measures_nothing_and_is_measured_and_heard_by_others(policy):
-    fates = np.array([tick.verdicts.fate for tick in fly(medium(profile(), paused(policy)), always(10))])
-    heard = {UnderWay.HOLD: Fate.DELAYED, UnderWay.DROP: Fate.PAUSED}[policy]
-    assert (fates[5:8, 0][:, TOWARD_2] == Fate.PAUSED).all()
-    assert (fates[5:8, 1:][..., TOWARD_2] == heard).all()
-    assert (fates[..., ~TOWARD_2] == Fate.DELIVERED).all()
-    assert (fates[[0, 4, 8, 9]] == Fate.DELIVERED).all()
+    kinds = np.array([tick.verdicts.kind for tick in fly(medium(profile(), paused(policy)), always(10))])
+    heard = {UnderWay.HOLD: Verdict.DELAYED, UnderWay.DROP: Verdict.PAUSED}[policy]
+    assert (kinds[5:8, 0][:, TOWARD_2] == Verdict.PAUSED).all()
+    assert (kinds[5:8, 1:][..., TOWARD_2] == heard).all()
+    assert (kinds[..., ~TOWARD_2] == Verdict.DELIVERED).all()
+    assert (kinds[[0, 4, 8, 9]] == Verdict.DELIVERED).all()
 
 
 @pytest.mark.parametrize("policy", [UnderWay.HOLD, UnderWay.DROP])
@@ -525,7 +531,7 @@ def test_what_is_under_way_to_an_agent_when_it_is_paused_waits_with_the_rest_or_
     else:
         assert arrivals(flown) == [*before, *after]
         dropped = flown[5].delivery.dropped
-        assert set(dropped[:, 4]) == {Fate.PAUSED}
+        assert set(dropped[:, 4]) == {Verdict.PAUSED}
         assert len(dropped) == 2 * 2 * TOWARD_2.sum()
         assert set(dropped[:, 2]) == set(np.flatnonzero(TOWARD_2))
 
@@ -533,7 +539,7 @@ def test_what_is_under_way_to_an_agent_when_it_is_paused_waits_with_the_rest_or_
 def test_what_waits_for_a_paused_agent_that_dies_is_dropped_for_its_death():
     faults = [*paused(UnderWay.HOLD), Fault(Verb.KILL, 7, None, agents=(2,))]
     flown = fly(medium(profile(), faults), always(10))
-    assert set(flown[7].delivery.dropped[:, 4]) == {Fate.DEAD}
+    assert set(flown[7].delivery.dropped[:, 4]) == {Verdict.DEAD}
     assert len(flown[7].delivery.dropped) == 2 * 2 * TOWARD_2.sum()
     assert flown[-1].air.in_flight == 0
 
@@ -542,7 +548,7 @@ def test_of_two_pauses_one_that_drops_takes_what_the_other_holds():
     faults = [*paused(UnderWay.HOLD), Fault(Verb.PAUSE, 6, 7, agents=(2,))]
     flown = fly(medium(profile(), faults), always(10))
     assert arrivals(flown) == [*((k, k) for k in range(5)), (8, 7), (8, 8), (9, 9)]
-    assert {(sent, fate) for sent, *_, fate in flown[6].delivery.dropped.tolist()} == {(5, Fate.PAUSED)}
+    assert {(sent, kind) for sent, *_, kind in flown[6].delivery.dropped.tolist()} == {(5, Verdict.PAUSED)}
 
 
 def test_what_is_lost_on_its_way_to_a_paused_agent_does_not_wait_for_it():
@@ -557,28 +563,28 @@ def test_what_is_lost_on_its_way_to_a_paused_agent_does_not_wait_for_it():
 
 def test_only_sensing_drops_out_on_its_links_as_often_as_asked_for():
     fault = Fault(Verb.DROPOUT, 0, None, pairs=((1, 2), (2, 3)), probability=0.3)
-    fates = verdicts(profile(coupled=False), 2000, [fault], seed=3)
+    kinds = verdicts(profile(coupled=False), 2000, [fault], seed=3)
     struck = np.isin(np.arange(SIZE), [ROW, LINKS.index[2, 3]])
-    assert (fates[:, 1:] == Fate.DELIVERED).all()
-    assert (fates[:, 0, ~struck] == Fate.DELIVERED).all()
-    assert set(np.unique(fates[:, 0, struck])) == {Fate.DELIVERED, Fate.DROPOUT}
+    assert (kinds[:, 1:] == Verdict.DELIVERED).all()
+    assert (kinds[:, 0, ~struck] == Verdict.DELIVERED).all()
+    assert set(np.unique(kinds[:, 0, struck])) == {Verdict.DELIVERED, Verdict.DROPOUT}
     for row in np.flatnonzero(struck):
-        assert abs((fates[:, 0, row] == Fate.DROPOUT).sum() - 600) < 3 * np.sqrt(2000 * 0.3 * 0.7)
+        assert abs((kinds[:, 0, row] == Verdict.DROPOUT).sum() - 600) < 3 * np.sqrt(2000 * 0.3 * 0.7)
 
 
 @pytest.mark.parametrize("coupled", [True, False])
 def test_a_sensor_that_drops_out_takes_no_word_with_it(coupled):
     everywhere = Fault(Verb.DROPOUT, 0, None, pairs=tuple(LINKS.index), probability=1.0)
-    fates = judged(profile(coupled=coupled), [everywhere])
-    assert (fates[0] == Fate.DROPOUT).all()
-    assert (fates[1:] == Fate.DELIVERED).all()
+    kinds = judged(profile(coupled=coupled), [everywhere])
+    assert (kinds[0] == Verdict.DROPOUT).all()
+    assert (kinds[1:] == Verdict.DELIVERED).all()
 
 
 def test_dropouts_are_independent_of_scripted_losses_and_of_each_other():
     everywhere = {"pairs": tuple(LINKS.index), "probability": 0.5}
     drop, lose = (Fault(verb, 0, None, **everywhere) for verb in (Verb.DROPOUT, Verb.LOSE))
-    missing = verdicts(profile(), 500, [drop, drop], seed=3)[:, 0] == Fate.DROPOUT
-    lost = verdicts(profile(), 500, [lose], seed=3)[:, 0] == Fate.SCRIPTED
+    missing = verdicts(profile(), 500, [drop, drop], seed=3)[:, 0] == Verdict.DROPOUT
+    lost = verdicts(profile(), 500, [lose], seed=3)[:, 0] == Verdict.SCRIPTED
     assert missing.mean() == pytest.approx(0.75, abs=0.02)
     assert (missing & lost).mean() == pytest.approx(0.375, abs=0.02)
 
@@ -587,17 +593,20 @@ def test_dropouts_are_independent_of_scripted_losses_and_of_each_other():
 
 
 def test_the_ledger_names_each_reason_that_occurred():
-    fates = np.array([[[Fate.DELIVERED, Fate.LOST, Fate.CUT, Fate.DELAYED, Fate.DELAYED, Fate.SILENT]]], dtype=np.uint8)
-    dropped = np.zeros((1, len(Fate)), dtype=np.int64)
-    dropped[0, Fate.DEAD] = 1
-    ledger = Ledger.of(fates, copies=np.array([0]), late=np.array([0]), dropped=dropped)
+    kinds = np.array(
+        [[[Verdict.DELIVERED, Verdict.LOST, Verdict.CUT, Verdict.DELAYED, Verdict.DELAYED, Verdict.SILENT]]],
+        dtype=np.uint8,
+    )
+    dropped = np.zeros((1, len(Verdict)), dtype=np.int64)
+    dropped[0, Verdict.DEAD] = 1
+    ledger = Ledger.of(kinds, copies=np.array([0]), late=np.array([0]), dropped=dropped)
     assert ledger == Ledger(offered=5, copies=0, delivered=1, dropped={"dead": 1, "cut": 1, "lost": 1})
     assert Accounts(1, ledger, in_flight=1).close
 
 
 def test_the_ledger_counts_a_copy_as_a_message_of_its_own():
-    fates = np.array([[[Fate.DELIVERED, Fate.DELAYED]], [[Fate.SILENT, Fate.SILENT]]], dtype=np.uint8)
-    nothing = np.zeros((2, len(Fate)), dtype=np.int64)
-    ledger = Ledger.of(fates, copies=np.array([2, 0]), late=np.array([1, 1]), dropped=nothing)
+    kinds = np.array([[[Verdict.DELIVERED, Verdict.DELAYED]], [[Verdict.SILENT, Verdict.SILENT]]], dtype=np.uint8)
+    nothing = np.zeros((2, len(Verdict)), dtype=np.int64)
+    ledger = Ledger.of(kinds, copies=np.array([2, 0]), late=np.array([1, 1]), dropped=nothing)
     assert ledger == Ledger(offered=2, copies=2, delivered=3, dropped={})
     assert Accounts(1, ledger, in_flight=1).close

@@ -14,7 +14,7 @@ from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark
 from netem.medium.medium import Medium
 from netem.medium.relay import Relay, changed_on_the_way
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 
 LINKS = Links.both_ways(3, [(1, 2), (2, 3)])
 CHANNELS = ("sense", "input", "theta")
@@ -64,10 +64,10 @@ def test_what_is_decided_ahead_is_under_way_only_when_its_tick_is_over():
 
 def test_who_is_idle_offers_nothing_but_its_sensors_sense():
     decided = flown(relay(Fault(Verb.PAUSE, 0, None, agents=(2,))), 1)
-    fates = decided.verdicts.fate
+    kinds = decided.verdicts.kind
     from_2 = LINKS.src == 2
-    assert (fates[1:, from_2] == Fate.SILENT).all()
-    assert (fates[0] != Fate.SILENT).all()
+    assert (kinds[1:, from_2] == Verdict.SILENT).all()
+    assert (kinds[0] != Verdict.SILENT).all()
     assert decided.awake.tolist() == [True, False, True]
 
 
@@ -79,7 +79,7 @@ def test_an_order_holds_from_the_next_decision_and_is_told_once():
     decided = relayed.decide(1, None)
     relayed.finish(1)
     assert [fault.start for fault in decided.injected] == [1]
-    assert (decided.verdicts.fate[:, LINKS.index[1, 2]] == Fate.CUT).all()
+    assert (decided.verdicts.kind[:, LINKS.index[1, 2]] == Verdict.CUT).all()
     assert relayed.decide(2, None).injected is None
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from netem.medium.verdict import BY_THE_AIR, FATE_OF, PASSED, REASONS, STRONGEST_FIRST, Fate, stronger
+from netem.medium.verdict import BY_THE_AIR, PASSED, REASONS, STRONGEST_FIRST, VERDICT_OF, Verdict, stronger
 
 NUMBERS = {
     "silent": 0,
@@ -25,12 +25,12 @@ NUMBERS = {
 
 
 def test_no_number_has_changed():
-    assert {fate.label: int(fate) for fate in Fate} == NUMBERS
+    assert {kind.label: int(kind) for kind in Verdict} == NUMBERS
 
 
 def test_every_reason_has_its_place_among_the_others():
     assert sorted(STRONGEST_FIRST) == sorted(REASONS)
-    assert set(BY_THE_AIR) <= set(REASONS) - set(FATE_OF.values())
+    assert set(BY_THE_AIR) <= set(REASONS) - set(VERDICT_OF.values())
 
 
 def test_a_message_that_two_layers_hold_is_booked_under_the_stronger():
@@ -45,5 +45,5 @@ def test_strength_is_no_matter_of_numbers(monkeypatch):
     turned = np.full(256, 255, dtype=np.uint8)
     turned[list(reversed(STRONGEST_FIRST))] = np.arange(len(STRONGEST_FIRST))
     monkeypatch.setattr("netem.medium.verdict._RANK", turned)
-    dead, lost = np.array([Fate.DEAD], dtype=np.uint8), np.array([Fate.LOST], dtype=np.uint8)
-    assert stronger(dead, lost) == stronger(lost, dead) == Fate.LOST
+    dead, lost = np.array([Verdict.DEAD], dtype=np.uint8), np.array([Verdict.LOST], dtype=np.uint8)
+    assert stronger(dead, lost) == stronger(lost, dead) == Verdict.LOST

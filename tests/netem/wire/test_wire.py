@@ -90,7 +90,7 @@ MESSAGES = [
         k=7,
         src="netem",
         seq=7,
-        fates=np.array([[0, 1], [2, 7]], dtype=np.uint8),
+        verdicts=np.array([[0, 1], [2, 7]], dtype=np.uint8),
         odd=np.array([[1, 0, 9, 0, 8]]),
         apart=np.array([[4, 1, 1, 0]]),
         late=1,
@@ -215,7 +215,7 @@ def test_no_type_is_taken_for_another(field, wrong, says):
 def test_numbers_that_an_array_cannot_hold_are_refused():
     for wrong in ([[300]], [[-1]], [[0.5]]):
         with pytest.raises(WireError, match="uint8"):
-            messages.unpack(messages.Journal, msgpack.packb(plain(MESSAGES[6]) | {"fates": wrong}))
+            messages.unpack(messages.Journal, msgpack.packb(plain(MESSAGES[6]) | {"verdicts": wrong}))
 
 
 def test_an_overlong_value_is_shortened_in_the_message():

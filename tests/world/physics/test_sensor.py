@@ -16,7 +16,7 @@ from affinet.studies.batch import fly_all
 from agents.brief import Own
 from analysis.metrics.consistency import nees
 from analysis.models.sensor import Sensor, moments
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books.history import History
 
 SPACES = pytest.mark.parametrize("dimension", [2, 3])
@@ -339,7 +339,7 @@ def test_what_was_measured_is_where_the_neighbour_is_and_the_noise_of_the_sensor
         )
     within_standard_errors(white, np.zeros(2))
     within_standard_errors(white[:, :, None] * white[:, None, :], np.eye(2))
-    heard = (arrays["fates"][:, 0] == Fate.DELIVERED)[:, links.slots] & links.present
+    heard = (arrays["verdicts"][:, 0] == Verdict.DELIVERED)[:, links.slots] & links.present
     assert 0.45 < heard[:, links.present].mean() < 0.55
     np.testing.assert_array_equal(arrays["known"], heard)
     np.testing.assert_array_equal(arrays["estimate"][heard], measured[:, links.slots][heard])

@@ -101,7 +101,7 @@ def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
     told = np.array(column(chunks, "/metrics/localization", "Scalars:scalars"), dtype=float)[:, 0]
     kept = arrays["place"][:40:5]
     assert np.isnan(kept).any(axis=(1, 2)).tolist() == [False] * 4 + [True] * 4
-    known = FirstMeasurements.of(plan.world, plan.timeline, arrays["measured"], arrays["fates"][:, 0])
+    known = FirstMeasurements.of(plan.world, plan.timeline, arrays["measured"], arrays["verdicts"][:, 0])
     np.testing.assert_allclose(told, localization.distance(kept, known.edges()), rtol=1e-6)
     assert np.isfinite(told).all()
     place, best = (

@@ -9,7 +9,7 @@ from rerun.chunk import RrdReader
 from scipy.stats import chi2
 
 from affinet.runtimes.run import fly, rehearse
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books.history import UNTOLD
 
 
@@ -69,7 +69,7 @@ def normalised(plan, arrays, tick):
         z, P = arrays["estimate"][tick, i, j], arrays["covariance"][tick, i, j][[[0, 1], [1, 2]]]
         error, left = z - (position[i] - position[links.src[link] - 1]), arrays["measured"][tick, link] - z
         errors.append(error @ np.linalg.solve(P, error))
-        if arrays["fates"][tick, 0, link] == Fate.DELIVERED:
+        if arrays["verdicts"][tick, 0, link] == Verdict.DELIVERED:
             innovations.append(left @ np.linalg.solve(sensor.spread(arrays["measured"][tick, link]) - P, left))
     return np.mean(errors), np.mean(innovations), len(errors)
 
@@ -78,7 +78,7 @@ def test_consistency_is_that_of_the_edges_with_a_band_as_wide_as_they_are_many(c
     recorded = np.array(column(chunks, "/metrics/consistency", "Scalars:scalars"))
     assert recorded.shape == (40, 4)
     plan, arrays = plan_of("corridor"), np.load(flown / "arrays.npz")
-    arrays = {name: arrays[name] for name in ("position", "estimate", "known", "covariance", "measured", "fates")}
+    arrays = {name: arrays[name] for name in ("position", "estimate", "known", "covariance", "measured", "verdicts")}
     numbers = []
     for moment in range(40):
         error, innovation, number = normalised(plan, arrays, 5 * moment)
@@ -123,9 +123,9 @@ def test_a_swarm_that_diverges_in_space_is_recorded_to_the_end(estimator, sensin
 
 def test_messages_are_counted_over_all_ticks(chunks, flown):
     per_tick = np.array(column(chunks, "/metrics/messages", "Scalars:scalars"))
-    fates = np.load(flown / "arrays.npz")["fates"]
-    assert per_tick[:, 0].sum() * 5 == pytest.approx((fates == Fate.DELIVERED).sum())
-    assert per_tick.sum() * 5 == pytest.approx((fates != Fate.SILENT).sum())
+    verdicts = np.load(flown / "arrays.npz")["verdicts"]
+    assert per_tick[:, 0].sum() * 5 == pytest.approx((verdicts == Verdict.DELIVERED).sum())
+    assert per_tick.sum() * 5 == pytest.approx((verdicts != Verdict.SILENT).sum())
 
 
 def test_faults_are_told_as_text(chunks):
@@ -155,7 +155,7 @@ def test_colours_tell_what_became_of_an_edge(chunks):
 def test_agents_whose_neighbours_determine_no_map_are_told_tick_by_tick():
     plan = plan_of("corridor", "time.duration=1", "network.availability=0.4", "record.enabled=false")
     evidence, links = rehearse(plan), plan.world.links
-    seen = (evidence.arrays["fates"][:, 0] == Fate.DELIVERED)[:, links.slots] & links.present
+    seen = (evidence.arrays["verdicts"][:, 0] == Verdict.DELIVERED)[:, links.slots] & links.present
     rank = np.linalg.matrix_rank(np.where(seen[..., None], plan.brief.relative, 0.0))
     assert set(rank.ravel().tolist()) == {0, 1, 2}
     np.testing.assert_array_equal(evidence.arrays["feasible"], rank == 2)

@@ -13,7 +13,7 @@ from affinet.runtimes.run import fly
 from affinet.scenario import verbs
 from affinet.verdicts.compare import first_difference
 from affinet.verdicts.outcome import Outcome
-from netem.medium.verdict import Fate
+from netem.medium.verdict import Verdict
 from world.books import history
 
 DT = 0.05
@@ -41,13 +41,13 @@ class Flight(NamedTuple):
     def links(self):
         return self.plan.world.links
 
-    def fates(self, src, dst):
+    def verdicts(self, src, dst):
         """Of a link, in every tick, shape (T, C)."""
-        return self.arrays["fates"][:, :, self.links.index[src, dst]]
+        return self.arrays["verdicts"][:, :, self.links.index[src, dst]]
 
-    def fates_around(self, agent):
+    def verdicts_around(self, agent):
         """Of all links from and to an agent, in every tick, shape (T, C, L')."""
-        return self.arrays["fates"][:, :, self.links.touching(np.arange(1, self.links.agents + 1) == agent)]
+        return self.arrays["verdicts"][:, :, self.links.touching(np.arange(1, self.links.agents + 1) == agent)]
 
 
 @pytest.fixture(scope="module")
@@ -103,24 +103,24 @@ WHAT = {
 ENDED_BY = {"heal": "cut", "restart": "kill", "resume": "pause", "rejoin": "depart", "replace": "depart"}
 # What differs first from a run without the verb, when it comes in tick 20, and of whom.
 FIRST = {
-    "cut": (20, "fates", "sense on 2->4"),
-    "partition": (20, "fates", "sense on 4->1"),
-    "lose": (20, "fates", "sense on 2->4"),
-    "delay": (20, "fates", "input on 2->4"),  # sensing is not delayed
-    "degrade": (20, "fates", "input on 2->4"),
-    "heal": (20, "fates", "sense on 2->4"),
+    "cut": (20, "verdicts", "sense on 2->4"),
+    "partition": (20, "verdicts", "sense on 4->1"),
+    "lose": (20, "verdicts", "sense on 2->4"),
+    "delay": (20, "verdicts", "input on 2->4"),  # sensing is not delayed
+    "degrade": (20, "verdicts", "input on 2->4"),
+    "heal": (20, "verdicts", "sense on 2->4"),
     "kill": (20, "error", ""),  # of those who take part
     "restart": (20, "error", ""),
-    "pause": (20, "fates", "sense on 1->5"),  # it takes part; its ears are closed
-    "resume": (20, "fates", "sense on 1->5"),
+    "pause": (20, "verdicts", "sense on 1->5"),  # it takes part; its ears are closed
+    "resume": (20, "verdicts", "sense on 1->5"),
     "clock": (21, "input", "agent 1"),  # one second per second: a tick ahead after a tick
     "depart": (20, "error", ""),
     "rejoin": (20, "error", ""),
-    "replace": (19, "fates", "sense on 5->1"),  # its process is killed in the last tick of its absence
+    "replace": (19, "verdicts", "sense on 5->1"),  # its process is killed in the last tick of its absence
     "gust": (21, "position", "agent 5"),
     "bias": (20, "measured", "2->4"),
     "outlier": (20, "measured", "2->4"),
-    "dropout": (20, "fates", "sense on 2->4"),
+    "dropout": (20, "verdicts", "sense on 2->4"),
     "freeze": (20, "measured", "2->4"),
     "lie": (20, "psi", "agent 1"),  # the first neighbour who believes it
 }
@@ -359,10 +359,15 @@ def test_a_condition_that_held_long_enough_sets_off_what_waits_for_it(side, last
 
 @pytest.mark.parametrize(
     ("verb", "reason", "agent"),
-    [("heal", Fate.CUT, 4), ("restart", Fate.DEAD, 5), ("resume", Fate.PAUSED, 5), ("rejoin", Fate.DEPARTED, 5)],
+    [
+        ("heal", Verdict.CUT, 4),
+        ("restart", Verdict.DEAD, 5),
+        ("resume", Verdict.PAUSED, 5),
+        ("rejoin", Verdict.DEPARTED, 5),
+    ],
 )
 def test_what_is_ended_holds_until_then_and_no_longer(verb, reason, agent, flown):
-    held = (flown(*scripted(verb, 1.0)).fates_around(agent) == reason).any(axis=(1, 2))
+    held = (flown(*scripted(verb, 1.0)).verdicts_around(agent) == reason).any(axis=(1, 2))
     assert np.flatnonzero(held).tolist() == list(range(10, 20))
 
 
@@ -370,14 +375,17 @@ def test_a_heal_by_name_leaves_what_it_does_not_name(flown):
     cuts = [{"verb": "cut", "at": 0.5, "links": [f"{src}->4"], "name": f"from {src}"} for src in (1, 2)]
     healed = flown(*cuts, {"verb": "heal", "at": 1.0, "names": ["from 2"]})
     all_healed = flown(*cuts, {"verb": "heal", "at": 1.0})
-    ends = [[(flight.fates(src, 4) == Fate.CUT).any(axis=1).sum() for src in (1, 2)] for flight in (healed, all_healed)]
+    ends = [
+        [(flight.verdicts(src, 4) == Verdict.CUT).any(axis=1).sum() for src in (1, 2)]
+        for flight in (healed, all_healed)
+    ]
     assert ends == [[30, 10], [10, 10]]
 
 
 def test_a_heal_ends_a_fault_that_would_have_lasted_longer(flown):
     lose = {"verb": "lose", "at": 0.5, "lasts": 1.2, "links": ["2->4"], "loss": 1.0}
     flight = flown(lose, {"verb": "heal", "at": 1.0})
-    assert np.flatnonzero((flight.fates(2, 4) == Fate.SCRIPTED).all(axis=1)).tolist() == list(range(10, 20))
+    assert np.flatnonzero((flight.verdicts(2, 4) == Verdict.SCRIPTED).all(axis=1)).tolist() == list(range(10, 20))
 
 
 def test_a_clock_is_right_again_at_its_end(flown):
@@ -516,22 +524,24 @@ def test_a_paused_agent_neither_hears_nor_speaks_nor_estimates(flown):
     asleep = slice(20, 30)
     assert not flight.arrays["known"][asleep, 4].any()
     assert np.isnan(flight.arrays["psi"][asleep, 4]).all()
-    assert (flight.fates(5, 1)[asleep, 1:] == Fate.SILENT).all()
-    assert (flight.fates(5, 1)[asleep, 0] == Fate.DELIVERED).all()  # it can be seen
-    assert (flight.fates(1, 5)[asleep, 0] == Fate.PAUSED).all()
+    assert (flight.verdicts(5, 1)[asleep, 1:] == Verdict.SILENT).all()
+    assert (flight.verdicts(5, 1)[asleep, 0] == Verdict.DELIVERED).all()  # it can be seen
+    assert (flight.verdicts(1, 5)[asleep, 0] == Verdict.PAUSED).all()
 
 
-@pytest.mark.parametrize(("policy", "fate", "arrive"), [("hold", Fate.DELAYED, 4 * 3 * 10), ("drop", Fate.PAUSED, 0)])
-def test_what_is_sent_to_a_paused_agent_waits_or_is_dropped(policy, fate, arrive, flown):
+@pytest.mark.parametrize(
+    ("policy", "verdict", "arrive"), [("hold", Verdict.DELAYED, 4 * 3 * 10), ("drop", Verdict.PAUSED, 0)]
+)
+def test_what_is_sent_to_a_paused_agent_waits_or_is_dropped(policy, verdict, arrive, flown):
     flight = flown(*scripted("pause", 1.0, in_flight=policy))
-    assert (flight.fates(1, 5)[20:30, 1:] == fate).all()
+    assert (flight.verdicts(1, 5)[20:30, 1:] == verdict).all()
     assert flight.arrays["late"].sum() == flight.arrays["late"][30] == arrive
 
 
 @pytest.mark.parametrize(("policy", "dropped"), [("hold", 0), ("drop", 4 * 3 * 2)])
 def test_what_is_under_way_to_a_paused_agent_waits_or_is_dropped(policy, dropped, flown):
     flight = flown(*scripted("pause", 1.0, in_flight=policy), over=LATE)
-    assert flight.arrays["dropped"][:, Fate.PAUSED].sum() == dropped
+    assert flight.arrays["dropped"][:, Verdict.PAUSED].sum() == dropped
 
 
 def test_an_agent_that_slept_knows_what_it_knew(flown):
@@ -591,7 +601,7 @@ def test_dropouts_strike_at_their_rate(flown):
     (bite,) = flight.outcome.faults
     offers = 40 * 24
     assert bite.touched / offers == pytest.approx(0.25, abs=4 * np.sqrt(0.25 * 0.75 / offers))
-    assert not (flight.arrays["fates"][:, 1:] == Fate.DROPOUT).any()  # messages pass
+    assert not (flight.arrays["verdicts"][:, 1:] == Verdict.DROPOUT).any()  # messages pass
 
 
 def test_a_liar_believes_itself(flown):
@@ -631,6 +641,6 @@ def test_a_degraded_link_has_the_profile_in_place_of_its_own(profile, flown):
 def test_of_two_profiles_the_one_named_last_rules(flown):
     first, second = ({"verb": "degrade", "at": 0.5, "links": ["2->4"], "profile": name} for name in ("jammed", "slow"))
     flight = flown(first, second)
-    fates = flight.fates(2, 4)[10:]
-    assert (fates[:, 1] == Fate.DELAYED).all()
-    assert not (fates[:, 0] > Fate.DELIVERED).any()
+    verdicts = flight.verdicts(2, 4)[10:]
+    assert (verdicts[:, 1] == Verdict.DELAYED).all()
+    assert not (verdicts[:, 0] > Verdict.DELIVERED).any()
