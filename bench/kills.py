@@ -179,7 +179,8 @@ def _wrong_end(run: Run, role: str, pid: int) -> list[str]:
     if role == "launcher":
         return [] if status == -signal.SIGKILL else [f"exit status {status}"]
     if role == "ctrl-c":  # Python itself dies of the signal while it still imports
-        return [] if status in (130, -signal.SIGINT) else [f"exit status {status}"]
+        fine = status in (130, -signal.SIGINT)
+        return [] if fine else [f"exit status {status}: {run.text('complained').strip()}"]
     said = run.text("said").splitlines()
     if status != 1 or not said:
         return [f"exit status {status}, {len(said)} lines said"]

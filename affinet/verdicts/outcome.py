@@ -118,7 +118,8 @@ def judge(
     arrays
         What happened; None when the run left no arrays.
     accounts
-        What the medium has booked of its messages; None when the run did not get that far.
+        What the medium has booked of its messages; None when the run did not get that far. In a run that failed the medium may
+        have booked other ticks than the world has flown.
     uninstructed
         Messages lost though nobody ordered it; None when the run did not get to its end.
     failure, user_code
@@ -188,7 +189,7 @@ def prepare(plan: Plan, out: Path) -> None:
 
 
 def _messages(booked: Accounts, uninstructed: int | None) -> dict[str, Any]:
-    return vars(booked.ledger) | {"in_flight": booked.in_flight, "uninstructed": uninstructed}
+    return {"ticks": booked.ticks} | vars(booked.ledger) | {"in_flight": booked.in_flight, "uninstructed": uninstructed}
 
 
 def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:

@@ -109,8 +109,8 @@ def test_a_death_ends_the_run_with_its_reason(package, out):
     table = journal.read(out / JOURNAL)
     counts = dict(zip(*np.unique(table["verdict"].to_numpy(), return_counts=True), strict=True))
     messages = summary["messages"]
-    assert summary["ticks"] == table["tick"].to_numpy().max() + 1 >= 50
-    assert messages["offered"] == summary["ticks"] * 24 * 4
+    assert messages["ticks"] == table["tick"].to_numpy().max() + 1 >= 50
+    assert messages["offered"] == messages["ticks"] * 24 * 4
     assert messages["delivered"] == counts["delivered"]
     assert messages["dropped"] == {"lost": counts["dropped"]}
     assert messages["in_flight"] == 0

@@ -34,7 +34,15 @@ def test_json_is_the_last_line_and_has_every_figure(out):
     }
     assert promised <= set(summary)
     assert set(summary["tracking_error"]) == {"mean", "final", "max"}
-    assert set(summary["messages"]) == {"offered", "copies", "delivered", "dropped", "in_flight", "uninstructed"}
+    assert set(summary["messages"]) == {
+        "ticks",
+        "offered",
+        "copies",
+        "delivered",
+        "dropped",
+        "in_flight",
+        "uninstructed",
+    }
     assert set(summary["processes"][0]) == {"role", "id", "pid", "rss_mb", "exit"}
     assert (summary["verdict"], summary["ticks"], summary["messages"]["uninstructed"]) == ("pass", 100, 0)
 

@@ -121,3 +121,35 @@ def test_what_is_ignored_stays_ignored_and_handlers_come_back():
 def test_an_interruption_ends_whatever_a_keyboard_interrupt_ends():
     with pytest.raises(KeyboardInterrupt):
         Interruption(signal.SIGHUP).heed()
+
+
+MEETS_CTRL_C = """
+import importlib.abc, os, signal, sys
+
+class Meets(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == {library!r}:
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                raise ValueError("an error of its own") from None
+
+sys.meta_path.insert(0, Meets())
+signal.signal(signal.SIGINT, {handler})
+sys.argv = ["affinet", "--version"]
+from affinet.__main__ import command
+command()
+"""
+
+
+@pytest.mark.parametrize("library", ["pydantic", "numpy", "affinet.cli.options"])
+def test_ctrl_c_that_a_library_meets_while_it_is_imported_ends_the_command_by_that(library):
+    code = MEETS_CTRL_C.format(library=library, handler="signal.default_int_handler")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_ctrl_c_stays_ignored_where_it_is():
+    code = MEETS_CTRL_C.format(library="pydantic", handler="signal.SIG_IGN")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
