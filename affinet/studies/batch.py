@@ -18,6 +18,7 @@ from analysis.metrics.localization import centroid, distance, ringing
 from analysis.models.arrays import Array, Mask
 from analysis.models.information import position, reported
 from analysis.models.jacobi import EdgeInformation, weights
+from analysis.models.reports import NIS
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from world.books.history import Moment
@@ -191,7 +192,8 @@ class _Places:
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment) -> dict[str, Array]:
     """What is kept of a tick of all runs of a plan."""
-    of_agents = {name: getattr(moment, name) for name in ("position", "measured", "estimate", "covariance", "known")}
+    of_agents = {name: getattr(moment, name) for name in ("position", "estimate", "covariance", "known")}
+    of_agents[NIS] = moment.reports.get(NIS)
     looked_at = seen(plan.world, present.reshape(-1), moment.entry.verdicts[0], of_agents)
     return {name: metric.of(looked_at) for name, metric in METRICS.items()}
 

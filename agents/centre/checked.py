@@ -51,6 +51,8 @@ class CheckedCentre:
                 raise WrongReturn(f"must return a CentreEstimate, got {kind(estimate)}")
             array("relative", estimate.relative, "N, n, D", edges, batch)
             array("covariance", estimate.covariance, "N, n, D, D", (*edges, edges[-1]), batch)
+            if estimate.nis is not None:
+                array("nis", estimate.nis, "N, n", edges[:-1], batch)
             return after, estimate
 
 

@@ -123,6 +123,7 @@ class CentreNode:
                 seq=number,
                 relative=told.relative[agent - 1],
                 covariance=told.covariance[agent - 1],
+                nis=None if told.nis is None else told.nis[agent - 1],
             )
             voice.say(messages.pack(message))
 

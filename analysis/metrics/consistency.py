@@ -12,8 +12,7 @@ from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array, Integers, Mask
 
 DRAWN = 0.95  # how probable the bands of pictures are
-# A smallest eigenvalue below this is what rounding leaves of nothing (of the trace), and of a difference (of R's).
-_SINGULAR, _CANCELLED = 1e-12, 1e-6
+_SINGULAR = 1e-12  # of the trace: a smallest eigenvalue below this is what rounding leaves of nothing
 
 
 class Normalised(NamedTuple):
@@ -38,30 +37,17 @@ def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> N
     return _averaged(nees(np.where(known[..., None], estimate - true, 0.0), covariance), known)
 
 
-def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array, seen: Mask) -> Normalised:
-    """NIS of the edges measured, from what is left of their innovations once the filters are corrected.
-
-    A filter with the innovation nu of covariance S leaves y - z = R S^-1 nu, of covariance R - P = R S^-1 R: normalised, one is
-    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates,
-    and those whose filters were so unsure that rounding leaves nothing of it. NaN where a filter has diverged.
+def of_innovations(nis: Array, seen: Mask) -> Normalised:
+    """NIS of a swarm, from that of its edges; NaN where the filter of one has diverged.
 
     Parameters
     ----------
-    estimate, measured
-        Relative positions, shape (..., N, n, D), in metres.
-    covariance
-        Upper triangles of the covariances P of the estimates, shape (..., N, n, D (D + 1) / 2), in square metres.
-    R
-        Covariances of the measurements, shape (..., N, n, D, D), in square metres.
+    nis
+        Innovations squared, normalised by their covariances, shape (..., N, n).
     seen
-        Which edges were measured and are estimated, shape (..., N, n).
+        Which edges were measured, shape (..., N, n).
     """
-    left = R - whole(covariance)
-    smallest = _smallest(left)
-    lost = np.isnan(smallest) | ~np.isfinite(estimate).all(axis=-1)
-    filtered = seen & (lost | (smallest > _CANCELLED * _smallest(R)))
-    residual = np.where(filtered[..., None], measured - estimate, 0.0)
-    return _averaged(_normalised(residual, left, smallest), filtered)
+    return _averaged(nis, seen)
 
 
 def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]:

@@ -68,8 +68,11 @@ class Sensor:
         """What it would say of relative positions (..., D), in metres, without noise."""
         return true if self.says_positions else _swung(true, np.zeros((*true.shape[:-1], true.shape[-1] - 1)))
 
-    def observed(self, measured: Array, expected: Array) -> tuple[Array, Array]:
+    def observed(self, measured: Array, expected: Array, doubt: Array) -> tuple[Array, Array]:
         """Measurements as relative positions (..., D), and their covariances (..., D, D), in square metres.
+
+        Where the covariance of a position hangs on where it is, it is that at the position expected, once that is surer than
+        the measurement: taken at the measurement it hangs on the error, and draws a filter to one side.
 
         A direction says where across the line to where a thing is expected it is, at the distance at which it is expected, and
         next to nothing of how far: an extended Kalman filter's measurement of a bearing (Aidala, IEEE Transactions on Aerospace
@@ -80,11 +83,16 @@ class Sensor:
         ----------
         measured
             What it said, shape (..., D).
-        expected
-            Where the estimator takes things to be, shape (..., D), in metres.
+        expected, doubt
+            Where the estimator takes things to be before this, shape (..., D), in metres, and the covariance of that, shape
+            (..., D, D), in square metres.
         """
-        if self.says_positions:
+        if self.reads == "coordinates":
             return measured, self.spread(measured)
+        if self.says_positions:
+            spread = self.spread(measured)
+            surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
+            return measured, np.where(surer[..., None, None], self.spread(expected), spread)
         distance = np.maximum(np.linalg.norm(expected, axis=-1, keepdims=True), _NEAREST)
         toward = expected / distance
         aside = measured - (measured * toward).sum(axis=-1, keepdims=True) * toward

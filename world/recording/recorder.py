@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from analysis.metrics import consistency
 from analysis.metrics.errors import procrustes_error
 from analysis.models.arrays import Array
+from analysis.models.reports import NIS
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
@@ -239,14 +240,14 @@ class Recorder:
         edges = of_swarms(
             self._world,
             position=moments.position[kept],
-            measured=moments.measured[kept],
             verdicts=moments.verdicts[kept, 0],
             estimate=moments.estimate[kept],
             covariance=moments.covariance[kept],
             known=moments.known[kept],
+            nis=moments.reports[NIS][kept] if NIS in moments.reports else None,
         )
         errors = consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known)
-        innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+        innovations = consistency.of_innovations(edges.nis, edges.seen)
         number = np.maximum(errors.number, 1)
         bands = consistency.band(consistency.DRAWN, self._formation.dimension, number)
         self._scalars("metrics/consistency", time, np.concatenate([errors.mean, innovations.mean, *bands], axis=-1))

@@ -128,14 +128,14 @@ CASES = {
     ),
     "agents.algebra.inputs.NeighbourInputs.last": of(
         lambda flown, spread: inputs.NeighbourInputs(flown, spread).last,
-        real(NEIGHBOURS, 2, 2),
-        covariance(NEIGHBOURS, 2, 2, 2),
+        real(NEIGHBOURS, 3, 2),
+        covariance(NEIGHBOURS, 3, 3),
     ),
     "agents.algebra.inputs.hear": of(
         lambda flown, spread, velocity, fresh: inputs.hear(
             inputs.NeighbourInputs(flown, spread), Heard({"velocity": velocity}, fresh), np.linspace(0.5, -0.3, 9), 0.2
         ),
-        *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 2, 2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+        *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 9), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
     "agents.estimators.joint_kf.corrected": of(
         joint_kf.corrected,
