@@ -15,7 +15,7 @@ help: ## this list
 test: lint types imports ## everything that must hold, in minutes
 	$(BIN)/pytest -n 2 --dist loadgroup
 
-test-room: $(READY) ## a room's own tests, in seconds, without flights over processes: make test-room ROOM=netem/medium
+test-room: $(READY) ## a room's own tests, without flights over processes: make test-room ROOM=netem/medium
 	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
 test-all: lint types imports ## and the slow proofs

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from affinet.testing.swarm import FlownRun as FlownRun
     from affinet.verdicts.checkers import agreement as agreement
     from affinet.verdicts.checkers import always as always
+    from affinet.verdicts.checkers import below as below
     from affinet.verdicts.checkers import bounded as bounded
     from affinet.verdicts.checkers import collision_free as collision_free
     from affinet.verdicts.checkers import consistent as consistent
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from analysis.models.unsuited import Unsuited as Unsuited
     from netem.impairments.own import Loss as Loss
     from netem.impairments.own import Offered as Offered
+    from netem.processes.user_code import UserCodeError as UserCodeError
 
     __version__: str
 
@@ -76,7 +78,17 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "scenario.sections"): ("Scenario", "ScenarioError"),
     ("affinet", "testing.swarm"): ("Broken", "FlownRun"),
     ("affinet", "verdicts.checkers"): (
-        *("agreement", "always", "bounded", "collision_free", "consistent", "converged", "energy", "error_below"),
+        *(
+            "agreement",
+            "always",
+            "below",
+            "bounded",
+            "collision_free",
+            "consistent",
+            "converged",
+            "energy",
+            "error_below",
+        ),
         *("eventually", "localized", "never_heard_across_a_cut", "recovers", "smooth"),
     ),
     ("affinet", "verdicts.checking"): ("Checker", "CheckResult"),
@@ -93,6 +105,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("analysis", "models.finding"): ("Finding",),
     ("analysis", "models.unsuited"): ("Unsuited",),
     ("netem", "impairments.own"): ("Loss", "Offered"),
+    ("netem", "processes.user_code"): ("UserCodeError",),
 }
 _MODULES = {
     "algebra": ("analysis", "models.algebra"),

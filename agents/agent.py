@@ -21,6 +21,7 @@ from analysis.models.arrays import Array, Mask, chosen
 from analysis.models.pursuit import Sighting
 from netem.core.channels import INPUT
 from netem.loading.calling import Calling
+from netem.loading.given import protect, readonly
 from netem.loading.returned import array, pair
 
 
@@ -72,6 +73,9 @@ class Agent:
     limit: float | None
     reports: Mapping[str, tuple[int, ...]] | None = None
 
+    def __post_init__(self) -> None:
+        protect(self.brief)
+
     def channels(self) -> Channels:
         """Everything it broadcasts as arrays: for each channel, its fields."""
         moves = DERIVATIVES[: self.law.order]
@@ -110,10 +114,11 @@ class Agent:
         motion
             Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
         """
+        before = readonly(state.estimator)
         with Calling(self.estimator, "sense"):
-            told = self.estimator.sense(self.brief, state.estimator, measured, seen)
+            told = self.estimator.sense(self.brief, before, readonly(measured), readonly(seen))
             estimator, said = pair(told, "the state, and what to broadcast")
-            returned.state(state.estimator, estimator, seen.shape[:-1])
+            returned.state(before, estimator, seen.shape[:-1])
             returned.said(self._spoken, said, seen.shape[:-1])
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
         moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
@@ -147,9 +152,9 @@ class Agent:
         """
         brief = self.brief
         velocity, higher = (state.input, None) if motion is None else (motion[..., 0, :], motion[..., 1:, :])
-        own = Own(velocity, state.input, tick, position, sighting, higher)
+        own, heard = readonly(Own(velocity, state.input, tick, position, sighting, higher)), readonly(heard)
         estimator, estimate = self._fused(state, heard, own)
-        law, steered = self._commanded(state, tick, own, estimate, heard[INPUT])
+        law, steered = self._commanded(state, own, estimate, heard[INPUT])
         if self.leaders == "distances":
             held = hold_distances(brief, self.leader_gain, estimate)
             steered = np.where(brief.leader[..., None], held, steered)
@@ -162,20 +167,19 @@ class Agent:
 
     def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
         batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
+        before = readonly(state.estimator)
         with Calling(self.estimator, "fuse"):
-            told = self.estimator.fuse(self.brief, state.estimator, heard, own)
+            told = self.estimator.fuse(self.brief, before, heard, own)
             estimator, estimate = pair(told, "the state, and an Estimate")
-            returned.state(state.estimator, estimator, batch)
+            returned.state(before, estimator, batch)
             return estimator, returned.estimate(estimate, slots, dimension, batch, self.reports)
 
-    def _commanded(
-        self, state: AgentState, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
-    ) -> tuple[Any, Array]:
-        batch = state.input.shape[:-1]
+    def _commanded(self, state: AgentState, own: Own, estimate: Estimate, inputs: Heard) -> tuple[Any, Array]:
+        batch, before = state.input.shape[:-1], readonly(state.law)
         with Calling(self.law, "command"):
-            told = self.law.command(self.brief, state.law, tick, own, estimate, inputs)
+            told = self.law.command(self.brief, before, own.tick, own, readonly(estimate), inputs)
             law, steered = pair(told, "the state, and the input")
-            returned.state(state.law, law, batch)
+            returned.state(before, law, batch)
             array("the input", steered, "D", (self.brief.dimension,), batch)
             return law, steered
 

@@ -185,7 +185,11 @@ class ZenohCarrier:
     def _account(self, journal: messages.Journal, acts: Mapping[int, messages.Act]) -> None:
         """What the agents say they heard must be what the medium says it delivered, message by message."""
         for agent, act in acts.items():
-            self.uninstructed += abs(journal.handed[agent - 1] - (act.heard - self._heard[agent]))
+            handed, heard = journal.handed[agent - 1], act.heard - self._heard[agent]
+            if not 0 <= heard <= handed:
+                says = f"it was handed {handed} broadcasts in tick {act.k}, and has heard {heard} more than before"
+                raise messages.WireError(f"agent {agent}: Act: heard: {says} (see docs/protocol.md)")
+            self.uninstructed += handed - heard
             self._heard[agent] = act.heard
 
 

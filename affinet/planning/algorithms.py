@@ -95,8 +95,8 @@ def _choice(given: Scenario, group: str, key: str, name: str) -> Choice:
 
 def _check_order(given: Scenario, law: Law[Any]) -> None:
     orders = "1 if it steers velocities, 2 if accelerations, 3 if jerks, 4 if snaps"
-    registry.refuse_other(law, "order", (1, 2, 3, 4).__contains__, orders)
-    registry.refuse_other(law, "by_stress", (True, False).__contains__, "whether it weighs edges by the stress")
+    registry.refuse_other(law, "order", lambda said: type(said) is int and 1 <= said <= 4, orders)
+    registry.refuse_other(law, "by_stress", lambda said: type(said) is bool, "whether it weighs edges by the stress")
     if given.agents.leaders == "distances" and law.order != 1:
         raise ScenarioError("agents.leaders: 'distances' is held by velocities; double integrators have 'pilot'")
     if given.formation.leaders and law.order > 2:

@@ -16,6 +16,7 @@ from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Target
 from netem.core.links import Links
+from netem.loading.given import protect
 from world.formation import manoeuvre
 from world.formation.nominal import PRESETS, Formation
 from world.physics.bodies import BodyModel
@@ -181,7 +182,7 @@ def brief_of(world: World, L: Array) -> Brief:
 def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
     """The swarm as a whole, from the world of its first tick and the stress matrix L, shape (N, N)."""
     formation, links, disturbance = first.formation, first.links, first.disturbance
-    return SwarmBrief(
+    swarm = SwarmBrief(
         dt=first.dt,
         ticks=given.time.ticks,
         order=given.dynamics.order,
@@ -195,6 +196,8 @@ def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
         correlation=disturbance.between(formation.nominal),
         displacement=disturbance.covariance,
     )
+    protect(swarm)
+    return swarm
 
 
 def _process(world: World) -> Array:

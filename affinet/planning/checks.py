@@ -100,7 +100,11 @@ def step(law: Any, swarm: SwarmBrief) -> Finding:
     """Whether the gains of a law, and the step, hold the formation, as far as it says what they make of it."""
     matrix, dt = capabilities.step_matrix(law, swarm), swarm.dt
     if matrix is None:
-        return Finding("step", "note", f"{type(law).__name__} is not a law of Table II; its step is not checked")
+        return Finding(
+            "step",
+            "note",
+            f"{type(law).__name__} brings no step_matrix (docs/estimators.md): whether it settles with this step is not known",
+        )
     radius, gain = stability.radius(matrix), capabilities.step_gain(law)
     if radius < 1.0:
         gains = f", gain {gain:g}" if gain else ""

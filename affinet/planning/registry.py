@@ -113,8 +113,8 @@ def refuse_other(algorithm: Any, name: str, fits: Callable[[Any], bool], what: s
     """
     with Calling(algorithm, name):
         said = getattr(algorithm, name, None)
-    if not fits(said):
-        has = f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
+        has = None if fits(said) else f"has no {name!r}: {what}" if said is None else f"{name!r} is {said!r}: {what}"
+    if has is not None:
         raise UserCodeError(name_of(type(algorithm)), has, definition(type(algorithm)))
 
 

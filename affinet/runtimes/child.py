@@ -42,6 +42,8 @@ class Child:
         Of an agent.
     process, log
         The process, and the file its standard error goes to.
+    trusted
+        Whether what it runs is sure to come to an end, as no code of a user's own is.
     expected_to_die
         Whether its death is in the script, or the run is over.
     killed
@@ -62,6 +64,7 @@ class Child:
     number: int | None
     process: subprocess.Popen[bytes]
     log: Path
+    trusted: bool
     expected_to_die: bool = False
     killed: bool = False
     confessed: bool = False

@@ -23,9 +23,13 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass
 class Interruption:
-    """Whether a signal has come: the number of the first; others are ignored, since the run is ending already."""
+    """Whether a signal has come: the number of the first; others are ignored, since the run is ending already.
+
+    But while code runs that may never come to an end, a second one ends it where it is.
+    """
 
     number: int | None = None
+    _may_last: bool = False
 
     def heed(self) -> None:
         """Go on if no signal has come.
@@ -40,7 +44,18 @@ class Interruption:
 
     def note(self, number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
+        if self.number is not None and self._may_last:
+            raise Interrupted(self.number)
         self.number = self.number or number
+
+    @contextmanager
+    def of_what_may_last(self) -> Iterator[None]:
+        """For code of a user's own in this process."""
+        self._may_last = True
+        try:
+            yield
+        finally:
+            self._may_last = False
 
 
 @contextmanager

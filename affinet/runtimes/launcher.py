@@ -129,8 +129,10 @@ class Launcher:
     def _start(self, group: ProcessGroup) -> None:
         private = self._private
         self._logins = self._make_logins(private)
-        group.start("world", module(world.__name__), self._world_brief(self._logins[WORLD]))
-        group.start("netem", module(netem.__name__), self._medium_brief(self._logins[HUB], private / "users"))
+        group.start("world", module(world.__name__), self._world_brief(self._logins[WORLD]), trusted=True)
+        medium = self._medium_brief(self._logins[HUB], private / "users")
+        own_losses = any(profile.own for profile in medium.profiles)
+        group.start("netem", module(netem.__name__), medium, trusted=not own_losses)
         if self._plan.centre:
             login = self._logins[CENTRE]
             group.start("centre", module(centre_process.__name__), self._centre_brief(login))

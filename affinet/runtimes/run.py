@@ -158,7 +158,8 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
                 watch(int(moments.ticks[-1]) + 1, float(moments.error[-1]))
                 interruption.heed()
 
-            broken = _broken(partial(swarm.fly, see, books.batch, booked.enter), out)
+            with interruption.of_what_may_last():
+                broken = _broken(partial(swarm.fly, see, books.batch, booked.enter), out)
             failure = None if broken is None else str(broken)
     except Interrupted as error:
         failure = str(error)

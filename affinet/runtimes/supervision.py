@@ -76,8 +76,10 @@ class ProcessGroup:
         self._end_all()
         self._selector.close()
 
-    def start(self, role: str, program: Sequence[str], brief: Any, number: int | None = None) -> Child:
-        """Start a program, and give it its brief."""
+    def start(
+        self, role: str, program: Sequence[str], brief: Any, number: int | None = None, *, trusted: bool = False
+    ) -> Child:
+        """Start a program, and give it its brief; `trusted` says that it runs no code of a user's own."""
         log = self._logs / (f"{role}.log" if number is None else f"{role}-{number}.log")
         with log.open("ab") as standard_error:
             process = subprocess.Popen(
@@ -88,7 +90,7 @@ class ProcessGroup:
                 env=os.environ | ENVIRONMENT,
                 start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
             )
-        child = Child(role, number, process, log)
+        child = Child(role, number, process, log, trusted)
         self.children.append(child)
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         child.brief(brief)
@@ -164,7 +166,7 @@ class ProcessGroup:
         if not culprits:
             raise RunFailed(f"nothing moved for {quiet_s:.1f} s, and nobody is to blame: {_who_waits(beats, beats)}")
         looks = {child.name: child.looks for child in culprits if child.looks is not None}
-        trusted = [child.name for child in culprits if child.role != "agent"]
+        trusted = [child.name for child in culprits if child.trusted]
         if blamed := stalled(looks, self._patience_s, trusted):
             said = _said_of([alive[name] for name in blamed])
             raise RunFailed(f"{said}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}")

@@ -10,6 +10,7 @@ from agents.loading import capabilities, returned
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from netem.loading.calling import Calling
+from netem.loading.given import readonly
 from netem.loading.returned import WrongReturn, array, kind, pair
 
 
@@ -44,9 +45,10 @@ class CheckedCentre:
         """Take in what all measured (..., N, n, D), which of it was `seen` (..., N, n), and what they flew (..., N, D)."""
         batch, edges = seen.shape[:-2], measured.shape[-3:]
         with Calling(self.filter, "step"):
-            told = self.filter.step(state, measured, seen, inputs)
+            before = readonly(state)
+            told = self.filter.step(before, readonly(measured), readonly(seen), readonly(inputs))
             after, estimate = pair(told, "the state, and a CentreEstimate")
-            returned.state(state, after, batch)
+            returned.state(before, after, batch)
             if not isinstance(estimate, CentreEstimate):
                 raise WrongReturn(f"must return a CentreEstimate, got {kind(estimate)}")
             array("relative", estimate.relative, "N, n, D", edges, batch)

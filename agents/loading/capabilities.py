@@ -13,7 +13,7 @@ from agents.wants import Wants
 from analysis.models.arrays import Array
 from analysis.models.finding import Finding, Level
 from netem.loading.calling import Calling
-from netem.loading.returned import WrongReturn, array, kind
+from netem.loading.returned import WrongReturn, array, is_array, kind
 
 
 def wants(algorithm: Any) -> Wants:
@@ -57,8 +57,10 @@ def step_matrix(law: Any, swarm: SwarmBrief) -> Array | None:
         step: Array | None = law.step_matrix(swarm.follower_stress, swarm.follower_degree, swarm.dt)
         if step is None:
             return None
-        size = len(step) if isinstance(step, np.ndarray) and step.ndim else 0
+        size, followers = len(step) if is_array(step) and step.ndim else 0, len(swarm.follower_degree)
         array("the step", step, "S, S", (size, size), ())
+        if size < followers or size % followers:
+            raise WrongReturn(f"the step is that of {followers} followers, so S is a multiple of that, not {size}")
         if not np.isfinite(step).all():
             raise WrongReturn("the step has numbers that are not finite")
         return step
@@ -72,6 +74,8 @@ def step_gain(law: Any) -> float | None:
         gain = law.step_gain
         if gain is not None and type(gain) not in (int, float):
             raise WrongReturn(f"must be a number, or None, got {kind(gain)}")
+        if gain is not None and not np.isfinite(gain):
+            raise WrongReturn(f"must be a finite number, or None, got {gain}")
         return None if gain is None else float(gain)
 
 

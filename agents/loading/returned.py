@@ -6,7 +6,6 @@ These checks run in every tick, so they compare a shape and a dtype each, and lo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from math import prod
 from typing import Any, NoReturn
 
@@ -15,11 +14,11 @@ import numpy as np
 from agents.estimate import Estimate
 from agents.exchange import Channels, Field, Fields
 from netem.core import channels
-from netem.loading.returned import ARRAYS, BOOL, FLOAT, Shape, WrongReturn, array, kind, shown, written
+from netem.loading.returned import BOOL, FLOAT, Shape, WrongReturn, array, is_array, kind, shown, written
 
 _NUMBERS = "biuf"
 _WIDEST = 8  # bytes of a number that a message can carry
-_MOST_AXES, _MOST_NUMBERS = 8, 65536
+_MOST_AXES, _MOST_NUMBERS, _MOST_CHANNELS = 8, 65536, 100
 _RESERVED = frozenset({channels.SENSE, channels.MEASUREMENT, channels.INPUT, channels.CENTRE})
 
 
@@ -27,6 +26,10 @@ def declared(given: Any) -> Channels:
     """The channels that an estimator declares, if they can be flown."""
     if not isinstance(given, Mapping):
         raise WrongReturn(f"must return a map from channels to their fields, got {kind(given)}")
+    if len(given) > _MOST_CHANNELS:
+        raise WrongReturn(
+            f"must return at most {_MOST_CHANNELS} channels, as all speak in every tick, got {len(given)}"
+        )
     for channel, fields in given.items():
         if not isinstance(channel, str):
             raise WrongReturn(f"a channel is called by a text, not {channel!r}")
@@ -48,13 +51,17 @@ def declared(given: Any) -> Channels:
 def _declared(name: str, field: Any) -> None:
     if not isinstance(field, Field):
         raise WrongReturn(f"{name} must be a Field(shape), or Field(shape, bool), got {kind(field)}")
-    if not isinstance(field.shape, tuple) or not all(type(size) is int and size >= 0 for size in field.shape):
-        raise WrongReturn(f"{name} must have a shape like (2, 2), a tuple of whole numbers, got {field.shape!r}")
-    if len(field.shape) > _MOST_AXES or prod(map(partial(max, 1), field.shape)) > _MOST_NUMBERS:
-        most = f"at most {_MOST_AXES} axes and {_MOST_NUMBERS} numbers"
-        raise WrongReturn(f"{name} must have {most}, as it is sent in every tick, got {field.shape!r}")
+    if not isinstance(field.shape, tuple) or not all(type(size) is int and size >= 1 for size in field.shape):
+        raise WrongReturn(f"{name} must have a shape like (2, 2), a tuple of whole numbers from 1, got {field.shape!r}")
+    _refuse_too_much(name, field.shape)
     if field.dtype not in (float, np.float64, bool, np.bool_):
         raise WrongReturn(f"{name} holds numbers (float) or truths (bool), got {field.dtype!r}")
+
+
+def _refuse_too_much(name: str, shape: Shape) -> None:
+    if len(shape) > _MOST_AXES or prod(shape) > _MOST_NUMBERS:
+        most = f"at most {_MOST_AXES} axes and {_MOST_NUMBERS} numbers"
+        raise WrongReturn(f"{name} must have {most}, as it is sent in every tick, got {shape!r}")
 
 
 def fresh(given: Any, batch: Shape, name: str = "the state") -> None:
@@ -62,7 +69,7 @@ def fresh(given: Any, batch: Shape, name: str = "the state") -> None:
     if isinstance(given, tuple) and hasattr(given, "_fields"):
         for field, part in zip(given._fields, given, strict=True):
             fresh(part, batch, f"{name}.{field}")
-    elif not isinstance(given, ARRAYS) or given.dtype.kind not in _NUMBERS or given.shape[: len(batch)] != batch:
+    elif not is_array(given) or given.dtype.kind not in _NUMBERS or given.shape[: len(batch)] != batch:
         what = "a NamedTuple of arrays" if name == "the state" else "an array of numbers or truths"
         raise WrongReturn(f"{name} must be {what} that begins with the batch axes, got {shown(given, batch)}")
 
@@ -75,7 +82,7 @@ def state(before: Any, given: Any, batch: Shape, name: str = "the state") -> Non
         for field, old, new in zip(before._fields, before, given, strict=True):  # type: ignore[attr-defined]
             if new is not old:
                 state(old, new, batch, field if name == "the state" else f"{name}.{field}")
-    elif not isinstance(given, ARRAYS) or given.shape != before.shape or given.dtype != before.dtype:
+    elif not is_array(given) or given.shape != before.shape or given.dtype != before.dtype:
         raise WrongReturn(f"{name} must stay what it was, {shown(before, batch)}, got {shown(given, batch)}")
 
 
@@ -120,12 +127,17 @@ def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> No
     for name, value in given.items():
         if not isinstance(name, str) or not name.isidentifier():
             raise WrongReturn(f"a report is called by a name like 'place', not {name!r}")
-        numbers = isinstance(value, ARRAYS) and value.dtype.kind in _NUMBERS and value.dtype.itemsize <= _WIDEST
+        numbers = is_array(value) and value.dtype.kind in _NUMBERS and value.dtype.itemsize <= _WIDEST
         if not numbers or value.shape[: len(batch)] != batch:
             raise WrongReturn(
                 f"report {name!r} must be an array of numbers (..., *) of at most 64 bits, got {shown(value, batch)}"
             )
-        if wanted is not None and value.shape[len(batch) :] != wanted[name]:
+        shape = value.shape[len(batch) :]
+        if wanted is None:
+            _refuse_too_much(f"report {name!r}", shape)
+            if not prod(shape):
+                raise WrongReturn(f"report {name!r} must have a number at least, got {shown(value, batch)}")
+        elif shape != wanted[name]:
             was = written(wanted[name])
             raise WrongReturn(f"report {name!r} must stay what it was, {was}, got {shown(value, batch)}")
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 Shape = tuple[int, ...]
-ARRAYS = (np.ndarray, np.generic)
 FLOAT, BOOL = np.dtype(np.float64), np.dtype(np.bool_)
 
 
@@ -28,11 +27,16 @@ def pair(given: Any, what: str) -> tuple[Any, Any]:
 
 def array(name: str, value: Any, axes: str, shape: Shape, batch: Shape, dtype: np.dtype[Any] = FLOAT) -> None:
     """Refuse what is no array of this dtype and shape, which begins with the batch axes; `axes` name the others."""
-    if isinstance(value, ARRAYS) and value.shape == (*batch, *shape) and value.dtype == dtype:
+    if is_array(value) and value.shape == (*batch, *shape) and value.dtype == dtype:
         return
     symbols = written(axes.split(", ") if axes else [])
     meant = "" if written(shape) == symbols else f" = {written(shape)}"
     raise WrongReturn(f"{name} must be {dtype} {symbols}{meant}, got {shown(value, batch)}")
+
+
+def is_array(value: Any) -> bool:
+    """Whether it is a plain array, or a number of NumPy: a masked one has places without a number, that no message carries."""
+    return type(value) is np.ndarray or isinstance(value, np.generic)
 
 
 def written(sizes: Sequence[Any]) -> str:
@@ -42,7 +46,7 @@ def written(sizes: Sequence[Any]) -> str:
 
 def shown(value: Any, batch: Shape | None = None) -> str:
     """Dtype and shape of an array, without the batch axes where it has them, or what else a value is."""
-    if not isinstance(value, ARRAYS):
+    if not is_array(value):
         return kind(value)
     if batch is None or value.shape[: len(batch)] != batch:
         return f"{value.dtype} {value.shape}"
@@ -55,4 +59,5 @@ def kind(value: Any) -> str:
         return "None"
     if isinstance(value, tuple) and not hasattr(value, "_fields"):
         return f"a tuple of {len(value)}"
-    return f"a {type(value).__name__}"
+    name = type(value).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

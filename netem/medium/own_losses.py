@@ -9,6 +9,7 @@ from netem.core.draws import DrawnAhead, Seed, uniform
 from netem.core.links import Links
 from netem.impairments.own import Loss, Offered, OwnLoss
 from netem.loading.calling import Calling
+from netem.loading.given import readonly
 from netem.loading.returned import BOOL, array
 from netem.processes.user_code import UserCodeError
 
@@ -59,7 +60,7 @@ class OwnLosses:
         offered = Offered(tick, tick * self._dt, self._ends["src"], self._ends["dst"], self._draws.at(tick), relative)
         try:
             with Calling(self._loss, "lost"):
-                lost = self._loss.lost(offered)
+                lost = self._loss.lost(readonly(offered))
                 array("what is lost", lost, "C, n", (self._shape[0], len(self._rows)), (), BOOL)
         except UserCodeError as error:
             error.tick = tick

@@ -9,6 +9,7 @@ import time
 import psutil
 import pytest
 from flying import PROCESSES
+from own_code import ESTIMATOR, broken
 
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from netem.medium import journal
@@ -121,6 +122,28 @@ def test_what_is_ignored_stays_ignored_and_handlers_come_back():
 def test_an_interruption_ends_whatever_a_keyboard_interrupt_ends():
     with pytest.raises(KeyboardInterrupt):
         Interruption(signal.SIGHUP).heed()
+
+
+ENDLESS = broken(ESTIMATOR, ("late = np.max(own.tick) >= 7", "while np.max(own.tick) >= 2: open('here', 'w').close()"))
+
+
+def test_code_without_an_end_is_ended_by_a_second_signal(tmp_path):
+    """Before: by no signal but SIGKILL."""
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    command = ["run", "corridor", "--estimator", "endless:Own", "--runtime", "inprocess", "--out", "run"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "affinet", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as flying:
+        try:
+            await_true((tmp_path / "here").exists, "it never got there")
+            flying.send_signal(signal.SIGINT)
+            flying.send_signal(signal.SIGTERM)
+            _, complained = flying.communicate(timeout=PATIENCE)
+        finally:
+            flying.kill()
+    assert flying.returncode == 130, complained
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["reasons"] == ["interrupted by SIGINT"]
 
 
 MEETS_CTRL_C = """

@@ -175,6 +175,20 @@ def test_a_foreign_agent_that_computes_for_ever_is_named(tmp_path):
             blamed(crew, awaited)
 
 
+def test_a_medium_with_code_of_a_users_own_is_not_trusted_to_end(tmp_path):
+    """Before: a loss without an end was waited for without an end."""
+    computes = [sys.executable, "-S", "-c", "while True: pass"]
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
+        medium = crew.start("netem", computes, {})
+        with pytest.raises(RunFailed, match=r"^netem \(pid \d+\) computes \(state R\): nothing moved for "):
+            blamed(crew, [medium])
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
+        medium = crew.start("netem", computes, {}, trusted=True)
+        while crew.now_s < 3 * SHORT:
+            crew.listen()
+            crew.blame_the_silent([medium])
+
+
 def test_where_all_wait_for_each_other_it_is_said_for_whom(tmp_path):
     with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
         awaited = swarm(crew)

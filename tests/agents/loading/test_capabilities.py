@@ -135,7 +135,9 @@ def test_the_closed_loop_of_a_users_own_law_decides_whether_it_flies(folder):
     assert str(refused(*steers(name, "pull=50.0"), *SHORT)).startswith("step: radius 1.6")
     mute = write(folder, broken(PILOTED, ("def step_matrix", "def of_the_step")))
     said = [found for found in plan_of(*steers(mute), *SHORT).findings if found.check == "step"]
-    assert [found.says for found in said] == ["Own is not a law of Table II; its step is not checked"]
+    assert [found.says for found in said] == [
+        "Own brings no step_matrix (docs/estimators.md): whether it settles with this step is not known"
+    ]
 
 
 # ---- what is wanted, and not given
@@ -216,7 +218,7 @@ SAID_WRONGLY = [
         "estimator",
         "return SwarmFilter",
         "return 7 or SwarmFilter",
-        "Own.centre: must return a Centre, or None, got a int",
+        "Own.centre: must return a Centre, or None, got an int",
     ),
     (
         "estimator",

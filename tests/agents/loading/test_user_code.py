@@ -172,7 +172,7 @@ RETURNED = [
     ),
     (
         "channels",
-        (MINE, '{"mine": {"number": Field((0, 10**12))}}'),
+        (MINE, '{"mine": {"number": Field((1, 10**12))}}'),
         "mine.number must have at most 8 axes and 65536 numbers",
     ),
     ("channels", (MINE, '{"mine": {"number": Field((1,) * 70)}}'), "mine.number must have at most 8 axes and 65536"),
@@ -234,7 +234,7 @@ RETURNED = [
         "known must stay what it was, bool (..., 4), got float64 (..., 4)",
     ),
     # fuse; before: flew, with other bits over processes, or broke anywhere later
-    ("fuse", ("return state, estimate", "return estimate"), "must return the state, and an Estimate, got a Estimate"),
+    ("fuse", ("return state, estimate", "return estimate"), "must return the state, and an Estimate, got an Estimate"),
     ("fuse", ("return state, estimate", "return state, None"), "must return an Estimate, got None"),
     ("fuse", estimate(("(state.measured, ", "(state.measured[..., 0], ")), "relative must be float64 (..., n, D) = "),
     (
@@ -766,3 +766,98 @@ def test_a_checker_that_fails_is_named_with_file_and_line(checker, says):
         checker(evidence)
     assert str(caught.value).startswith(says)
     assert re.search(r"test_user_code\.py:\d+\)$", str(caught.value))
+
+
+# ---- what is given is not theirs to write to
+
+FUSED, COMMANDED = "late = np.max(own.tick) >= 7", "force = np.where(estimate.known"
+WRITES = [
+    ("estimator", ESTIMATOR, "sense", SENSED, "measured[...] += 1.0"),
+    ("estimator", ESTIMATOR, "sense", SENSED, "seen[...] = True"),
+    ("estimator", ESTIMATOR, "sense", SENSED, "state.measured[...] += 1.0"),
+    ("estimator", ESTIMATOR, "sense", SENSED, "brief.nominal[...] += 1.0"),
+    ("estimator", ESTIMATOR, "sense", SENSED, "brief.sensor.covariance[...] *= 2.0"),
+    ("estimator", ESTIMATOR, "fuse", FUSED, "heard['input'].fields['velocity'][...] += 1.0"),
+    ("estimator", ESTIMATOR, "fuse", FUSED, "heard['mine'].fresh[...] = True"),
+    ("estimator", ESTIMATOR, "fuse", FUSED, "own.velocity[...] += 1.0"),
+    ("estimator", ESTIMATOR, "fuse", FUSED, "own.input[...] += 1.0"),
+    ("law", LAW, "command", COMMANDED, "estimate.relative[...] += 1.0"),
+    ("law", LAW, "command", COMMANDED, "inputs.fields['velocity'][...] += 1.0"),
+    ("law", LAW, "command", COMMANDED, "state.force[...] += 1.0"),
+]
+
+
+@pytest.mark.parametrize(("key", "text", "method", "before", "write_"), WRITES, ids=[row[-1] for row in WRITES])
+def test_what_is_given_can_be_read_and_not_written(key, text, method, before, write_, folder):
+    """Before: in process it was everybody's, and a run passed with other bits than over processes."""
+    place = next(line for line in text.splitlines() if before in line)
+    indent = place[: len(place) - len(place.lstrip())]
+    name = write(folder, broken(text, (place, f"{indent}{write_}\n{place}")))
+    said = refused(key, name)
+    assert said.startswith(f"{name}:Own.{method}: ValueError: ")
+    assert "read-only" in said
+
+
+def test_the_swarm_that_checks_look_at_cannot_be_written(folder):
+    checks = "\n    def checks(self, swarm):\n        swarm.nominal[...] = 0.0\n        return []\n"
+    assert "read-only" in refused("estimator", write(folder, ESTIMATOR + checks))
+
+
+# ---- arrays that no message carries
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (estimate(("(state.measured, ", "(np.ma.masked_array(state.measured), ")), "got a MaskedArray"),
+        (reporting("{'mine': np.ma.masked_array(state.measured)}"), "got a MaskedArray"),
+        (
+            reporting("{'mine': np.zeros((*state.known.shape[:-1], 2, 0, 3))}"),
+            "report 'mine' must have a number at least",
+        ),
+        (
+            reporting("{'mine': np.zeros((*state.known.shape[:-1], 65537))}"),
+            "report 'mine' must have at most 8 axes and",
+        ),
+    ],
+)
+def test_what_no_message_carries_is_refused_before_anything_flies(change, says, folder):
+    assert says in refused("estimator", write(folder, broken(ESTIMATOR, change)))
+
+
+@pytest.mark.parametrize(
+    ("channels", "says"),
+    [
+        (
+            "{'mine': {'number': Field((2, 0, 3))}}",
+            "mine.number must have a shape like (2, 2), a tuple of whole numbers from 1",
+        ),
+        ("{f'mine{n}': {'number': Field(())} for n in range(101)}", "must return at most 100 channels"),
+    ],
+)
+def test_channels_that_no_message_or_journal_holds_are_refused(channels, says, folder):
+    declared = 'return {"mine": {"number": Field(()), "seen": Field((), bool)}}'
+    assert says in refused("estimator", write(folder, broken(ESTIMATOR, (declared, f"return {channels}"))))
+
+
+ODD_WORD = "type('Odd', (), {'__eq__': lambda *_: 1 / 0, '__repr__': lambda *_: 1 / 0})()"
+
+
+@pytest.mark.parametrize("order", ["1.0", "True", "np.int64(1)", "np.array([1, 2])", ODD_WORD])
+def test_an_order_that_is_no_whole_number_is_the_laws_own_fault(order, folder):
+    """Before: a traceback, or it flew."""
+    name = write(folder, broken(LAW, ("order: ClassVar[int] = 1", f"order: ClassVar[int] = {order}")))
+    assert refused("law", name).startswith(f"{name}:Own")
+
+
+@pytest.mark.parametrize("by_stress", ["0", "np.array([True, False])", ODD_WORD])
+def test_by_stress_is_a_truth(by_stress, folder):
+    name = write(folder, broken(LAW, ("by_stress: ClassVar[bool] = False", f"by_stress: ClassVar[bool] = {by_stress}")))
+    assert refused("law", name).startswith(f"{name}:Own")
+
+
+@pytest.mark.parametrize("size", [0, 2, 6])
+def test_a_step_is_that_of_the_followers(size, folder):
+    step = f"\n    def step_matrix(self, stress, degree, dt):\n        return 0.5 * np.eye({size})\n"
+    text = broken(LAW, ("by_stress: ClassVar[bool] = False", "by_stress: ClassVar[bool] = True")) + step
+    assert "the step is that of 4 followers" in refused("law", write(folder, text))

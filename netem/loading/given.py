@@ -1,0 +1,37 @@
+"""What is given to a user's own code: arrays that it can read and not write, since others hold the same ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+
+def readonly(given: Any) -> Any:
+    """The same value, with views that cannot be written to in place of its arrays; tuples and maps are gone through."""
+    if isinstance(given, np.ndarray):
+        if not given.flags.writeable:
+            return given
+        view = given.view()
+        view.flags.writeable = False
+        return view
+    if isinstance(given, tuple):
+        parts = map(readonly, given)
+        return type(given)(*parts) if hasattr(given, "_fields") else tuple(parts)
+    if isinstance(given, Mapping):
+        return {name: readonly(part) for name, part in given.items()}
+    return given
+
+
+def protect(given: Any) -> None:
+    """Make the arrays in a value that lasts, in its fields and theirs, such that nobody can write to them."""
+    if isinstance(given, np.ndarray):
+        given.flags.writeable = False
+    elif is_dataclass(given) and not isinstance(given, type):
+        for field in fields(given):
+            protect(getattr(given, field.name))
+    elif isinstance(given, tuple):
+        for part in given:
+            protect(part)
