@@ -114,8 +114,7 @@ class ArrayCarrier:
             return array.reshape(self._world.swarms, centre.swarm.agents, *array.shape[1:])
 
         self._whole, told = centre.step(self._whole, of_swarms(measured), of_swarms(seen), of_swarms(inputs))
-        said = {name: field for name, field in told._asdict().items() if field is not None}
-        fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in said.items()}
+        fields = {name: field.reshape(-1, *field.shape[2:]) for name, field in told._asdict().items()}
         return Heard(fields, self._links.present)
 
     def _steered(self, said: Broadcasts) -> Array:

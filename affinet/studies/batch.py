@@ -203,6 +203,8 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
     number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
     means = {}
     for name, told in moment.reports.items():
+        if name == NIS:  # a metric
+            continue
         each = of_runs(told)
         length = each if each.ndim == 2 else np.sqrt((each * each).sum(axis=tuple(range(2, each.ndim))))
         means[f"{REPORT}{name}"] = np.where(awake, length, 0.0).sum(axis=1) / number
@@ -212,7 +214,8 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
 def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
     """Of the first run."""
     size, nominal = plan.world.formation.agents, plan.world.formation.nominal
-    shown = {name: said[:size] for name, said in (*moment.reports.items(), ("position", moment.position))}
+    said = {"position": moment.position, **moment.reports}
+    shown = {name: each[:size] for name, each in said.items() if name != NIS}
     return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
 
 

@@ -101,7 +101,7 @@ def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any
 def of_run(evidence: Evidence, name: str, span: range) -> Array:
     """A metric in each of these ticks of a run, shape (T,)."""
     part, arrays = slice(span.start, span.stop), evidence.arrays
-    told = {what: arrays[what][part] for what in ("estimate", "covariance")}
+    told: dict[str, Any] = {what: arrays[what][part] for what in ("estimate", "covariance")}
     told[NIS] = arrays[NIS][part] if NIS in arrays else None
     awake = (evidence.awake & evidence.present)[part, :, None]
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}

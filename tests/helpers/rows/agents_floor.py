@@ -144,6 +144,7 @@ CASES = {
     "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)
     ),
+    "agents.algebra.kalman.normalised": of(kalman.normalised, real(NEIGHBOURS, 2), covariance(NEIGHBOURS, 2, 2)),
     "agents.algebra.kalman.correct": of(
         lambda mean, spread, seen, usable: kalman.correct(mean, spread, seen, NOISE, usable),
         *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
@@ -168,15 +169,13 @@ CASES = {
             covariance(NEIGHBOURS, 2, 2),
         ),
     ),
-    "agents.estimators.rkf.EdgeFilters.advance": of(
-        lambda mean, spread, known, position, usable: FILTERS.advance(
-            BRIEF, Tracks(mean, spread, known), position, NOISE, usable
-        ),
-        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), truth(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.estimators.rkf.EdgeFilters.ahead": of(
+        lambda mean, spread, nis, known: FILTERS.ahead(BRIEF, Tracks(mean, spread, nis, known)),
+        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
     ),
     "agents.estimators.rkf.EdgeFilters.estimate": of(
-        lambda mean, spread, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, known), known[..., 0]),
-        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), truth(NEIGHBOURS)),
+        lambda mean, spread, nis, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, nis, known), known[..., 0]),
+        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
     ),
     "agents.algebra.redcho.Consensus.outputs": of(CONSENSUS.outputs, real(4, 9, axis=1), real(4, 9), out=1),
     "agents.algebra.redcho.Consensus.step": of(
