@@ -119,6 +119,7 @@ class SwarmFilter(Centre[Whole]):
         expected, doubt = self._edges(position), self._spread(covariance, agents, dimension)
         innovation = measured - expected
         _, R = self.swarm.sensor.observed(measured, expected, doubt)
+        R = np.where(seen[..., None, None], R, np.eye(dimension))
         nis = np.where(seen, normalised(innovation, np.asarray(np.linalg.inv(doubt + R))), np.nan)
         precision = np.where(seen[..., None, None], np.linalg.inv(R), 0.0)
         surprise = product(precision, innovation[..., None])

@@ -92,7 +92,7 @@ class Sensor:
         if self.says_positions:
             spread = self.spread(measured)
             surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
-            return measured, np.where(surer[..., None, None], self.spread(expected), spread)
+            return measured, np.where(surer[..., None, None], self._expected(expected, doubt), spread)
         distance = np.maximum(np.linalg.norm(expected, axis=-1, keepdims=True), _NEAREST)
         toward = expected / distance
         aside = measured - (measured * toward).sum(axis=-1, keepdims=True) * toward
@@ -127,14 +127,23 @@ class Sensor:
         if self.reads == "coordinates":
             return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
         if self.reads == "line-of-sight":
-            along, across = self._variances[:2]
-            lines = measured[..., :, None] * measured[..., None, :]
-            squared = (measured * measured).sum(axis=-1)[..., None, None]
-            spread: Array = across * squared * np.eye(measured.shape[-1]) + (along - across) * lines
-            return spread
+            return self._of_lines(measured[..., :, None] * measured[..., None, :])
         _, covariance = moments(_polar(measured), self._variances)
         shrinking = _shrinking(self._variances)
         return covariance / (shrinking[:, None] * shrinking)
+
+    def _expected(self, position: Array, doubt: Array) -> Array:
+        """The covariance of measurements of things that are about here (..., D), with covariances `doubt` (..., D, D)."""
+        if self.reads == "line-of-sight":
+            return self._of_lines(position[..., :, None] * position[..., None, :] + doubt)
+        return self.spread(position)
+
+    def _of_lines(self, second: Array) -> Array:
+        """Along and across lines of sight, of second moments (..., D, D), as shares of the squared distance."""
+        along, across = self._variances[:2]
+        squared = np.einsum("...ii", second)[..., None, None]
+        spread: Array = across * squared * np.eye(second.shape[-1]) + (along - across) * second
+        return spread
 
     @property
     def common(self) -> Array:

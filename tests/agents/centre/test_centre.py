@@ -68,10 +68,10 @@ def test_it_tells_what_the_filter_of_all_edges_would(availability, reader):
         measured, inputs = rng.normal(size=(*seen.shape, 2)), rng.normal(size=(HEXA.agents, 2))
         state, told = filtered.step(state, np.where(seen[..., None], measured, 0.0), seen, inputs)
         printed.step(measured[LINKS.present], seen[LINKS.present], inputs)
-        np.testing.assert_allclose(told.relative[LINKS.present].ravel(), printed.x, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(told.relative[LINKS.present].ravel(), printed.x, rtol=1e-5, atol=1e-5)
         blocks = np.einsum("aibi->abi", printed.covariance.reshape(60, 2, 60, 2))[np.arange(60), np.arange(60)]
         variances = np.einsum("eii->ei", told.covariance[LINKS.present])
-        np.testing.assert_allclose(variances, blocks, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(variances, blocks, rtol=1e-5, atol=1e-6)
 
 
 def test_swarms_side_by_side_are_told_what_each_is_told_alone():
