@@ -91,6 +91,8 @@ RAISING += [
     raised(MUTE.replace("SAYS", "7"), "Mute: (its text cannot be had: TypeError) (", "no-text"),
     # Before: a traceback of UnicodeEncodeError where the log was written.
     raised(r"ValueError('bad \udcff name')", r"ValueError: bad \udcff name (", "surrogate"),
+    # Before: raw, so that a terminal obeyed it.
+    raised(r"ValueError('\x1b[31mred')", r"ValueError: \x1b[31mred (", "escape"),
 ]
 
 
@@ -234,7 +236,7 @@ RETURNED = [
         "known must stay what it was, bool (..., 4), got float64 (..., 4)",
     ),
     # fuse; before: flew, with other bits over processes, or broke anywhere later
-    ("fuse", ("return state, estimate", "return estimate"), "must return the state, and an Estimate, got a Estimate"),
+    ("fuse", ("return state, estimate", "return estimate"), "must return the state, and an Estimate, got an Estimate"),
     ("fuse", ("return state, estimate", "return state, None"), "must return an Estimate, got None"),
     ("fuse", estimate(("(state.measured, ", "(state.measured[..., 0], ")), "relative must be float64 (..., n, D) = "),
     (
