@@ -33,7 +33,7 @@ from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.words import among, one_line
 from affinet.studies import fit
 from affinet.verdicts import compare
-from affinet.verdicts.outcome import claim
+from affinet.verdicts.outcome import claim, refuse_taken
 from analysis.models.finding import Finding
 from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
@@ -292,8 +292,9 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
     parsed.out = parsed.out or directories.for_run(name)
-    claim(parsed.out)
+    refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
+    claim(parsed.out)
     with show.Progress(plan, name, parsed.out) as watch:
         outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
     if parsed.json:

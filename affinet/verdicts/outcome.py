@@ -175,7 +175,18 @@ def claim(out: Path) -> None:
         raise OSError(
             f"{str(out)!r} is no UTF-8, as what writes recordings wants it; name another directory"
         ) from error
+    refuse_taken(out)
     out.mkdir(parents=True, exist_ok=True)
+
+
+def refuse_taken(out: Path) -> None:
+    """Refuse a directory that holds a run already.
+
+    Raises
+    ------
+    FileExistsError
+        When it does.
+    """
     if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
         raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory")
 
