@@ -291,9 +291,10 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
-    parsed.out = parsed.out or directories.for_run(name)
-    refuse_taken(parsed.out)
+    if parsed.out:
+        refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
+    parsed.out = parsed.out or directories.for_run(name)
     claim(parsed.out)
     with show.Progress(plan, name, parsed.out) as watch:
         outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)

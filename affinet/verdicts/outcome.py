@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -187,7 +188,8 @@ def refuse_taken(out: Path) -> None:
     FileExistsError
         When it does.
     """
-    if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
+    there = set(os.listdir(out)) if os.path.isdir(out) else set()  # Path.is_dir raises for a name that is too long
+    if taken := [name for name in _LEFT_BY_A_RUN if name in there]:
         raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory")
 
 
