@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from netem.impairments.own import Loss as Loss
     from netem.impairments.own import Offered as Offered
     from netem.processes.user_code import UserCodeError as UserCodeError
+    from world.books.history import Damaged as Damaged
 
     __version__: str
 
@@ -106,6 +107,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("analysis", "models.unsuited"): ("Unsuited",),
     ("netem", "impairments.own"): ("Loss", "Offered"),
     ("netem", "processes.user_code"): ("UserCodeError",),
+    ("world", "books.history"): ("Damaged",),
 }
 _MODULES = {
     "algebra": ("analysis", "models.algebra"),

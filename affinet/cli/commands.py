@@ -28,11 +28,12 @@ from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.interruption import Interrupted
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
-from affinet.scenario import loading
+from affinet.scenario import files, loading
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.words import among, one_line
 from affinet.studies import fit
 from affinet.verdicts import compare
+from affinet.verdicts.outcome import claim, refuse_taken
 from analysis.models.finding import Finding
 from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
@@ -64,7 +65,11 @@ def command() -> NoReturn:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parsed = options.parser().parse_args(arguments)
+    parser = options.parser()
+    parsed = parser.parse_args(arguments)
+    if parsed.command is None:
+        parser.print_help(sys.stderr)
+        return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)
     except (ScenarioError, PlanError, NoViewer, NotFlying, history.Damaged) as error:
@@ -129,7 +134,7 @@ def _overrides(parsed: argparse.Namespace) -> list[str]:
 
 
 def _scenario(parsed: argparse.Namespace) -> Scenario:
-    return loading.load(parsed.scenario, _overrides(parsed), Path.cwd())
+    return loading.load(parsed.scenario, _overrides(parsed), files.working_directory())
 
 
 def _check(parsed: argparse.Namespace) -> int:
@@ -156,12 +161,12 @@ def _replay(parsed: argparse.Namespace) -> int:
     overrides = _overrides(parsed)
     from netem.medium.journal import JournalError  # pyarrow takes a while to import
 
-    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=Path.cwd())
+    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=files.working_directory())
     flown = parsed.directory / history.FILE
     before = history.load(flown) if flown.exists() and not overrides else None
     for finding in plan.findings:
         if finding.check == "inputs":
-            print(f"note: {finding.says}", file=sys.stderr)  # noqa: T201
+            print(one_line(f"note: {finding.says}"), file=sys.stderr)  # noqa: T201
     try:
         status = _fly(plan, "replay", parsed)
     except JournalError as error:
@@ -249,7 +254,7 @@ def _hunt(parsed: argparse.Namespace) -> int:
         raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
     if parsed.out and not parsed.out.parent.is_dir():
         raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
-    folder = parsed.out.absolute().parent if parsed.out else Path.cwd()
+    folder = parsed.out.absolute().parent if parsed.out else files.working_directory()
     for name, lies_in in given.own_modules.items():
         if folder != lies_in:
             raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
@@ -286,8 +291,11 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
+    if parsed.out:
+        refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
     parsed.out = parsed.out or directories.for_run(name)
+    claim(parsed.out)
     with show.Progress(plan, name, parsed.out) as watch:
         outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
     if parsed.json:

@@ -15,7 +15,7 @@ def parser() -> argparse.ArgumentParser:
         prog="affinet", description="Fly a swarm of agents through a network that loses, delays and cuts."
     )
     whole.add_argument("--version", action="version", version=f"affinet {version('affinet')}")
-    commands = whole.add_subparsers(required=True, dest="command", metavar="COMMAND")
+    commands = whole.add_subparsers(dest="command", metavar="COMMAND")
     run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
     check = commands.add_parser("check", help="say whether a scenario can fly, before anything starts")
     replay = commands.add_parser("replay", help="fly again what was flown, and compare")
@@ -24,7 +24,7 @@ def parser() -> argparse.ArgumentParser:
     )
     for command in (run, check, determinism):
         command.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(loading.shipped())}")
-    replay.add_argument("directory", type=Path, metavar="DIR", help="the run directory")
+    replay.add_argument("directory", type=_path, metavar="DIR", help="the run directory")
     replay.add_argument(
         "--verdicts",
         action="store_true",
@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
         )
-        command.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
+        command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
         command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
     _add_hunt(commands)
     _add_study(commands)
@@ -60,7 +60,7 @@ def _add_overrides(command: argparse.ArgumentParser) -> None:
 
 def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     inject = commands.add_parser("inject", help="change the air of a run while it flies over processes")
-    inject.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
+    inject.add_argument("directory", type=_path, metavar="RUN", help="the run directory")
     verbs = inject.add_subparsers(dest="verb", required=True, metavar="VERB")
     cut = verbs.add_parser("cut", help="links that carry nothing: 1-2, 1->2, leaders->followers")
     cut.add_argument("links", nargs="+")
@@ -85,6 +85,12 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
     return int(text)
+
+
+def _path(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty: name a directory")
+    return Path(text)
 
 
 def _scenario_file(text: str) -> Path:
@@ -128,14 +134,14 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
     study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
-    study.add_argument("--out", type=Path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
+    study.add_argument("--out", type=_path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
 
 
 def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     fitting = commands.add_parser(
         "fit", help="an autoregressive model of the inputs of a run, for filters that predict them"
     )
-    fitting.add_argument("directory", type=Path, metavar="RUN", help="the run directory")
+    fitting.add_argument("directory", type=_path, metavar="RUN", help="the run directory")
     fitting.add_argument(
         "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
     )

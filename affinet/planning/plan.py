@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
 from affinet.scenario.sections import Scenario
+from affinet.scenario.words import one_line
 from agents.agent import Agent
 from agents.brief import Brief
 from agents.centre.checked import CheckedCentre, centre_of
@@ -32,11 +33,15 @@ class PlanError(ValueError):
     """The scenario is well formed, but cannot fly: why, in plain words."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:
-        super().__init__("; ".join(f"{finding.check}: {finding.says}" for finding in findings if finding.fatal))
         self.findings = tuple(findings)
+        super().__init__(self.findings)
+
+    def __str__(self) -> str:
+        wrong = (f"{finding.check}: {finding.says}" for finding in self.findings if finding.fatal)
+        return "; ".join(map(one_line, wrong))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """All a runtime needs.
 
@@ -74,6 +79,10 @@ class Plan:
     findings: tuple[Finding, ...]
     journal: Path | None = None
     injected: tuple[Fault, ...] = ()
+
+    def __getstate__(self) -> dict[str, object]:
+        """What it was made of: what it has worked out since can be worked out again, wherever it is taken."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def facing(self, injected: Sequence[Fault]) -> Plan:
         """The plan with faults that an earlier run was given while it flew."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from affinet.planning import limits
 from affinet.scenario.profiles import IMPAIRMENTS
 from affinet.scenario.sections import ScenarioError
-from affinet.scenario.words import among
+from affinet.scenario.words import among, one_line
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from netem.impairments.own import Loss
@@ -125,7 +125,7 @@ def refusing(key: str, refusal: type[ValueError]) -> Iterator[None]:
         yield
     except UserCodeError as error:
         if isinstance(error.__cause__, refusal):
-            raise ScenarioError(f"{key}: {text_of(error.__cause__)}") from error
+            raise ScenarioError(f"{key}: {one_line(text_of(error.__cause__))}") from error
         raise
 
 

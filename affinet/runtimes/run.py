@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast, get_args
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.rerun_command import NotMended, NoViewer, mend
+from affinet.scenario.words import among, shown
 from affinet.verdicts import outcome
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
@@ -28,6 +29,19 @@ from world.recording.file import wrong_with
 
 Runtime = Literal["processes", "inprocess"]
 Watch = Callable[[int, float], None]
+
+
+def runtime_of(word: str) -> Runtime:
+    """The runtime of this name.
+
+    Raises
+    ------
+    ValueError
+        When there is none.
+    """
+    if word not in (names := get_args(Runtime)):
+        raise ValueError(f"runtime {shown(word)}: {among(word, names)}")
+    return cast("Runtime", word)
 
 
 def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | None = None) -> Outcome:
@@ -50,13 +64,15 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     ------
     FileExistsError
         When `out` holds a run already.
+    ValueError
+        When there is no such runtime.
     OSError
         When `out` cannot be made or written to. What the system refuses later fails the run, and is told in its outcome.
     Interrupted
         When a signal asked the run to end; its outcome is written down all the same.
     """
+    fly_in = _RUNTIMES[runtime_of(runtime)]
     outcome.prepare(plan, out)
-    fly_in = _over_processes if runtime == "processes" else _in_process
     with interruptible() as interruption:
         done = fly_in(plan, out, watch, viewer, interruption)
         try:
@@ -195,3 +211,9 @@ def _broken(fly: Callable[[], None], out: Path) -> UserCodeError | None:
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8", errors="backslashreplace")
         return error
     return None
+
+
+_RUNTIMES: Mapping[Runtime, Callable[[Plan, Path, Watch, str | None, Interruption], Outcome]] = {
+    "processes": _over_processes,
+    "inprocess": _in_process,
+}

@@ -22,6 +22,20 @@ class Read(NamedTuple):
     folder: Path
 
 
+def working_directory() -> Path:
+    """Where the process works.
+
+    Raises
+    ------
+    ScenarioError
+        When that has been deleted meanwhile.
+    """
+    try:
+        return Path.cwd()
+    except FileNotFoundError as error:
+        raise ScenarioError("the working directory is not there any more: go to one that is") from error
+
+
 def shipped(folder: str) -> list[str]:
     """Names of the files in a folder of the package."""
     items = (resources.files("affinet.shipped") / folder).iterdir()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import reduce
@@ -11,12 +12,14 @@ from typing import Any
 
 import tomli_w
 from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
 
 from affinet.scenario import files, inputs, source
 from affinet.scenario.explain import explained
 from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.scenario.source import Source
+from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.words import one_line
+from netem.core.plain import shown
 
 FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
@@ -27,7 +30,7 @@ def shipped() -> list[str]:
     return files.shipped(_FOLDER)
 
 
-def load(name: str, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
+def load(name: str | Path, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
     """The scenario in a file, or one that is shipped, with `a.b=c` overrides applied.
 
     Parameters
@@ -43,8 +46,14 @@ def load(name: str, overrides: Sequence[str] = (), folder: Path | None = None) -
     ------
     ScenarioError
         When there is no such scenario, or something in it is wrong.
+    TypeError
+        When name or overrides are something else.
     """
-    file = files.read(name, _FOLDER, "scenario")
+    if not isinstance(name, str | os.PathLike):
+        raise TypeError(f"{shown(name)} is no scenario: give the name of one that is shipped, or the path of a file")
+    if not isinstance(overrides, list | tuple) or not all(isinstance(one, str) for one in overrides):
+        raise TypeError(f"{shown(overrides)} are no overrides: give a list of texts, each like 'time.duration=5'")
+    file = files.read(os.fspath(name), _FOLDER, "scenario")
     origin, asked_from = Source(file.name, file.text, tuple(overrides)), folder or file.folder
     scenario = _validated(inputs.anchored(file.says, file.folder), origin, asked_from)
     scenario._own = inputs.own(scenario, lambda key, _: _folders(origin, key, asked_from, file.folder))
@@ -91,11 +100,38 @@ def extended(given: Scenario, entries: Sequence[Mapping[str, Any]]) -> Scenario:
     ------
     ScenarioError
         When something in them is wrong.
+    TypeError
+        When these are no scenario and no list.
     """
-    raw = given.model_dump(mode="json", exclude_none=True)
-    raw["timeline"] += entries
-    scenario = _validated(raw, Source("in code", "", ()), Path())
-    scenario._own = given.own_modules
+    if not isinstance(entries, list | tuple):
+        raise TypeError(f"{shown(entries)} are no entries: give a list of tables, each like {{'verb': 'kill', ...}}")
+    scenario = _again(given, entries)
+    scenario._source = IN_CODE
+    return scenario
+
+
+def checked(given: Scenario) -> Scenario:
+    """The same scenario, held against what a file may say: a copy that pydantic has changed is not.
+
+    Raises
+    ------
+    ScenarioError
+        When something in it is wrong.
+    """
+    return _again(given, ())
+
+
+def _again(given: Scenario, entries: Sequence[Any]) -> Scenario:
+    if not isinstance(given, Scenario):
+        raise TypeError(f"{shown(given)} is no Scenario: give one that affinet.scenario.load has read")
+    try:
+        raw = given.model_dump(mode="json", exclude_none=True, warnings=False)
+    except PydanticSerializationError as error:
+        raise ScenarioError(f"{IN_CODE.file}: {one_line(str(error))}") from error
+    if entries and isinstance(raw.get("timeline"), list):
+        raw["timeline"] += entries
+    scenario = _valid(raw, IN_CODE)
+    scenario._source, scenario._own = given._source, given.own_modules
     return scenario
 
 
@@ -121,14 +157,18 @@ def _folders(origin: Source, key: str, asked_from: Path, *folders: Path) -> Sequ
 def _validated(raw: dict[str, Any], origin: Source, folder: Path) -> Scenario:
     for override in origin.overrides:
         _override(raw, override, folder)
+    scenario = _valid(raw, origin)
+    scenario._source = origin
+    return scenario
+
+
+def _valid(raw: dict[str, Any], origin: Source) -> Scenario:
     try:
-        scenario = Scenario.model_validate(raw)
+        return Scenario.model_validate(raw)
     except ValidationError as error:
         raise ScenarioError(
             explained(error, Scenario, origin)
         ) from None  # it has all that pydantic says, in better words
-    scenario._source = origin
-    return scenario
 
 
 def _value(override: str, text: str) -> Any:

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.selectors import edge
-from affinet.scenario.source import Source
+from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.units import (
     Bearing,
     Below1,
@@ -336,6 +336,11 @@ class Scenario(Section):
     def own_modules(self) -> dict[str, Path]:
         """The folders of the user's own in which modules of its algorithms lie, by "module:Class"."""
         return self._own
+
+    @property
+    def source(self) -> Source:
+        """Where it came from."""
+        return self._source or IN_CODE
 
     def locate(self, error: ScenarioError) -> ScenarioError:
         """The same error, whose text begins with a key, with the place where that key was given."""

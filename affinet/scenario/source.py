@@ -31,6 +31,9 @@ class Source:
         return any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given)
 
 
+IN_CODE = Source("in code", "", ())  # what no file says
+
+
 def parts(key: str) -> list[str]:
     """The parts of a key as TOML writes it: a part in quotes may have dots in it."""
     return [_unquoted(part.strip()) for part in _DOT.split(key)]

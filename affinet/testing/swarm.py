@@ -15,7 +15,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.run import Runtime, evidence, fly, rehearse
 from affinet.scenario import loading as scenarios
 from affinet.scenario.sections import Scenario
-from affinet.verdicts.checking import Checker
+from affinet.verdicts.checking import CheckResult, as_checker
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import RunVerdict
 from netem.processes.user_code import UserCodeError
@@ -35,16 +35,25 @@ class FlownRun(Evidence):
         """The run that left this evidence."""
         return cls(evidence.plan, evidence.arrays, evidence.outcome)
 
-    def check(self, *checkers: Checker) -> FlownRun:
-        """Nothing if every checker passes; one that is vacuous proves nothing, and fails.
+    def check(self, *checkers: Callable[[Evidence], CheckResult]) -> FlownRun:
+        """The run itself if every checker passes; one that is vacuous proves nothing, and fails.
+
+        Parameters
+        ----------
+        checkers
+            Each a `Checker`, or a function that is to be one under its own name.
 
         Raises
         ------
         Broken
             When one does not pass: which, why, and the first tick that offends.
+        UserCodeError
+            When one fails itself, or returns no `CheckResult`.
+        TypeError
+            When one is none.
         """
         __tracebackhide__ = True
-        findings = [checker(self) for checker in checkers]
+        findings = [checker(self) for checker in map(as_checker, checkers)]
         if wrong := [finding for finding in findings if finding.verdict != "pass"]:
             raise Broken("\n".join(map(str, wrong)))
         return self

@@ -15,6 +15,7 @@ import numpy as np
 
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import RunVerdict
+from netem.core.plain import shown
 from netem.loading.calling import Calling
 from netem.loading.returned import WrongReturn, kind
 
@@ -92,6 +93,21 @@ class Checker:
             return CheckResult(name, verdict, evidence.ticks - 1 if verdict == "fail" else None, found.says)
 
         return Checker(name, check)
+
+
+def as_checker(given: Callable[[Evidence], CheckResult]) -> Checker:
+    """A checker as it is; a function as the checker of its name.
+
+    Raises
+    ------
+    TypeError
+        When it is neither.
+    """
+    if isinstance(given, Checker):
+        return given
+    if not callable(given):
+        raise TypeError(f"{shown(given)} is no checker: give checkers, like bounded(5.0), or a Checker of your own")
+    return Checker(getattr(given, "__name__", type(given).__name__), given)
 
 
 def above_zero(checker: str, **numbers: float) -> None:

@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.plan import Plan
+from affinet.scenario.words import one_line
 from affinet.verdicts.bites import Bite
 from affinet.verdicts.outcome import Outcome
 from analysis.models.arrays import Array, Mask
 from netem.faults.timeline import Timeline
 from world.books.history import Arrays
 
+_DIGITS = 12  # of a digest, where it is there to tell runs apart
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Evidence:
     """A run, for checkers and tests.
 
@@ -33,6 +36,11 @@ class Evidence:
     plan: Plan
     arrays: Arrays
     outcome: Outcome
+
+    def __repr__(self) -> str:
+        source, digest = self.plan.scenario.source, self.outcome.digest or ""
+        flown = f"{one_line(source.file)}, {self.outcome.verdict}, {digest[:_DIGITS]}, {self.ticks} ticks"
+        return f"<{type(self).__name__}: {flown}>"
 
     @property
     def timeline(self) -> Timeline:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -159,6 +160,39 @@ def judge(
     )
 
 
+def claim(out: Path) -> None:
+    """Make the run directory, before anything is said of a run in it.
+
+    Raises
+    ------
+    FileExistsError
+        When it holds a run already.
+    OSError
+        When it cannot be made.
+    """
+    try:
+        str(out).encode()
+    except UnicodeEncodeError as error:
+        raise OSError(
+            f"{str(out)!r} is no UTF-8, as what writes recordings wants it; name another directory"
+        ) from error
+    refuse_taken(out)
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def refuse_taken(out: Path) -> None:
+    """Refuse a directory that holds a run already.
+
+    Raises
+    ------
+    FileExistsError
+        When it does.
+    """
+    there = set(os.listdir(out)) if os.path.isdir(out) else set()  # Path.is_dir raises for a name that is too long
+    if taken := [name for name in _LEFT_BY_A_RUN if name in there]:
+        raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory")
+
+
 def prepare(plan: Plan, out: Path) -> None:
     """Make the run directory, and write down what is about to be flown, with a copy of all it reads.
 
@@ -169,21 +203,13 @@ def prepare(plan: Plan, out: Path) -> None:
     OSError
         When it cannot be made, or written to.
     """
-    try:
-        str(out).encode()
-    except UnicodeEncodeError as error:
-        raise OSError(
-            f"{str(out)!r} is no UTF-8, as what writes recordings wants it; name another with --out"
-        ) from error
-    out.mkdir(parents=True, exist_ok=True)
-    if taken := [name for name in _LEFT_BY_A_RUN if (out / name).exists()]:
-        raise FileExistsError(f"{str(out)!r} holds a run already: {taken[0]}; name another directory with --out")
+    claim(out)
     text = inputs.keep(plan.scenario, plan.journal, out).model_dump_json(indent=2, exclude_none=True) + "\n"
     with system_errors.about(out / loading.FILE):
         try:
             file = (out / loading.FILE).open("x", encoding="utf-8")
         except FileExistsError as error:
-            raise FileExistsError(f"{str(out)!r} holds a run already; name another directory with --out") from error
+            raise FileExistsError(f"{str(out)!r} holds a run already; name another directory") from error
         with file:
             file.write(text)
 

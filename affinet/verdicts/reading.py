@@ -3,20 +3,75 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+from msgspec import Meta
 
 from affinet.planning import making
 from affinet.scenario.sections import ScenarioError
 from affinet.verdicts import outcome
 from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.outcome import RunVerdict
+from netem.core.plain import PlainError, from_plain
 from netem.faults.timeline import Timeline
+from netem.medium.ledger import Accounts
 from netem.medium.medium import JOURNAL
+from netem.processes.system_errors import said
 from world.books import history
-from world.books.history import Arrays
+from world.books.history import Arrays, Damaged
 
-_SUMMED_UP = ("verdict", "reasons", "user_code", "flown", "messages", "wall_s", "processes")
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_Count = Annotated[int, Meta(ge=0)]
+_Seconds = Annotated[float, Meta(ge=0.0, le=1e12)]
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """As in `outcome.Outcome`."""
+
+    estimator: str
+    law: str
+    seed: _Count
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class _Messages:
+    ticks: _Count
+    offered: _Count
+    copies: _Count
+    delivered: _Count
+    dropped: dict[str, _Count]
+    in_flight: _Count
+    uninstructed: _Count | None
+
+
+@dataclass(frozen=True)
+class _Process:
+    role: str
+    id: int | None
+    pid: int
+    rss_mb: float
+    exit: int | None
+
+
+@dataclass(frozen=True)
+class _Summary:
+    """Of `summary.json` what the arrays do not say again."""
+
+    verdict: RunVerdict
+    reasons: tuple[str, ...]
+    user_code: bool
+    digest: str | None
+    flown: _Flown
+    ticks: _Count
+    wall_s: _Seconds
+    messages: _Messages
+    processes: tuple[_Process, ...]
 
 
 def evidence(out: Path) -> Evidence:
@@ -25,45 +80,89 @@ def evidence(out: Path) -> Evidence:
     Raises
     ------
     ScenarioError
-        When it holds no run, or one that has left no summary or no arrays.
+        When it holds no run, or one that has left no summary or no arrays, or its scenario cannot be read any more.
+    PlanError, UserCodeError
+        When its scenario cannot fly any more.
     Damaged
-        When its arrays are not what the run wrote.
+        When its summary, arrays or journal are not what the run wrote.
     """
-    from netem.medium import journal  # pyarrow takes a while to import
-
     summary = _summary(out)
     file = out / history.FILE
     if not file.is_file():
-        raise ScenarioError(f"{out}: the run left no {history.FILE}: {'; '.join(summary['reasons'])}")
-    plan, arrays = making.again(out, (), verdicts=False), history.load(file)
-    timeline = _as_fired(plan.timeline, arrays)
+        raise ScenarioError(f"{out}: the run left no {history.FILE}: {'; '.join(summary.reasons)}")
+    arrays, accounts = history.load(file), _accounts(out)
+    plan = making.again(out, (), verdicts=False)
+    history.refuse_those_of_another(file, arrays, plan.world, len(plan.channels), plan.reports)
+    if summary.ticks != len(arrays["error"]):
+        raise Damaged(file, f"it is not that of {outcome.SUMMARY}, which has {summary.ticks} ticks")
+    if summary.digest != history.digest(arrays):
+        raise Damaged(file, f"it is not that of {outcome.SUMMARY}, which has another digest")
     judged = outcome.judge(
         plan,
-        timeline,
+        _as_fired(plan.timeline, arrays),
         arrays,
-        accounts=journal.accounts(journal.read(out / JOURNAL)),
-        uninstructed=summary["messages"]["uninstructed"],
+        accounts=accounts,
+        uninstructed=summary.messages.uninstructed,
         failure=None,
-        user_code=summary["user_code"],
-        wall_s=summary["wall_s"],
-        processes=summary["processes"],
+        user_code=summary.user_code,
+        wall_s=summary.wall_s,
+        processes=[asdict(process) for process in summary.processes],
         out=out,
     )
-    verdict, reasons = summary["verdict"], tuple(summary["reasons"])
-    return Evidence(plan, arrays, replace(judged, verdict=verdict, reasons=reasons, flown=summary["flown"]))
+    if summary.verdict != "fail" and judged.messages != asdict(
+        summary.messages
+    ):  # a failed run may have missed the last
+        raise Damaged(out / JOURNAL, f"its accounts are not those of {outcome.SUMMARY}")
+    return Evidence(
+        plan, arrays, replace(judged, verdict=summary.verdict, reasons=summary.reasons, flown=asdict(summary.flown))
+    )
 
 
-def _summary(out: Path) -> dict[str, Any]:
+def journal(out: Path) -> pa.Table:
+    """The journal of a run directory.
+
+    Raises
+    ------
+    Damaged
+        When there is none, or it is not what a run wrote.
+    """
+    from netem.medium import journal as journals  # pyarrow takes a while to import
+
+    file = out / JOURNAL
+    try:
+        return journals.read(file)
+    except journals.JournalError as error:
+        raise Damaged(file, str(error).removeprefix(f"{file}: ")) from error
+
+
+def _summary(out: Path) -> _Summary:
     file = out / outcome.SUMMARY
     try:
-        said = json.loads(file.read_text(encoding="utf-8"))
-        return {key: said[key] for key in _SUMMED_UP}
-    except FileNotFoundError as error:
+        return from_plain(_Summary, json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant))
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise ScenarioError(f"{out}: no run that has ended: it has no {outcome.SUMMARY}") from error
-    except KeyError as error:
-        raise ScenarioError(f"{file}: not what a run wrote there: it has no {error}; fly the run again") from error
-    except (OSError, ValueError, TypeError) as error:
-        raise ScenarioError(f"{file}: not what a run wrote there: {error}; fly the run again") from error
+    except PlainError as error:
+        raise Damaged(file, str(error).removeprefix(f"{_Summary.__name__}: ")) from error
+    except RecursionError as error:
+        raise Damaged(file, "it nests too deep") from error
+    except OSError as error:
+        raise Damaged(file, said(error)) from error
+    except ValueError as error:
+        raise Damaged(file, str(error)) from error
+
+
+def _refuse_constant(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number of JSON")
+
+
+def _accounts(out: Path) -> Accounts | None:
+    from netem.medium import journal as journals
+
+    table = journal(out)
+    try:
+        return journals.accounts(table)
+    except journals.JournalError as error:
+        raise Damaged(out / JOURNAL, str(error)) from error
 
 
 def _as_fired(timeline: Timeline, arrays: Arrays) -> Timeline:

@@ -7,7 +7,8 @@ with its verdict when it is offered, a row `copied` if it is doubled, and a row 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -204,17 +205,40 @@ def read(path: Path) -> Any:
 
 
 def accounts(table: Any) -> Accounts | None:
-    """The accounts of a run, as far as its journal was written; None where it holds no tick."""
-    plain = arrow.note(table)
-    return None if plain is None else from_plain(Accounts, plain)
+    """The accounts of a run, as far as its journal was written; None where it holds no tick.
+
+    Raises
+    ------
+    JournalError
+        When they are none.
+    """
+    with _refusing("accounts"):
+        plain = arrow.note(table)
+        return None if plain is None else from_plain(Accounts, plain)
 
 
 def injected(table: Any) -> tuple[Fault, ...]:
-    """The faults that were injected into a run while it flew."""
+    """The faults that were injected into a run while it flew.
+
+    Raises
+    ------
+    JournalError
+        When they are none.
+    """
     events = table["event"].drop_null()
     if not len(events):
         return ()
-    return tuple(from_plain(Fault, fault) for fault in json.loads(events[-1].as_py()))
+    with _refusing("faults"):
+        return tuple(from_plain(Fault, fault) for fault in json.loads(events[-1].as_py()))
+
+
+@contextmanager
+def _refusing(what: str) -> Iterator[None]:
+    """What cannot be read in the block is what was written beside the verdicts."""
+    try:
+        yield
+    except (ValueError, TypeError, RecursionError) as error:
+        raise JournalError(f"its {what} cannot be read: {error}") from error
 
 
 def check(table: Any, channels: Sequence[str], ticks: int) -> None:

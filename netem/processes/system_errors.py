@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from os import PathLike
 
-_ROOM = "free some room or raise the limit (ulimit -f), or write to another place with --out"
-_RIGHTS = "get the right to it, or write to another place with --out"
-_TAKEN = "a file is where a directory is due, or the other way round: name another with --out"
-_MORE = "raise the limit (ulimit -u, or memory), or fly in one process with --runtime inprocess"
+_ROOM = "free some room or raise the limit (ulimit -f), or write to another place"
+_RIGHTS = "get the right to it, or write to another place"
+_TAKEN = "a file is where a directory is due, or the other way round: name another"
+_MORE = "raise the limit (ulimit -u, or memory), or fly in one process (runtime inprocess)"
 _FILES = "raise the limit of open files (ulimit -n)"
 _WAYS_OUT = {
     errno.ENOSPC: _ROOM,

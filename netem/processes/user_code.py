@@ -60,7 +60,7 @@ def worded(error: BaseException) -> str:
     """An error with its type, in one line."""
     if isinstance(error, SystemExit):
         return "it called sys.exit(), and only the run may end the run"
-    line = " ".join(text_of(error).split())
+    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in " ".join(text_of(error).split()))
     if len(line) > _LONGEST:
         line = f"{line[:_LONGEST]} ..."
     return f"{type(error).__name__}: {line}" if line else type(error).__name__

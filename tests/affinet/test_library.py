@@ -3,9 +3,13 @@
 import ast
 import inspect
 import json
+import pickle
 import re
+import shutil
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +18,7 @@ from flying import PROCESSES, digest_of
 from own_code import ESTIMATOR, broken, write
 
 import affinet
+from affinet.cli import commands
 
 ROOT = Path(affinet.__file__).parents[1]
 SHORT = ("time.dt=0.05", "time.duration=1")
@@ -193,19 +198,284 @@ def test_what_an_estimator_does_wrong_is_said_however_it_is_flown(keys, tmp_path
         affinet.run("corridor", *SHORT, f"agents.estimator={name}:Own", "agents.law=rest", **keys)
 
 
-DAMAGES = {
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    out = tmp_path_factory.mktemp("kept") / "run"
+    affinet.run("corridor", *SHORT, "record.enabled=false", out=out)
+    return out
+
+
+@pytest.fixture
+def flown(kept, tmp_path):
+    """A copy of a run directory, to be damaged."""
+    return shutil.copytree(kept, tmp_path / "flown")
+
+
+NO_RUNS = {
     "no run": (lambda out: [file.unlink() for file in out.iterdir() if file.is_file()], "no run that has ended"),
-    "a text": (lambda out: (out / "summary.json").write_text("text"), "summary.json: not what a run wrote there"),
-    "a list": (lambda out: (out / "summary.json").write_text("[]"), "summary.json: not what a run wrote there"),
-    "no verdict": (lambda out: (out / "summary.json").write_text("{}"), "it has no 'verdict'"),
     "no arrays": (lambda out: (out / "arrays.npz").unlink(), "the run left no arrays.npz"),
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_directory_that_holds_no_whole_run_is_refused(damage, out):
-    affinet.run("corridor", "time.duration=0.1", out=out)
-    harm, says = DAMAGES[damage]
-    harm(out)
+@pytest.mark.parametrize("lack", NO_RUNS)
+def test_a_directory_that_holds_no_whole_run_is_refused(lack, flown):
+    harm, says = NO_RUNS[lack]
+    harm(flown)
     with pytest.raises(affinet.ScenarioError, match=says):
+        affinet.load(flown)
+
+
+def saying(**changes):
+    """A change of keys in a summary; None takes one away."""
+
+    def change(said):
+        return {key: value for key, value in (said | changes).items() if value is not GONE}
+
+    return change
+
+
+def of_messages(**changes):
+    return lambda said: said | {"messages": said["messages"] | changes}
+
+
+GONE = object()
+SUMMARIES = {
+    "no verdict": (saying(verdict=GONE), "object missing required field `verdict`"),
+    "verdict 5": (saying(verdict=5), "verdict: "),
+    "another verdict": (saying(verdict="fine"), "verdict: invalid enum value 'fine'"),
+    "no reasons": (saying(reasons=None), "reasons: "),
+    "a reason that is a number": (saying(reasons=[1]), "reasons[0]: "),
+    "no messages": (saying(messages={}), "messages: object missing required field"),
+    "messages null": (saying(messages=None), "messages: "),
+    "messages a text": (saying(messages="none"), "messages: "),
+    "less than no messages": (of_messages(offered=-1), "messages.offered: "),
+    "dropped numbers": (of_messages(dropped={"lost": "many"}), "messages.dropped[...]: "),
+    "no processes": (saying(processes=None), "processes: "),
+    "a process that is a number": (saying(processes=[1]), "processes[0]: "),
+    "no time": (saying(wall_s=None), "wall_s: "),
+    "a time in words": (saying(wall_s="long"), "wall_s: "),
+    "an endless time": (saying(wall_s=float("inf")), "Infinity is no number of JSON"),
+    "nothing flown": (saying(flown=None), "flown: "),
+    "flown by nobody": (saying(flown={"law": "rest"}), "flown: object missing required field `estimator`"),
+    "a list": (lambda _: [], "expected `object`, got `array`"),
+    "null": (lambda _: None, "expected `object`, got `null`"),
+}  # fmt: skip
+
+
+def damaged(out):
+    with pytest.raises(affinet.Damaged) as error:
         affinet.load(out)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("damage", SUMMARIES)
+def test_a_summary_that_no_run_wrote_is_damaged(damage, flown):
+    change, why = SUMMARIES[damage]
+    file = flown / "summary.json"
+    file.write_text(json.dumps(change(json.loads(file.read_text()))))
+    said = damaged(flown)
+    assert said.startswith(f"{file}: not what a run wrote there: {why}")
+    assert said.endswith("; fly the run again, or restore the file")
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"text", b"", b"\xff\xfe", b"[" * 100_000, b'{"wall_s":' + b"9" * 5000 + b"}"],
+    ids=["a text", "empty", "no UTF-8", "deep", "a long number"],
+)
+def test_a_summary_that_is_no_json_is_damaged(text, flown):
+    (flown / "summary.json").write_bytes(text)
+    assert damaged(flown).startswith(f"{flown / 'summary.json'}: not what a run wrote there: ")
+
+
+def only(name, change):
+    return lambda a: a | {name: change(a[name])}
+
+
+def every(change):
+    return lambda a: {name: change(array) for name, array in a.items()}
+
+
+OTHER_ARRAYS = {
+    "fewer reasons": (only("dropped", lambda a: a[:, :-1]), "dropped counts 15 verdicts, and there are 16"),
+    "no verdicts": (only("verdicts", lambda a: np.full_like(a, 255)), "verdicts has a 255, which is no verdict"),
+    "fewer agents": (only("input", lambda a: a[:, :3]), "input is float64 (3, 2) in a tick, where its scenario"),
+    "fewer links": (only("verdicts", lambda a: a[:, :, :2]), "verdicts is uint8 (4, 2) in a tick"),
+    "four axes": (only("position", lambda a: np.concatenate([a, a], axis=2)), "position is float64 (7, 4) in a tick"),
+    "short floats": (only("position", lambda a: a.astype(np.float16)), "position is float16 (7, 2) in a tick"),
+    "a stranger": (lambda a: a | {"stranger": a["psi"]}, "stranger is float64 (7,) in a tick, where"),
+    "fewer ticks": (every(lambda a: a[:-5]), "it is not that of summary.json, which has 20 ticks"),
+    "more ticks": (every(lambda a: np.concatenate([a, a])[: len(a) + 20]), "it has 40 ticks, where its scenario has 20"),
+    "other contents": (only("newest", lambda a: a * 0 + 99), "it is not that of summary.json, which has another digest"),
+    "other verdicts": (only("verdicts", lambda a: a * 0 + 5), "it is not that of summary.json, which has another digest"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", OTHER_ARRAYS)
+def test_arrays_that_the_run_did_not_leave_are_damaged(damage, flown):
+    change, why = OTHER_ARRAYS[damage]
+    file = flown / "arrays.npz"
+    np.savez(file, **change(dict(np.load(file))))
+    assert damaged(flown).startswith(f"{file}: not what a run wrote there: {why}")
+
+
+def test_arrays_without_a_digest_are_damaged(flown):
+    file = flown / "summary.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"digest": None}))
+    assert "it is not that of summary.json, which has another digest" in damaged(flown)
+
+
+def cut_short(file):
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+JOURNALS = {
+    "gone": (Path.unlink, "no such table"),
+    "a text": (lambda file: file.write_text("text"), "no such table"),
+    "cut short": (cut_short, "its accounts are not those of summary.json"),
+    "other accounts": (
+        lambda file: file.write_bytes(file.read_bytes().replace(b'"in_flight"', b'"in_fright"')),
+        "its accounts cannot be read: Accounts: ",
+    ),
+}
+
+
+@pytest.mark.parametrize("damage", JOURNALS)
+def test_a_journal_that_the_run_did_not_leave_is_damaged(damage, flown):
+    harm, why = JOURNALS[damage]
+    file = flown / "journal.arrows"
+    harm(file)
+    assert damaged(flown).startswith(f"{file}: not what a run wrote there: {why}")
+
+
+def test_the_journal_of_no_run_is_damaged(tmp_path):
+    with pytest.raises(affinet.Damaged, match=r"journal\.arrows: not what a run wrote there: no such table"):
+        affinet.journal(tmp_path)
+
+
+# ---- what is asked for
+
+
+READ = affinet.scenario.load("corridor")
+NO_RUNTIME = '^runtime "bogus": there are processes, inprocess$'
+WRONG_CALLS = {
+    "no such runtime": (lambda: affinet.run("corridor", runtime="bogus"), ValueError, NO_RUNTIME),
+    "out is empty": (lambda: affinet.run("corridor", out=""), ValueError, "^out is '', which is no path"),
+    "out has a NUL": (lambda: affinet.run("corridor", out="a\0b"), ValueError, r"^out is 'a\\x00b', which is no path"),
+    "out is a number": (lambda: affinet.run("corridor", out=5), TypeError, "^out is 5: give the path of a run directory"),
+    "a number": (lambda: affinet.run(5), TypeError, "^5 is no scenario: give the name"),
+    "a table": (lambda: affinet.run({"a": 1}), TypeError, r"^\{'a': 1\} is no scenario: give the name"),
+    "an override that is a number": (lambda: affinet.run("corridor", 5), TypeError, r"^\(5,\) are no overrides: give a"),
+    "one override": (lambda: affinet.scenario.load("corridor", "seed=3"), TypeError, "^'seed=3' are no overrides"),
+    "no scenario extended": (lambda: affinet.scenario.extended("corridor", []), TypeError, "^'corridor' is no Scenario"),
+    "extended by a table": (lambda: affinet.scenario.extended(READ, {}), TypeError, r"^\{\} are no entries"),
+    "load nothing": (lambda: affinet.load(None), TypeError, "^directory is None: give the path of a run directory"),
+    "load an empty path": (lambda: affinet.load(""), ValueError, "^directory is '', which is no path"),
+    "load a NUL": (lambda: affinet.load("\0"), ValueError, "^directory is"),
+    "journal of nothing": (lambda: affinet.journal(None), TypeError, "^directory is None"),
+    "realised nothing": (lambda: affinet.realised("run"), TypeError, "^'run' is no run: give what"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("call", WRONG_CALLS)
+def test_what_is_not_asked_for_is_refused_in_one_line(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    calling, kind, says = WRONG_CALLS[call]
+    with pytest.raises(kind, match=says):
+        calling()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("call", [lambda: affinet.run("corridor"), lambda: commands.main(["check", "corridor"])])
+def test_a_working_directory_that_is_gone_is_said(call, tmp_path, monkeypatch, capsys):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    try:
+        status = call()
+    except affinet.ScenarioError as error:
+        said = str(error)
+    else:
+        assert status == 2
+        said = capsys.readouterr().err.strip()
+    assert said == "the working directory is not there any more: go to one that is"
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"seed": -1}, "^in code: seed: should be greater than or equal to 0, got -1"),
+        ({"agents": None}, "^in code: agents: is missing"),
+        ({"timeline": 5}, "^in code: timeline: "),
+        ({"seed": object()}, "^in code: "),
+    ],
+)
+def test_a_scenario_that_was_changed_behind_its_back_is_read_again(changes, says):
+    given = affinet.scenario.load("corridor", SHORT)
+    with pytest.raises(affinet.ScenarioError, match=says):
+        affinet.run(given.model_copy(update=changes))
+
+
+def test_a_scenario_that_was_changed_to_another_is_flown():
+    given = affinet.scenario.load("corridor", [*SHORT, "seed=5"]).model_copy(update={"seed": 6})
+    assert affinet.run(given).outcome.digest == digest_of("corridor", *SHORT, "seed=6")
+
+
+# ---- what a run is
+
+
+@pytest.mark.parametrize("scenario", ["corridor", "target", "localization", "partition"])
+def test_a_run_can_be_pickled_compared_and_shown(scenario):
+    flown = affinet.run(scenario, "time.duration=0.1")
+    again = pickle.loads(pickle.dumps(flown))
+    assert flown != again
+    assert len({flown, again, flown}) == 2
+    assert flown.plan != again.plan
+    assert affinet.realised(flown) != affinet.realised(again)
+    digest, ticks = flown.outcome.digest, flown.ticks
+    assert (
+        repr(flown)
+        == repr(again)
+        == f"<FlownRun: {scenario}.toml, {flown.outcome.verdict}, {digest[:12]}, {ticks} ticks>"
+    )
+    assert affinet.run(again.plan.scenario).outcome.digest == digest
+    assert (affinet.realised(again).heard == affinet.realised(flown).heard).all()
+    assert again.check(affinet.bounded(1e9)) is again
+
+
+def test_a_run_comes_back_from_another_process():
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        flown = pool.submit(affinet.run, "corridor", *SHORT).result()
+    assert flown.outcome.digest == digest_of("corridor", *SHORT)
+
+
+# ---- checkers
+
+
+def test_what_is_no_checker_is_refused(short_run):
+    with pytest.raises(TypeError, match=r"^'bounded' is no checker: give checkers, like bounded\(5\.0\)"):
+        short_run.check("bounded")
+
+
+def says_nothing(_):
+    return None
+
+
+def breaks(_):
+    return 1 / 0
+
+
+@pytest.mark.parametrize("wrapped", [lambda check: check, lambda check: affinet.Checker(check.__name__, check)])
+@pytest.mark.parametrize(
+    ("check", "says"),
+    [(says_nothing, "must return a CheckResult, got None"), (breaks, "ZeroDivisionError: division by zero")],
+)
+def test_a_checker_that_fails_is_named_with_file_and_line(check, says, wrapped, short_run):
+    with pytest.raises(affinet.UserCodeError, match=rf"^{check.__name__}: {says} \({re.escape(__file__)}:\d+\)$"):
+        short_run.check(wrapped(check))
+
+
+@pytest.fixture(scope="module")
+def short_run():
+    return affinet.run("corridor", "time.duration=0.1")

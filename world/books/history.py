@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from zipfile import BadZipFile
@@ -24,6 +24,7 @@ from netem.processes import system_errors
 from world.physics.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
+Reports = Mapping[str, tuple[int, ...]]  # what estimators report beyond edges, and the shape of each for one agent
 
 FILE = "arrays.npz"  # in a run directory
 
@@ -250,7 +251,22 @@ class History:
 
 
 class Damaged(ValueError):
-    """The arrays of a run are not what it wrote."""
+    """What lies in a run directory is not what the run wrote: which file, what is wrong in it, and the way out.
+
+    Parameters
+    ----------
+    file
+        The file.
+    why
+        What is wrong in it.
+    """
+
+    def __init__(self, file: Path, why: str) -> None:
+        super().__init__(file, why)
+        self.file, self.why = file, " ".join(why.split())
+
+    def __str__(self) -> str:
+        return f"{self.file}: not what a run wrote there: {self.why}; fly the run again, or restore the file"
 
 
 def load(path: Path) -> Arrays:
@@ -271,9 +287,38 @@ def load(path: Path) -> Arrays:
             arrays = dict(archive)
         _refuse_other_forms(arrays)
     except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
-        why = " ".join(str(error).split())
-        raise Damaged(f"{path}: not what a run wrote there: {why}; fly the run again, or restore the file") from error
+        raise Damaged(path, str(error)) from error
     return arrays
+
+
+def refuse_those_of_another(path: Path, arrays: Arrays, world: World, channels: int, reports: Reports) -> None:
+    """Refuse arrays that no run over this world has left.
+
+    Parameters
+    ----------
+    path
+        Of the file that has them.
+    arrays
+        As read from it.
+    world, channels, reports
+        What they would be of: the world, how many channels, and what estimators report.
+
+    Raises
+    ------
+    Damaged
+        When they have other names, numbers, agents, links, channels or axes, or more ticks.
+    """
+    due = History(replace(world, ticks=0), channels, reports).arrays()
+    for name in sorted(due.keys() | arrays.keys()):
+        said, wanted = _form(arrays.get(name)), _form(due.get(name))
+        if said != wanted:
+            raise Damaged(path, f"{name} is {said} in a tick, where its scenario makes it {wanted}")
+    if (ticks := len(arrays["error"])) > world.ticks:
+        raise Damaged(path, f"it has {ticks} ticks, where its scenario has {world.ticks}")
+
+
+def _form(array: NDArray[Any] | None) -> str:
+    return "missing" if array is None else f"{array.dtype} {array.shape[1:]}"
 
 
 def _refuse_other_forms(arrays: Arrays) -> None:
@@ -285,6 +330,10 @@ def _refuse_other_forms(arrays: Arrays) -> None:
         rows = ticks + (name == "position")
         if (array.dtype.kind, array.ndim, array.shape[:1]) != (kind, axes, (rows,)):
             raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, in a run of {ticks} ticks")
+    if (largest := arrays["verdicts"].max(initial=0)) >= len(Verdict):
+        raise ValueError(f"verdicts has a {largest}, which is no verdict")
+    if (columns := arrays["dropped"].shape[1]) != len(Verdict):
+        raise ValueError(f"dropped counts {columns} verdicts, and there are {len(Verdict)}")
 
 
 def digest(arrays: Arrays) -> str:

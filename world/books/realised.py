@@ -17,7 +17,7 @@ from world.formation import stress
 from world.formation.nominal import Formation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Realised:
     """The functional graph in some ticks, for each channel, sensing first.
 

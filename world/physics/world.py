@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -101,6 +101,10 @@ class World:
     start: Literal["targets", "origin"]
     spread: float
     swarms: int
+
+    def __getstate__(self) -> dict[str, object]:
+        """What it was made of: what it has worked out since can be worked out again, wherever it is taken."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def seed(self) -> Seed:

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import pytest
 from flying import PROCESSES
 from paths import ROOT
 
@@ -66,12 +67,38 @@ def test_bad_input_is_one_line_and_exit_2():
     assert "did you mean 'availability'" in line
 
 
-def test_a_run_directory_is_never_overwritten(out):
+def test_a_run_directory_is_never_overwritten_nor_is_such_a_run_announced(out):
     short = ("run", "corridor", "--duration", "0.1", "--runtime", "inprocess", "--out", str(out))
     assert affinet(*short).returncode == 0
     again = affinet(*short)
     assert again.returncode == 2
-    assert "holds a run already" in again.stderr
+    (line,) = again.stderr.splitlines()
+    assert "holds a run already" in line
+
+
+def test_a_run_that_has_no_place_is_not_announced(tmp_path):
+    (tmp_path / "file").touch()
+    done = affinet("run", "corridor", "--duration", "0.1", "--out", str(tmp_path / "file"))
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"'{tmp_path / 'file'}': File exists; ")
+
+
+@pytest.mark.parametrize(
+    "words", [("run", "corridor", "--out="), ("replay", ""), ("study", "paper-003", "--out="), ("fit", "")]
+)
+def test_an_empty_path_is_none(words, tmp_path):
+    done = affinet(*words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith(": it is empty: name a directory\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_alone_says_what_commands_there_are():
+    done = affinet()
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == affinet("--help").stdout
+    assert "check-determinism" in done.stderr
 
 
 def test_check_says_why_a_scenario_cannot_fly():

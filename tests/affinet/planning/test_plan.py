@@ -1,5 +1,6 @@
 """What cannot fly is found by the plan, in plain words, before any process starts."""
 
+import pickle
 import re
 import subprocess
 from dataclasses import replace
@@ -18,6 +19,7 @@ from agents.exchange import Heard
 from agents.laws import heard_late
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.single import ConstantVelocity, Static, VaryingVelocity
+from analysis.models.finding import Finding
 from world.formation.nominal import PRESETS
 from world.formation.stress import laplacian, solve
 from world.physics import bodies
@@ -391,3 +393,10 @@ def test_the_one_tick_radius_is_the_rate_of_the_iteration_of_inputs(idle, relaxa
         size.append(np.linalg.norm(own.input))
     rate = (size[399] / size[299]) ** (1 / 100)
     assert rate == pytest.approx(heard_late.one_tick_radius(*follower_block(made), relaxation), abs=1e-4)
+
+
+def test_what_a_finding_says_stays_on_one_line_of_plain_text_wherever_it_goes():
+    said = PlanError([Finding("mine", "error", "a line\nand \x1b[31mred\udc80"), Finding("mine", "note", "not this")])
+    assert str(said) == r"mine: a line\nand \x1b[31mred\udc80"
+    again = pickle.loads(pickle.dumps(said))
+    assert (str(again), again.findings) == (str(said), said.findings)

@@ -69,7 +69,7 @@ def test_of_those_who_name_the_same_one_gets_it(ask, refusal, out):
     given = at_once(lambda: ask(out))
     refused = [one for one in given if isinstance(one, OSError)]
     assert len(refused) == TOGETHER - 1
-    assert all(refusal in str(error) and "--out" in str(error) for error in refused)
+    assert all(refusal in str(error) and "; name another" in str(error) for error in refused)
 
 
 @pytest.mark.usefixtures("still")
@@ -87,7 +87,7 @@ def test_runs_in_the_same_second_all_fly():
 def test_what_is_left_of_a_run_is_not_taken_for_this_one(left, out):
     out.mkdir()
     (out / left).touch()
-    with pytest.raises(FileExistsError, match=f"holds a run already: {left}; name another directory with --out"):
+    with pytest.raises(FileExistsError, match=f"holds a run already: {left}; name another directory"):
         fly(plan_of("corridor"), "inprocess", out, lambda *_: None)
 
 

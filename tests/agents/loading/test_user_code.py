@@ -91,6 +91,8 @@ RAISING += [
     raised(MUTE.replace("SAYS", "7"), "Mute: (its text cannot be had: TypeError) (", "no-text"),
     # Before: a traceback of UnicodeEncodeError where the log was written.
     raised(r"ValueError('bad \udcff name')", r"ValueError: bad \udcff name (", "surrogate"),
+    # Before: raw, so that a terminal obeyed it.
+    raised(r"ValueError('\x1b[31mred')", r"ValueError: \x1b[31mred (", "escape"),
 ]
 
 

@@ -61,8 +61,8 @@ def summary(out):
     [
         (errno.ENOSPC, "No space left on device; free some room or raise the limit (ulimit -f), or write to another"),
         (errno.EFBIG, "File too large; free some room or raise the limit (ulimit -f), or write to another place"),
-        (errno.EROFS, "Read-only file system; get the right to it, or write to another place with --out"),
-        (errno.EACCES, "Permission denied; get the right to it, or write to another place with --out"),
+        (errno.EROFS, "Read-only file system; get the right to it, or write to another place"),
+        (errno.EACCES, "Permission denied; get the right to it, or write to another place"),
         (errno.ENOTDIR, "Not a directory; a file is where a directory is due, or the other way round: name another"),
         (errno.ENAMETOOLONG, "File name too long; give it a shorter name"),
         (errno.EMFILE, "Too many open files; raise the limit of open files (ulimit -n)"),
@@ -104,7 +104,7 @@ def test_a_folder_without_the_right_to_write_is_bad_input(tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     tmp_path.chmod(0o500)
     assert main(RUN) == 2
-    assert in_one_line(capsys) == "'runs': Permission denied; get the right to it, or write to another place with --out"
+    assert in_one_line(capsys) == "'runs': Permission denied; get the right to it, or write to another place"
 
 
 COMMANDS = {
@@ -186,9 +186,7 @@ def test_tables_and_arrays_that_do_not_fit_fail_the_run(size, out, monkeypatch):
     assert done.verdict == "fail"
     (reason,) = done.reasons
     assert reason.startswith("the run could not be written down: ")
-    assert reason.endswith(
-        "File too large; free some room or raise the limit (ulimit -f), or write to another place with --out"
-    )
+    assert reason.endswith("File too large; free some room or raise the limit (ulimit -f), or write to another place")
     assert not list(out.glob("*.unfinished.npz"))
 
 
