@@ -90,7 +90,7 @@ def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any
         `position`, `estimate`, `covariance`, `known` and `nis`, as in `world.books.edges.of_swarms`.
     """
     size = world.formation.agents // world.swarms
-    edges = of_swarms(world, verdicts=verdicts, **of_agents)
+    edges = of_swarms(world, present=present, verdicts=verdicts, **of_agents)
 
     def by_swarm(array: Any, axis: int) -> Any:
         return array.reshape(*array.shape[:axis], world.swarms, size, *array.shape[array.ndim + axis + 1 :])

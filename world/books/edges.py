@@ -38,6 +38,7 @@ class EdgesByTick(NamedTuple):
 def of_swarms(
     world: World,
     *,
+    present: Mask,
     position: Array,
     verdicts: VerdictCodes,
     estimate: Array,
@@ -51,6 +52,8 @@ def of_swarms(
     ----------
     world
         Of the swarms.
+    present
+        Which agents take part, shape (..., S N): an edge of another does not count.
     position
         Of all agents, shape (..., S N, D), in metres.
     verdicts
@@ -65,13 +68,14 @@ def of_swarms(
         shape = of_agents.shape
         return of_agents.reshape(*shape[:axis], swarms, shape[axis] // swarms, *shape[len(shape) + axis + 1 :])
 
+    counted = known & present[..., :, None] & present[..., world.links.neighbours]
     # Of a direction an innovation has fewer axes than a position.
     reported = nis is not None and world.sensor.says_positions
     return EdgesByTick(
         estimate=each(estimate, -3),
         true=each(sensors.relative(position, world.links)[..., slots, :], -3),
-        covariance=each(covariance, -3),
+        covariance=each(np.where(counted[..., None], covariance, 0.0), -3),
         nis=each(np.full(known.shape, np.nan) if nis is None else nis, -2),
-        known=each(known, -2),
-        seen=each(reported & known & (verdicts == Verdict.DELIVERED)[..., slots], -2),
+        known=each(counted, -2),
+        seen=each(reported & counted & (verdicts == Verdict.DELIVERED)[..., slots], -2),
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.metrics import consistency
 from analysis.metrics.errors import procrustes_error
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Mask
 from analysis.models.reports import NIS
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
@@ -133,7 +133,7 @@ class Recorder:
         shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
         self._scalars("metrics/procrustes", time, shape[:, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
-        self._log_consistency(time, moments, kept)
+        self._log_consistency(time, moments, kept, present)
         numbers = np.arange(1.0, self._formation.agents + 1.0)
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
@@ -236,9 +236,10 @@ class Recorder:
         counts = np.stack([realised.feasible.sum(axis=-1), realised.stress_dimension[:, 0]], axis=-1)
         self._scalars("graph/rigidity", time, counts.astype(np.float64))
 
-    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, present: Mask) -> None:
         edges = of_swarms(
             self._world,
+            present=present,
             position=moments.position[kept],
             verdicts=moments.verdicts[kept, 0],
             estimate=moments.estimate[kept],

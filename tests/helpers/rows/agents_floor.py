@@ -15,6 +15,7 @@ from agents.centre.checked import CheckedCentre
 from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
 from agents.estimators.centralized import SwarmFilter, Whole
+from agents.estimators.conral import Indicator
 from agents.estimators.none import LastMeasured
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Heard
@@ -169,6 +170,7 @@ CASES = {
             covariance(NEIGHBOURS, 2, 2),
         ),
     ),
+    "agents.estimators.conral.Indicator.psi": of(lambda heard, age: Indicator(heard, age).psi, real(), real()),
     "agents.estimators.rkf.EdgeFilters.ahead": of(
         lambda mean, spread, nis, known: FILTERS.ahead(BRIEF, Tracks(mean, spread, nis, known)),
         *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
