@@ -12,7 +12,6 @@ from affinet.runtimes.run import fly, rehearse
 from netem.medium.verdict import Verdict
 from world.books.history import UNTOLD
 
-
 FAULTS = (
     'timeline=[{verb="cut",at=0.5,until=1.0,links=["4-6"]},{verb="kill",at=1.2,agents=[7]},'
     '{verb="restart",at=1.6,agents=[7]},{verb="partition",at=1.7,until=1.9,groups=[[1,2,3],[4,5,6,7]]}]'
