@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtri
+from scipy.special import chdtri, stdtrit
 
 from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.elementary import whole_power
 
 DRAWN = 0.95  # how probable the bands of pictures are
+BATCHES = 10
 _SINGULAR = 1e-12  # of the trace: a smallest eigenvalue below this is what rounding leaves of nothing
 
 
@@ -65,6 +67,35 @@ def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]
     averaged = np.asarray(number)
     low, high = (chdtri(dimension * averaged, tail) / averaged for tail in ((1.0 + level) / 2, (1.0 - level) / 2))
     return low, high
+
+
+class Averaged(NamedTuple):
+    """The mean of a series, half its confidence interval, and the means of its batches, shape (BATCHES,)."""
+
+    mean: float
+    half: float
+    batches: Array
+
+
+def averaged(series: Array, level: float) -> Averaged:
+    """The mean of a series of correlated values, by batch means with Student's t (Law, Simulation Modeling, section 9.5).
+
+    Ticks of a filter are correlated, and edges share their noise: batches longer than what correlates them are as good as
+    independent, and what they differ by says how much the mean is worth.
+
+    Parameters
+    ----------
+    series
+        Shape (T,), of at least 2 BATCHES values.
+    level
+        The probability that the interval has the mean in it.
+    """
+    starts = np.arange(BATCHES) * len(series) // BATCHES
+    lengths = np.diff(np.append(starts, len(series)))
+    batches = np.add.reduceat(series, starts) / lengths
+    spread = np.sqrt(whole_power(batches - batches.mean(), 2).sum() / (BATCHES - 1))
+    half = stdtrit(BATCHES - 1, (1.0 + level) / 2) * spread / np.sqrt(BATCHES)
+    return Averaged(float(series.mean()), float(half), batches)
 
 
 def nees(error: Array, covariance: Array) -> Array:
