@@ -370,6 +370,7 @@ def test_a_run_too_short_to_tell_is_vacuous_and_one_that_diverges_is_not(monkeyp
     assert short["vacuous"] > 60  # some of the others are wrong: a batch is no longer than what correlates the ticks
     growing = planted(50, 1000, 0.9, 0.0, 1.0) * np.exp(np.linspace(-5.0, 5.0, 1000))
     assert judged(monkeypatch, growing)["fail"] == 50
+    monkeypatch.undo()
     run = evidence(*HONEST)
     assert verdict(checkers.consistent(since=(TICKS - 10) * run.dt)(run)) == ("vacuous", None)
 
