@@ -182,7 +182,7 @@ class AgentNode:
         self._tellings.check("told", told.seq)
         if told.k != tick:
             raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
-        fields = {"relative": told.relative, "covariance": told.covariance}
+        fields = {"relative": told.relative, "covariance": told.covariance, "nis": told.nis}
         return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
 
     def _gather(self, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:

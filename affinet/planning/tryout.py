@@ -10,6 +10,7 @@ from affinet.scenario.sections import ScenarioError
 from agents.agent import Agent, AgentAction
 from agents.brief import Brief
 from agents.centre.checked import CheckedCentre
+from agents.estimators.base import CentreEstimate
 from agents.exchange import Heard
 from analysis.models.arrays import Mask
 from analysis.models.pursuit import Sighting
@@ -79,7 +80,8 @@ def _told(centre: CheckedCentre, brief: Brief) -> Heard:
 
 def _nothing_told(brief: Brief) -> Heard:
     unseen = np.zeros_like(brief.relative)
-    return Heard({"relative": unseen, "covariance": np.zeros((*unseen.shape, brief.dimension))}, brief.present)
+    told = CentreEstimate(unseen, np.zeros((*unseen.shape, brief.dimension)), np.full(brief.present.shape, np.nan))
+    return Heard(told._asdict(), brief.present)
 
 
 def _tick(agents: Agent, batch: tuple[int, ...], told: Heard | None, *, positioned: bool) -> AgentAction:

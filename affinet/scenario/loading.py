@@ -14,7 +14,7 @@ import tomli_w
 from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
-from affinet.scenario import files, inputs, source
+from affinet.scenario import files, inputs, sections, source
 from affinet.scenario.explain import explained
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.source import IN_CODE, Source
@@ -198,5 +198,14 @@ def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
         table = table.setdefault(step, {})
         if not isinstance(table, dict):
             raise ScenarioError(f"--set {one_line(override)}: {step} is not a table")
+    if tables == ["sensing"]:
+        _make_room(table, name)
     said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)
     table[name] = reduce(lambda outer, step: outer[step], [*tables, name], inputs.anchored(said, folder))
+
+
+def _make_room(sensing: dict[str, Any], name: str) -> None:
+    """Leave out what a file says of another sensor than the one that this key is of."""
+    own = [kind for kind in sections.SENSORS if name in kind]
+    for other in (key for kind in sections.SENSORS if own and kind not in own for key in kind):
+        sensing.pop(other, None)

@@ -137,6 +137,16 @@ class TimeSection(Section):
         return self
 
 
+# What says how wrong the sensor is, one of these.
+SENSORS = (
+    ("sigma",),
+    ("covariance",),
+    ("sigma_range", "sigma_bearing"),
+    ("sigma_along", "sigma_across"),
+    ("sigma_direction",),
+)
+
+
 class SensingSection(Section):
     """The relative position sensor: a standard deviation in metres, or a covariance in square metres, of one measurement.
 
@@ -160,14 +170,12 @@ class SensingSection(Section):
             raise ValueError("sigma_range (m) and sigma_bearing (rad) go together")
         if (self.sigma_along is None) != (self.sigma_across is None):
             raise ValueError("sigma_along and sigma_across (shares of the distance) go together")
-        kinds = (self.sigma, self.covariance, self.sigma_range, self.sigma_along, self.sigma_direction)
-        if sum(given is not None for given in kinds) != 1:
-            given = [name for name in type(self).model_fields if name != "samples" and getattr(self, name) is not None]
+        given = [name for kind in SENSORS for name in kind if getattr(self, name) is not None]
+        if sum(kind[0] in given for kind in SENSORS) != 1:
             also = f"; one of them, where {' and '.join(given)} are given" if given else ""
             raise ValueError(
                 "give sigma (m), or covariance (m2), or sigma_range (m) and sigma_bearing (rad), "
                 f"or sigma_along and sigma_across (shares of the distance), or sigma_direction (rad){also}"
-                + (" (--set 'sensing={ ... }' has what it says in place of the file's)" if given else "")
             )
         if self.sigma == 0.0:
             raise ValueError("sigma 0 would make every filter divide by zero; give a small one, like 1e-6 m")

@@ -18,6 +18,7 @@ from analysis.metrics.localization import centroid, distance, ringing
 from analysis.models.arrays import Array, Mask
 from analysis.models.information import position, reported
 from analysis.models.jacobi import EdgeInformation, weights
+from analysis.models.reports import NIS
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from world.books.history import Moment
@@ -191,7 +192,8 @@ class _Places:
 
 def _looked_at(plan: Plan, present: Mask, moment: Moment) -> dict[str, Array]:
     """What is kept of a tick of all runs of a plan."""
-    of_agents = {name: getattr(moment, name) for name in ("position", "measured", "estimate", "covariance", "known")}
+    of_agents = {name: getattr(moment, name) for name in ("position", "estimate", "covariance", "known")}
+    of_agents[NIS] = moment.reports.get(NIS)
     looked_at = seen(plan.world, present.reshape(-1), moment.entry.verdicts[0], of_agents)
     return {name: metric.of(looked_at) for name, metric in METRICS.items()}
 
@@ -201,6 +203,8 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
     number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
     means = {}
     for name, told in moment.reports.items():
+        if name == NIS:  # a metric
+            continue
         each = of_runs(told)
         length = each if each.ndim == 2 else np.sqrt((each * each).sum(axis=tuple(range(2, each.ndim))))
         means[f"{REPORT}{name}"] = np.where(awake, length, 0.0).sum(axis=1) / number
@@ -210,7 +214,8 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
 def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
     """Of the first run."""
     size, nominal = plan.world.formation.agents, plan.world.formation.nominal
-    shown = {name: said[:size] for name, said in (*moment.reports.items(), ("position", moment.position))}
+    said = {"position": moment.position, **moment.reports}
+    shown = {name: each[:size] for name, each in said.items() if name != NIS}
     return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
 
 

@@ -20,9 +20,6 @@ from netem.loading.returned import WrongReturn, shown
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
 
-_STANDARD_ERRORS = 3.0
-
-
 Signal = Callable[[Evidence], Mask]
 
 
@@ -158,33 +155,41 @@ def never_heard_across_a_cut() -> Checker:
     return Checker(name, check)
 
 
-def consistent(level: float = 0.99, since: float = 0.0) -> Checker:
-    """The filters' covariances tell the truth: mean NEES over all edges inside its chi-square band, in most ticks.
+def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) -> Checker:
+    """The filters' covariances tell the truth: the mean NEES over edges and ticks is their dimension.
 
-    In a share `level` of the ticks from `since` on, or fewer by no more than chance explains, the mean over the edges estimated
-    lies in the two-sided band of that probability. Edges and ticks count as independent, so the band is a little narrow.
+    From `since` on, in seconds. It fails where the confidence interval of that mean, of probability `level`, leaves the
+    dimension out, or the mean is off by more than a share `within` of it; it is vacuous where the interval is wider than that,
+    which says nothing. The interval is by batch means: edges share their noise, and ticks are correlated.
     """
-    name = f"consistent({level:g}, since={since:g})"
+    name = f"consistent({level:g}, within={within:g}, since={since:g})"
     if not 0.0 < level < 1.0:
-        raise ValueError(f"{name}: level is a share of the ticks between 0 and 1")
+        raise ValueError(f"{name}: level is a probability between 0 and 1")
+    above_zero(name, within=within)
     times(name, since=since)
 
     def check(evidence: Evidence) -> CheckResult:
         span = span_of(evidence, since, None)
         mean, number = _mean_nees(evidence, span)
-        tested = number > 0
-        if not tested.any():
-            return CheckResult(name, "vacuous", None, "no edge was estimated")
-        dimension = evidence.plan.world.formation.dimension
-        low, high = consistency.band(level, dimension, np.maximum(number, 1))
-        inside = (mean >= low) & (mean <= high)
-        share, least = inside[tested].mean(), level - _STANDARD_ERRORS * np.sqrt(level * (1.0 - level) / tested.sum())
-        says = (
-            f"{share:.1%} of the ticks inside the band, mean NEES {mean[tested].mean():.3g} for {dimension} dimensions"
-        )
-        if share >= least and np.isfinite(mean[tested]).all():
-            return CheckResult(name, "pass", None, says)
-        return CheckResult(name, "fail", span.start + int(np.argmax(~inside & tested)), says)
+        ticks = np.flatnonzero(number > 0)
+        if len(ticks) < 2 * consistency.BATCHES:
+            least = 2 * consistency.BATCHES
+            return CheckResult(
+                name, "vacuous", None, f"edges were estimated in {len(ticks)} ticks, and {least} are needed"
+            )
+        if not np.isfinite(mean[ticks]).all():
+            tick = int(np.argmin(np.isfinite(mean[ticks])))
+            return CheckResult(name, "fail", span.start + int(ticks[tick]), "the NEES is not a number any more")
+        found, dimension = consistency.averaged(mean[ticks], level), evidence.plan.world.formation.dimension
+        says = f"mean NEES {found.mean:.3g} +- {found.half:.2g} for {dimension} dimensions"
+        off = found.mean - dimension
+        if abs(off) > min(found.half, within * dimension):
+            worst = int(np.argmax(np.sign(off) * (found.batches - dimension) >= abs(off)))
+            first = ticks[worst * len(ticks) // consistency.BATCHES]
+            return CheckResult(name, "fail", span.start + int(first), says)
+        if found.half > within * dimension:
+            return CheckResult(name, "vacuous", None, f"{says}: too few independent ticks to tell")
+        return CheckResult(name, "pass", None, says)
 
     return Checker(name, check)
 

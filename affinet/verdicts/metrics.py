@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from affinet.verdicts.evidence import Evidence
 from analysis.metrics import consistency, errors
 from analysis.models.arrays import Array, Mask
+from analysis.models.reports import NIS
 from world.books.edges import EdgesByTick, of_swarms
 from world.physics.world import World
 
@@ -69,11 +70,7 @@ METRICS: Mapping[str, Metric] = {
     "nis": Metric(
         "normalised innovation squared",
         "",
-        lambda seen: (
-            consistency.of_innovations(
-                seen.edges.estimate, seen.edges.measured, seen.edges.covariance, seen.edges.R, seen.edges.seen
-            ).mean
-        ),
+        lambda seen: consistency.of_innovations(seen.edges.nis, seen.edges.seen).mean,
     ),
 }
 
@@ -90,10 +87,10 @@ def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any
     verdicts
         What became of the measurements, shape (..., L).
     of_agents
-        `position`, `measured`, `estimate`, `covariance` and `known`, as in `world.books.history.Moment`.
+        `position`, `estimate`, `covariance`, `known` and `nis`, as in `world.books.edges.of_swarms`.
     """
     size = world.formation.agents // world.swarms
-    edges = of_swarms(world, verdicts=verdicts, **of_agents)
+    edges = of_swarms(world, present=present, verdicts=verdicts, **of_agents)
 
     def by_swarm(array: Any, axis: int) -> Any:
         return array.reshape(*array.shape[:axis], world.swarms, size, *array.shape[array.ndim + axis + 1 :])
@@ -104,7 +101,8 @@ def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any
 def of_run(evidence: Evidence, name: str, span: range) -> Array:
     """A metric in each of these ticks of a run, shape (T,)."""
     part, arrays = slice(span.start, span.stop), evidence.arrays
-    told = {what: arrays[what][part] for what in ("measured", "estimate", "covariance")}
+    told: dict[str, Any] = {what: arrays[what][part] for what in ("estimate", "covariance")}
+    told[NIS] = arrays[NIS][part] if NIS in arrays else None
     awake = (evidence.awake & evidence.present)[part, :, None]
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
     looked_at = seen(evidence.plan.world, evidence.present[part], arrays["verdicts"][part, 0], whole)

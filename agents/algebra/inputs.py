@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.exchange import Heard
 from agents.swarm import SwarmBrief
-from analysis.models.algebra import sum_over
+from analysis.models.algebra import product
 from analysis.models.arrays import Array
 from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
@@ -18,7 +18,10 @@ _ROUNDING = 1e-9  # of the root of a random walk
 
 
 class NeighbourInputs(NamedTuple):
-    """Inputs of the neighbours in the last p ticks, newest first, (..., n, p, D), and their covariances (..., n, p, D, D)."""
+    """Inputs of the neighbours in the last p ticks, newest first, (..., n, p, D), and their covariance (..., n, p, p).
+
+    It is that of one axis: all have the same model, and are driven apart.
+    """
 
     inputs: Array
     covariance: Array
@@ -26,13 +29,13 @@ class NeighbourInputs(NamedTuple):
     @property
     def last(self) -> tuple[Array, Array]:
         """The newest, shape (..., n, D), and its covariance, shape (..., n, D, D)."""
-        return self.inputs[..., 0, :], self.covariance[..., 0, :, :]
+        return self.inputs[..., 0, :], self.covariance[..., 0, :1, None] * np.eye(self.inputs.shape[-1])
 
 
 def at_rest(shape: tuple[int, ...], dimension: int, order: int) -> NeighbourInputs:
     """Everybody at rest so far, surely; `shape` is (..., n)."""
-    past = (*shape, max(order, 1), dimension)
-    return NeighbourInputs(np.zeros(past), np.zeros((*past, dimension)))
+    past = max(order, 1)
+    return NeighbourInputs(np.zeros((*shape, past, dimension)), np.zeros((*shape, past, past)))
 
 
 def hear(flown: NeighbourInputs, said: Heard, coefficients: Sequence[float], sigma: float) -> NeighbourInputs:
@@ -55,19 +58,26 @@ def hear(flown: NeighbourInputs, said: Heard, coefficients: Sequence[float], sig
         When the neighbours' inputs are accelerations.
     """
     refuse_accelerations(said)
-    dimension = flown.inputs.shape[-1]
-    a = np.array(coefficients, dtype=np.float64)
-    # One-step prediction (6.6) with its covariance (6.18), which is that of (6.10) where the past is known. As there, errors of
-    # successive predictions count as independent: exact for p = 1, too sure of itself for longer models after several losses.
-    expected = sum_over(flown.inputs[..., : len(a), :] * a[:, None], -2)
-    spread = sum_over(flown.covariance[..., : len(a), :, :] * (a * a)[:, None, None], -3)
-    spread = spread + (sigma * sigma if len(a) else 0.0) * np.eye(dimension)
-    newest = np.where(said.fresh[..., None], said.fields["velocity"], expected)
-    doubt = np.where(said.fresh[..., None, None], 0.0, spread)
+    A = _companion(coefficients)
+    expected = product(A, flown.inputs)
+    spread = product(A, flown.covariance, A.T)
+    spread[..., 0, 0] += sigma * sigma if len(coefficients) else 0.0
+    fresh = said.fresh[..., None, None]
+    newest = np.where(fresh, said.fields["velocity"][..., None, :], expected[..., :1, :])
+    # What is said is known, and says nothing here of what was said before and lost.
+    doubted = np.ones(A.shape, dtype=bool)
+    doubted[0, :] = doubted[:, 0] = False
     return NeighbourInputs(
-        np.concatenate([newest[..., None, :], flown.inputs[..., :-1, :]], axis=-2),
-        np.concatenate([doubt[..., None, :, :], flown.covariance[..., :-1, :, :]], axis=-3),
+        np.concatenate([newest, expected[..., 1:, :]], axis=-2), np.where(~fresh | doubted, spread, 0.0)
     )
+
+
+def _companion(coefficients: Sequence[float]) -> Array:
+    """What takes the last p inputs a tick on: the newest by the model, the others a place further back."""
+    order = max(len(coefficients), 1)
+    A = np.eye(order, k=-1)
+    A[0, : len(coefficients)] = coefficients
+    return A
 
 
 def refuse_growing(coefficients: Sequence[float]) -> None:

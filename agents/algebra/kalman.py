@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from agents.algebra.small import inverse
-from analysis.models.algebra import product
+from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
@@ -99,7 +99,18 @@ def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, 
     return product(mean, F.T), product(F, covariance, F.T) + Q
 
 
-def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> tuple[Array, Array]:
+class Corrected(NamedTuple):
+    """Mean (..., S) and covariance (..., S, S) of filters, and how far off their predictions were: `nis`, shape (...).
+
+    The innovation squared, normalised by its covariance; NaN where there was no observation.
+    """
+
+    mean: Array
+    covariance: Array
+    nis: Array
+
+
+def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: Mask) -> Corrected:
     """The filters after an observation of their position, where it is usable (Algorithm 1, lines 7-11).
 
     Parameters
@@ -115,7 +126,13 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     """
     dimension = observed.shape[-1]
     innovation = observed - mean[..., :dimension]
-    gain = product(covariance[..., :dimension], inverse(covariance[..., :dimension, :dimension] + R))
-    gain = np.where(usable[..., None, None], gain, 0.0)
+    precision = inverse(covariance[..., :dimension, :dimension] + R)
+    gain = np.where(usable[..., None, None], product(covariance[..., :dimension], precision), 0.0)
     corrected = mean + product(gain, innovation[..., None])[..., 0]
-    return corrected, covariance - product(gain, covariance[..., :dimension, :])
+    nis = np.where(usable, normalised(innovation, precision), np.nan)
+    return Corrected(corrected, covariance - product(gain, covariance[..., :dimension, :]), nis)
+
+
+def normalised(error: Array, precision: Array) -> Array:
+    """e^T P^-1 e of errors (..., D), by the inverses of their covariances (..., D, D), shape (...)."""
+    return sum_over(error * product(precision, error[..., None])[..., 0], -1)

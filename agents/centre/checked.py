@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from agents.estimators.base import Centre, CentreEstimate
 from agents.loading import capabilities, returned
 from agents.swarm import SwarmBrief
@@ -53,6 +55,9 @@ class CheckedCentre:
                 raise WrongReturn(f"must return a CentreEstimate, got {kind(estimate)}")
             array("relative", estimate.relative, "N, n, D", edges, batch)
             array("covariance", estimate.covariance, "N, n, D, D", (*edges, edges[-1]), batch)
+            if estimate.nis is None:
+                estimate = estimate._replace(nis=np.full(seen.shape, np.nan))
+            array("nis", estimate.nis, "N, n", edges[:-1], batch)
             return after, estimate
 
 

@@ -115,6 +115,7 @@ class CentreNode:
         return measured, seen
 
     def _tell(self, tick: int, told: CentreEstimate) -> None:
+        assert told.nis is not None  # `CheckedCentre` says NaN where the filter says nothing
         for agent, voice in self._told.items():
             number = self._numbers.next(str(agent))
             message = messages.Told(
@@ -123,6 +124,7 @@ class CentreNode:
                 seq=number,
                 relative=told.relative[agent - 1],
                 covariance=told.covariance[agent - 1],
+                nis=told.nis[agent - 1],
             )
             voice.say(messages.pack(message))
 

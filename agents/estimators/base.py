@@ -23,10 +23,14 @@ State = TypeVar("State")
 
 
 class CentreEstimate(NamedTuple):
-    """What a centre tells all agents of their edges: relative positions (..., N, n, D), and covariances (..., N, n, D, D)."""
+    """What a centre tells all agents of their edges: relative positions (..., N, n, D), and covariances (..., N, n, D, D).
+
+    And, if it has them, its innovations as in `analysis.models.reports.NIS`, shape (..., N, n).
+    """
 
     relative: Array
     covariance: Array
+    nis: Array | None = None
 
 
 class Centre(Protocol[State]):

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.algebra.inputs import refuse_accelerations
+from agents.algebra.kalman import normalised
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Centre, CentreEstimate, Estimator, refuse_negative
@@ -21,6 +22,7 @@ from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
+from analysis.models.reports import NIS
 from netem.core.channels import CENTRE, INPUT
 
 
@@ -80,7 +82,8 @@ class CentralizedFilter(Estimator[Stateless]):
         refuse_accelerations(heard[INPUT])
         told = heard[CENTRE].fields
         known = np.broadcast_to(brief.present, told["relative"].shape[:-1])
-        return state, Estimate(told["relative"], known, told["covariance"], no_indicator(known))
+        reports = {NIS: told["nis"]}
+        return state, Estimate(told["relative"], known, told["covariance"], no_indicator(known), reports=reports)
 
     def centre(self, swarm: SwarmBrief) -> Centre[Whole]:
         """One filter for all agents."""
@@ -113,15 +116,20 @@ class SwarmFilter(Centre[Whole]):
         agents, dimension = state.position.shape[-2:]
         position = state.position + self.swarm.dt * inputs
         covariance = state.covariance + self.swarm.process
-        precision = np.where(seen[..., None, None], np.linalg.inv(self.swarm.sensor.spread(measured)), 0.0)
-        surprise = product(precision, (measured - self._edges(position))[..., None])
+        expected, doubt = self._edges(position), self._spread(covariance, agents, dimension)
+        innovation = measured - expected
+        _, R = self.swarm.sensor.observed(measured, expected, doubt)
+        R = np.where(seen[..., None, None], R, np.eye(dimension))
+        nis = np.where(seen, normalised(innovation, np.asarray(np.linalg.inv(doubt + R))), np.nan)
+        precision = np.where(seen[..., None, None], np.linalg.inv(R), 0.0)
+        surprise = product(precision, innovation[..., None])
         pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))
         information = self._information(precision)
         solved = np.linalg.solve(np.eye(agents * dimension) + product(covariance, information), covariance)
         corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
         moved = product(corrected, pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
         whole = Whole(position + moved.reshape(position.shape), corrected)
-        return whole, CentreEstimate(self._edges(whole.position), self._spread(corrected, agents, dimension))
+        return whole, CentreEstimate(self._edges(whole.position), self._spread(corrected, agents, dimension), nis)
 
     def _information(self, precision: Array) -> Array:
         """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""

@@ -1,11 +1,14 @@
 """RAL with consensus filtering (paper 000, Algorithm 2 and eq. 14): the neighbours' perceived shapes steady one's own.
 
-An agent's consensus map starts from its first own fit, or from what its neighbours agree on if that comes first. Equation
-(12) gives no covariance for it; since it pools at least what all neighbours measure, (12) over the whole nominal neighbourhood
-stands in.
+An agent's consensus map starts from its first own fit, or from what its neighbours agree on if that comes first. Its edges
+have the covariance (12) of those that the agent measures in this tick, or of all that it has where these are too few.
+
+The indicator (16) is that of the local fits (10): consensus maps agree whether or not the formation is affine. An agent that
+has no fit of its own holds its consensus map against those of its neighbours; who hears of no fit keeps to the last indicator,
+which grows as it ages (docs/decisions/0016).
 
 Under a constraint the local fits keep to it, and (14) averages them as it stands, so that its bound on the step holds. A mean
-of rotations is none; the map in use, and in the indicator, is the nearest that keeps to the constraint.
+of rotations is none; the map in use is the nearest that keeps to the constraint.
 """
 
 from __future__ import annotations
@@ -29,15 +32,25 @@ from analysis.models.finding import Finding
 from netem.core.channels import THETA
 
 
-class Agreement(NamedTuple):
-    """What is perceived in this tick, and the consensus map that outlasts it, with the H H^T of all nominal neighbours.
+class Indicator(NamedTuple):
+    """What (16) was when a fit was last heard, and how many ticks ago that is, both (...); NaN before."""
 
-    And the covariance of its edges at first: that of a linear class of maps stays so.
-    """
+    heard: Array
+    age: Array
+
+    @property
+    def psi(self) -> Array:
+        """What it is by now: maps that drift apart differ by their age, and its square is what (16) means."""
+        since = 1.0 + self.age
+        return self.heard * since * since
+
+
+class Agreement(NamedTuple):
+    """What is perceived in this tick, the consensus map that outlasts it, with the H H^T of all nominal neighbours, and psi."""
 
     perceived: Perceived
     consensus: geometry.Fit
-    covariance: Array
+    indicator: Indicator
 
 
 @dataclass(frozen=True)
@@ -64,8 +77,9 @@ class ConsensusLocalization(Estimator[Agreement]):
         """Nothing perceived, nothing agreed."""
         perceived = RelativeAffineLocalization().init(brief, batch)
         nominal = np.broadcast_to(geometry.gram(brief.relative, brief.present), perceived.local.gram.shape)
-        consensus = perceived.local._replace(gram=nominal)
-        return Agreement(perceived, consensus, self._covariance(consensus, brief))
+        return Agreement(
+            perceived, perceived.local._replace(gram=nominal), Indicator(np.full(batch, np.nan), np.zeros(batch))
+        )
 
     def sense(
         self, brief: Brief, state: Agreement, measured: Array, seen: Mask
@@ -91,12 +105,14 @@ class ConsensusLocalization(Estimator[Agreement]):
         """One step of consensus; complete the measurements by its map."""
         said = heard[THETA]
         voices = said.fresh & said.fields["started"]
-        maps = MAPS[self.constraint]
-        psi = geometry.indicator(self._in_use(state.consensus), maps.nearest(said.fields["consensus"]), voices)
+        fits = said.fresh & said.fields["feasible"]
+        indicator = self._indicated(state, said.fields["local"], fits)
         consensus = self._step(state, said, voices)
-        shape = self._in_use(consensus)
-        covariance = state.covariance if maps.linear else self._covariance(shape, brief)
-        return state._replace(consensus=consensus), complete(brief, state.perceived, shape, covariance, psi)
+        shape, local = self._in_use(consensus), state.perceived.local
+        measured = shape._replace(gram=np.where(local.feasible[..., None, None], local.gram, shape.gram))
+        covariance = MAPS[self.constraint].covariance(measured, brief.relative, brief.sensor.common)
+        estimate = complete(brief, state.perceived, shape, covariance, indicator.psi)
+        return state._replace(consensus=consensus, indicator=indicator), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether the consensus (14) converges on the graph."""
@@ -111,8 +127,16 @@ class ConsensusLocalization(Estimator[Agreement]):
             says = f"epsilon {self.epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges"
         return [Finding("consensus", "error", says)]
 
-    def _covariance(self, shape: geometry.Fit, brief: Brief) -> Array:
-        return MAPS[self.constraint].covariance(shape, brief.relative, brief.sensor.common)
+    def _indicated(self, state: Agreement, theirs: Array, fits: Mask) -> Indicator:
+        now = geometry.indicator(self._held_against(state), theirs, fits)
+        new, before = np.isfinite(now), state.indicator
+        return Indicator(np.where(new, now, before.heard), np.where(new, 0.0, before.age + 1.0))
+
+    def _held_against(self, state: Agreement) -> geometry.Fit:
+        """The map that the neighbours' fits are held against: the agent's own fit, or the consensus where it has none."""
+        local, agreed = state.perceived.local, self._in_use(state.consensus)
+        theta = np.where(local.feasible[..., None, None], local.theta, agreed.theta)
+        return local._replace(theta=theta, feasible=local.feasible | agreed.feasible)
 
     def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
         nearest = MAPS[self.constraint].nearest(consensus.theta)

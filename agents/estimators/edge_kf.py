@@ -25,6 +25,7 @@ from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.reports import NIS
 from netem.core.channels import INPUT
 
 
@@ -100,12 +101,12 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
         if not brief.sensor.says_positions:
             nominal = np.linalg.norm(brief.relative, axis=-1, keepdims=True) * state.measured
             mean = np.where((state.seen & ~state.met)[..., None], nominal, mean)
-        filters = kalman.correct(mean, covariance, *brief.sensor.observed(state.measured, mean), state.seen)
-        estimate = Estimate(
-            filters[0], np.broadcast_to(brief.present, state.seen.shape), filters[1], no_indicator(state.seen)
-        )
+        observed = brief.sensor.observed(state.measured, mean, covariance)
+        mean, covariance, nis = kalman.correct(mean, covariance, *observed, state.seen)
+        known = np.broadcast_to(brief.present, state.seen.shape)
+        estimate = Estimate(mean, known, covariance, no_indicator(state.seen), reports={NIS: nis})
         met = state.met | state.seen
-        return state._replace(mean=filters[0], covariance=filters[1], flown=flown, met=met), estimate
+        return state._replace(mean=mean, covariance=covariance, flown=flown, met=met), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether inputs are heard in the tick they are of."""

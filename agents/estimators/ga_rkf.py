@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from agents.algebra import kalman
 from agents.algebra.constraints import Constraint
 from agents.algebra.geometry import identity
 from agents.brief import Brief, Own
@@ -82,7 +83,11 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
             doubt = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
             R = R + doubt[..., None, None] * identity(brief.dimension)
         usable = seen | (observed.known & trusted[..., None])
-        tracks = self.advance(brief, state.tracks, observed.relative, R, usable)
+        corrected = kalman.correct(*self.ahead(brief, state.tracks), observed.relative, R, usable)
+        measured = corrected._replace(
+            nis=np.where(seen, corrected.nis, np.nan)
+        )  # what the shape says is no measurement
+        tracks = Tracks(*measured, state.tracks.known | usable)
         return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)._replace(feasible=observed.feasible)
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:

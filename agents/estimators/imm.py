@@ -23,18 +23,20 @@ from agents.exchange import Channels, Fields, Heard
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import exp, log
+from analysis.models.reports import NIS
 
 
 class Modes(NamedTuple):
     """The filters of every edge, one a model.
 
-    Their means (..., n, 3, S) and covariances (..., n, 3, S, S), how probable each model is (..., n, 3), and which edges were
-    ever corrected (..., n). S = 3 D.
+    Their means (..., n, 3, S) and covariances (..., n, 3, S, S), how probable each model is (..., n, 3), `nis` (..., n), and
+    which edges were ever corrected (..., n). S = 3 D.
     """
 
     mean: Array
     covariance: Array
     probability: Array
+    nis: Array
     known: Mask
 
 
@@ -76,7 +78,8 @@ class InteractingMultipleModel(Estimator[Modes]):
         shape = (*batch, brief.relative.shape[-2])
         deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
         filters = kalman.unknown((*shape, 3), brief.dimension, deviations)
-        return Modes(*filters, np.full((*shape, 3), 1.0 / 3.0), np.zeros(shape, dtype=bool))
+        alike = np.full((*shape, 3), 1.0 / 3.0)
+        return Modes(*filters, alike, np.full(shape, np.nan), np.zeros(shape, dtype=bool))
 
     def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
         """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""
@@ -85,12 +88,14 @@ class InteractingMultipleModel(Estimator[Modes]):
         weights = chain * state.probability[..., :, None] / expected[..., None, :]
         mean, covariance = _mix(state.mean, state.covariance, weights)
         mean, covariance = product(F, mean[..., None])[..., 0], product(F, covariance, np.swapaxes(F, -1, -2)) + Q
-        observed, usable = measured[..., None, :], seen[..., None]
-        R = brief.sensor.spread(measured)[..., None, :, :]
+        place, doubt = self._predicted(mean, covariance, expected, brief.dimension)
+        observed, R = brief.sensor.observed(measured, place, doubt)
+        nis = np.where(seen, kalman.normalised(observed - place, inverse(doubt + R)), np.nan)
+        observed, R, usable = observed[..., None, :], R[..., None, :, :], seen[..., None]
         surprise = _surprise(mean, covariance, observed, R)
-        mean, covariance = kalman.correct(mean, covariance, observed, R, usable)
+        mean, covariance, _ = kalman.correct(mean, covariance, observed, R, usable)
         probability = np.where(usable, _weighed(expected, surprise), expected)
-        return Modes(mean, covariance, probability, state.known | seen), {}
+        return Modes(mean, covariance, probability, nis, state.known | seen), {}
 
     def fuse(
         self,
@@ -109,7 +114,14 @@ class InteractingMultipleModel(Estimator[Modes]):
             covariance=covariance[..., :dimension, :dimension],
             psi=no_indicator(state.known),
             relative_velocity=mean[..., dimension : 2 * dimension],
+            reports={NIS: state.nis},
         )
+
+    def _predicted(self, mean: Array, covariance: Array, probability: Array, dimension: int) -> tuple[Array, Array]:
+        """The position that all models together predict, and its covariance."""
+        place, doubt = mean[..., :dimension], covariance[..., :dimension, :dimension]
+        mixed = _mix(place, doubt, probability[..., :, None])
+        return mixed[0][..., 0, :], mixed[1][..., 0, :, :]
 
     def _models(self, dimension: int, dt: float) -> tuple[Array, Array, Array]:
         sigmas = (self.sigma_constant_acceleration, self.sigma_constant_velocity, self.sigma_random_walk)

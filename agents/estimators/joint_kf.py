@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs
+from agents.algebra import inputs, kalman
 from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
+from agents.algebra.small import inverse
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
@@ -23,6 +24,7 @@ from agents.swarm import SwarmBrief
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.reports import NIS
 from netem.core.channels import INPUT
 
 
@@ -90,10 +92,12 @@ class JointEdgeFilter(Estimator[Joint]):
         theirs, doubt = flown.last
         mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
-        R = block_diagonal(brief.sensor.spread(state.measured))
-        mean, covariance = corrected(mean, covariance, state.measured, R, state.seen)
-        known = np.broadcast_to(brief.present, state.seen.shape)
-        estimate = Estimate(mean, known, diagonal_blocks(covariance, brief.dimension), no_indicator(state.seen))
+        doubts = diagonal_blocks(covariance, brief.dimension)
+        measured, R = brief.sensor.observed(state.measured, mean, doubts)
+        nis = np.where(state.seen, kalman.normalised(measured - mean, inverse(doubts + R)), np.nan)
+        mean, covariance = corrected(mean, covariance, measured, block_diagonal(R), state.seen)
+        known, edges = np.broadcast_to(brief.present, state.seen.shape), diagonal_blocks(covariance, brief.dimension)
+        estimate = Estimate(mean, known, edges, no_indicator(state.seen), reports={NIS: nis})
         return state._replace(mean=mean, covariance=covariance, flown=flown), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:

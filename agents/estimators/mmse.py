@@ -15,13 +15,15 @@ from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.arrays import Array, Mask
+from analysis.models.reports import NIS
 
 
 class Recent(NamedTuple):
-    """The estimates, shape (..., n, D), and their covariances, shape (..., n, D, D)."""
+    """The estimates, shape (..., n, D), their covariances, shape (..., n, D, D), and `nis`, shape (..., n)."""
 
     mean: Array
     covariance: Array
+    nis: Array
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,14 @@ class MinimumMeanSquareError(Estimator[Recent]):
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Recent:
         """Everybody at the same place."""
         square = (*batch, brief.relative.shape[-2], brief.dimension, brief.dimension)
-        return Recent(np.zeros(square[:-1]), np.broadcast_to(self._prior(brief), square).copy())
+        prior = np.broadcast_to(self._prior(brief), square).copy()
+        return Recent(np.zeros(square[:-1]), prior, np.full(square[:-2], np.nan))
 
     def sense(self, brief: Brief, state: Recent, measured: Array, seen: Mask) -> tuple[Recent, Mapping[str, Fields]]:
         """Correct the last estimates (4.20)."""
         prior = np.broadcast_to(self._prior(brief), state.covariance.shape)
-        return Recent(*kalman.correct(state.mean, prior, measured, brief.sensor.spread(measured), seen)), {}
+        observed = brief.sensor.observed(measured, state.mean, prior)
+        return Recent(*kalman.correct(state.mean, prior, *observed, seen)), {}
 
     def fuse(
         self,
@@ -62,7 +66,7 @@ class MinimumMeanSquareError(Estimator[Recent]):
     ) -> tuple[Recent, Estimate]:
         """The estimates."""
         known = np.broadcast_to(brief.present, state.mean.shape[:-1])
-        return state, Estimate(state.mean, known, state.covariance, no_indicator(known))
+        return state, Estimate(state.mean, known, state.covariance, no_indicator(known), reports={NIS: state.nis})
 
     def _prior(self, brief: Brief) -> Array:
         return self.sigma_prior * self.sigma_prior * identity(brief.dimension)

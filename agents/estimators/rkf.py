@@ -17,13 +17,15 @@ from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
 from analysis.models.arrays import Array, Mask
+from analysis.models.reports import NIS
 
 
 class Tracks(NamedTuple):
-    """The edge filters: mean (..., n, S), covariance (..., n, S, S), and whether ever corrected (..., n)."""
+    """The edge filters: mean (..., n, S), covariance (..., n, S, S), `nis`, and whether ever corrected, both (..., n)."""
 
     mean: Array
     covariance: Array
+    nis: Array
     known: Mask
 
 
@@ -57,13 +59,11 @@ class EdgeFilters:
         shape = (*batch, brief.relative.shape[-2])
         deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
         filters = kalman.unknown(shape, brief.dimension, deviations[: kalman.ORDER[self.model]])
-        return Tracks(*filters, np.zeros(shape, dtype=bool))
+        return Tracks(*filters, np.full(shape, np.nan), np.zeros(shape, dtype=bool))
 
-    def advance(self, brief: Brief, tracks: Tracks, position: Array, R: Array, usable: Mask) -> Tracks:
-        """All filters one tick ahead, corrected by positions (..., n, D) with covariances R (..., n, D, D) where usable."""
-        F, Q = kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
-        predicted = kalman.predict(tracks.mean, tracks.covariance, F, Q)
-        return Tracks(*kalman.correct(*predicted, position, R, usable), tracks.known | usable)
+    def ahead(self, brief: Brief, tracks: Tracks) -> tuple[Array, Array]:
+        """Mean and covariance of all filters one tick ahead."""
+        return kalman.predict(tracks.mean, tracks.covariance, *self._motion(brief))
 
     def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
         """What the filters say."""
@@ -75,7 +75,11 @@ class EdgeFilters:
             covariance=tracks.covariance[..., :dimension, :dimension],
             psi=psi,
             relative_velocity=tracks.mean[..., dimension : 2 * dimension] if moves else None,
+            reports={NIS: tracks.nis},
         )
+
+    def _motion(self, brief: Brief) -> tuple[Array, Array]:
+        return kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,10 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""
-        return self.advance(brief, state, measured, brief.sensor.spread(measured), seen), {}
+        mean, covariance = self.ahead(brief, state)
+        D = brief.dimension
+        observed = brief.sensor.observed(measured, mean[..., :D], covariance[..., :D, :D])
+        return Tracks(*kalman.correct(mean, covariance, *observed, seen), state.known | seen), {}
 
     def fuse(
         self,

@@ -25,6 +25,7 @@ from agents.swarm import SwarmBrief
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.reports import NIS
 from netem.core.channels import INPUT
 
 
@@ -115,17 +116,16 @@ class SilentEdgeFilter(Estimator[Silent]):
         theirs, doubt = self._neighbours(brief, past)
         mean = past.mean[..., 0, :, :] + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt * brief.dt * doubt
-        R = brief.sensor.spread(state.measured)
-        mean, covariance = kalman.correct(mean, covariance, state.measured, R, state.seen)
+        observed = brief.sensor.observed(state.measured, mean, covariance)
+        mean, covariance, nis = kalman.correct(mean, covariance, *observed, state.seen)
         newer = Past(
             mean=_pushed(mean, past.mean, -3),
             covariance=_pushed(covariance, past.covariance, -4),
             input=past.input,
             length=np.minimum(past.length + 1, self.window + 1),
         )
-        estimate = Estimate(
-            mean, np.broadcast_to(brief.present, state.seen.shape), covariance, no_indicator(state.seen)
-        )
+        known = np.broadcast_to(brief.present, state.seen.shape)
+        estimate = Estimate(mean, known, covariance, no_indicator(state.seen), reports={NIS: nis})
         return state._replace(past=newer), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:

@@ -6,14 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtri
+from scipy.special import chdtri, stdtrit
 
 from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.elementary import whole_power
 
 DRAWN = 0.95  # how probable the bands of pictures are
-# A smallest eigenvalue below this is what rounding leaves of nothing (of the trace), and of a difference (of R's).
-_SINGULAR, _CANCELLED = 1e-12, 1e-6
+BATCHES = 10
+_SINGULAR = 1e-12  # of the trace: a smallest eigenvalue below this is what rounding leaves of nothing
 
 
 class Normalised(NamedTuple):
@@ -38,30 +39,17 @@ def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> N
     return _averaged(nees(np.where(known[..., None], estimate - true, 0.0), covariance), known)
 
 
-def of_innovations(estimate: Array, measured: Array, covariance: Array, R: Array, seen: Mask) -> Normalised:
-    """NIS of the edges measured, from what is left of their innovations once the filters are corrected.
-
-    A filter with the innovation nu of covariance S leaves y - z = R S^-1 nu, of covariance R - P = R S^-1 R: normalised, one is
-    as long as the other. Edges for which R - P is no covariance are not counted: those who take measurements for estimates,
-    and those whose filters were so unsure that rounding leaves nothing of it. NaN where a filter has diverged.
+def of_innovations(nis: Array, seen: Mask) -> Normalised:
+    """NIS of a swarm, from that of its edges; NaN where the filter of one has diverged.
 
     Parameters
     ----------
-    estimate, measured
-        Relative positions, shape (..., N, n, D), in metres.
-    covariance
-        Upper triangles of the covariances P of the estimates, shape (..., N, n, D (D + 1) / 2), in square metres.
-    R
-        Covariances of the measurements, shape (..., N, n, D, D), in square metres.
+    nis
+        Innovations squared, normalised by their covariances, shape (..., N, n).
     seen
-        Which edges were measured and are estimated, shape (..., N, n).
+        Which edges were measured, shape (..., N, n).
     """
-    left = R - whole(covariance)
-    smallest = _smallest(left)
-    lost = np.isnan(smallest) | ~np.isfinite(estimate).all(axis=-1)
-    filtered = seen & (lost | (smallest > _CANCELLED * _smallest(R)))
-    residual = np.where(filtered[..., None], measured - estimate, 0.0)
-    return _averaged(_normalised(residual, left, smallest), filtered)
+    return _averaged(nis, seen)
 
 
 def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]:
@@ -79,6 +67,35 @@ def band(level: float, dimension: int, number: ArrayLike) -> tuple[Array, Array]
     averaged = np.asarray(number)
     low, high = (chdtri(dimension * averaged, tail) / averaged for tail in ((1.0 + level) / 2, (1.0 - level) / 2))
     return low, high
+
+
+class Averaged(NamedTuple):
+    """The mean of a series, half its confidence interval, and the means of its batches, shape (BATCHES,)."""
+
+    mean: float
+    half: float
+    batches: Array
+
+
+def averaged(series: Array, level: float) -> Averaged:
+    """The mean of a series of correlated values, by batch means with Student's t (Law, Simulation Modeling, section 9.5).
+
+    Ticks of a filter are correlated, and edges share their noise: batches longer than what correlates them are as good as
+    independent, and what they differ by says how much the mean is worth.
+
+    Parameters
+    ----------
+    series
+        Shape (T,), of at least 2 BATCHES values.
+    level
+        The probability that the interval has the mean in it.
+    """
+    starts = np.arange(BATCHES) * len(series) // BATCHES
+    lengths = np.diff(np.append(starts, len(series)))
+    batches = np.add.reduceat(series, starts) / lengths
+    spread = np.sqrt(whole_power(batches - batches.mean(), 2).sum() / (BATCHES - 1))
+    half = stdtrit(BATCHES - 1, (1.0 + level) / 2) * spread / np.sqrt(BATCHES)
+    return Averaged(float(series.mean()), float(half), batches)
 
 
 def nees(error: Array, covariance: Array) -> Array:

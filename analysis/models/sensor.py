@@ -68,8 +68,11 @@ class Sensor:
         """What it would say of relative positions (..., D), in metres, without noise."""
         return true if self.says_positions else _swung(true, np.zeros((*true.shape[:-1], true.shape[-1] - 1)))
 
-    def observed(self, measured: Array, expected: Array) -> tuple[Array, Array]:
+    def observed(self, measured: Array, expected: Array, doubt: Array) -> tuple[Array, Array]:
         """Measurements as relative positions (..., D), and their covariances (..., D, D), in square metres.
+
+        Where the covariance of a position hangs on where it is, it is that at the position expected, once that is surer than
+        the measurement: taken at the measurement it hangs on the error, and draws a filter to one side.
 
         A direction says where across the line to where a thing is expected it is, at the distance at which it is expected, and
         next to nothing of how far: an extended Kalman filter's measurement of a bearing (Aidala, IEEE Transactions on Aerospace
@@ -80,11 +83,16 @@ class Sensor:
         ----------
         measured
             What it said, shape (..., D).
-        expected
-            Where the estimator takes things to be, shape (..., D), in metres.
+        expected, doubt
+            Where the estimator takes things to be before this, shape (..., D), in metres, and the covariance of that, shape
+            (..., D, D), in square metres.
         """
-        if self.says_positions:
+        if self.reads == "coordinates":
             return measured, self.spread(measured)
+        if self.says_positions:
+            spread = self.spread(measured)
+            surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
+            return measured, np.where(surer[..., None, None], self._expected(expected, doubt), spread)
         distance = np.maximum(np.linalg.norm(expected, axis=-1, keepdims=True), _NEAREST)
         toward = expected / distance
         aside = measured - (measured * toward).sum(axis=-1, keepdims=True) * toward
@@ -119,14 +127,23 @@ class Sensor:
         if self.reads == "coordinates":
             return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
         if self.reads == "line-of-sight":
-            along, across = self._variances[:2]
-            lines = measured[..., :, None] * measured[..., None, :]
-            squared = (measured * measured).sum(axis=-1)[..., None, None]
-            spread: Array = across * squared * np.eye(measured.shape[-1]) + (along - across) * lines
-            return spread
+            return self._of_lines(measured[..., :, None] * measured[..., None, :])
         _, covariance = moments(_polar(measured), self._variances)
         shrinking = _shrinking(self._variances)
         return covariance / (shrinking[:, None] * shrinking)
+
+    def _expected(self, position: Array, doubt: Array) -> Array:
+        """The covariance of measurements of things that are about here (..., D), with covariances `doubt` (..., D, D)."""
+        if self.reads == "line-of-sight":
+            return self._of_lines(position[..., :, None] * position[..., None, :] + doubt)
+        return self.spread(position)
+
+    def _of_lines(self, second: Array) -> Array:
+        """Along and across lines of sight, of second moments (..., D, D), as shares of the squared distance."""
+        along, across = self._variances[:2]
+        squared = np.einsum("...ii", second)[..., None, None]
+        spread: Array = across * squared * np.eye(second.shape[-1]) + (along - across) * second
+        return spread
 
     @property
     def common(self) -> Array:

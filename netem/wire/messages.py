@@ -137,7 +137,7 @@ class Told(_Message, frozen=True, kw_only=True):
     """Centre to agent: its edges as the centralized filter sees them.
 
     `relative` has a row for each slot, shape (n, D), in metres, 0 in padding, `covariance` theirs, shape (n, D, D), in square
-    metres.
+    metres; `nis` its innovations squared, normalised, shape (n,), NaN where it has none.
     """
 
     k: int
@@ -145,6 +145,7 @@ class Told(_Message, frozen=True, kw_only=True):
     seq: int
     relative: Array
     covariance: Array
+    nis: Array
 
 
 class Journal(_Message, frozen=True, kw_only=True):

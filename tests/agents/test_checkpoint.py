@@ -73,7 +73,8 @@ def lives(agent, state, ticks, seed):
             )
             for channel, fields in agent.channels().items()
         }
-        centre = {"relative": measured, "covariance": rng.normal(size=(*measured.shape, measured.shape[-1]))}
+        spread = rng.normal(size=(*measured.shape, measured.shape[-1]))
+        centre = {"relative": measured, "covariance": spread, "nis": rng.random(slots)}
         heard[CENTRE] = Heard(centre, np.ones(slots, dtype=bool))
         position, sighting = None, None
         if agent.brief.target is not None:

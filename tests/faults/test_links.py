@@ -40,23 +40,24 @@ def test_bursts_in_the_turn_are_bridged_by_the_geometry(swarm):
     """A turn is when antennas point elsewhere, and when guessing that nothing changes is most wrong."""
     air = ("partition", COARSE, "time.duration=28", "timeline=[]")
     bursts = {"links": ["all"], "profile": "jammed", "at": 18, "until": 24}
-    swarm(*air).fault("degrade", **bursts).fly().check(bounded(1.5), recovers(0.15, within=3.5))
+    swarm(*air).fault("degrade", **bursts).fly().check(bounded(3), recovers(0.15, within=3.5))
     swarm(*air, FILTER_ALONE).fault("degrade", **bursts).fly().check(~bounded(50))
 
 
 @pytest.mark.affinet_seeds(1, 2, 3)
 def test_a_jammed_corridor_is_flown_through(swarm):
     """A jammer by the road leaves one message in ten to fly by, for as long as it takes to pass it."""
-    jammed = swarm("corridor", COARSE, "time.duration=16.5").fault("lose", links=["all"], loss=0.9, at=8, until=12)
-    jammed.fly().check(bounded(2), recovers(0.2, within=4))
+    air, jam = ("corridor", COARSE, "time.duration=18"), {"links": ["all"], "loss": 0.9, "at": 8, "until": 12}
+    swarm(*air).fault("lose", **jam).fly().check(bounded(4), recovers(0.2, within=5.5))
+    swarm(*air, FILTER_ALONE).fault("lose", **jam).fly().check(~bounded(8))
 
 
 def test_maps_that_come_late_in_the_turn_raise_the_alarm_and_not_the_error(swarm):
     """A relay adds a second: what neighbours say of the shape was true before they turned, and psi must tell."""
     only_maps_travel = ("partition", COARSE, "time.duration=25", "timeline=[]", "agents.law=constant-velocity")
-    prompt = swarm(*only_maps_travel).fly().check(agreement(0.02, by=18))
+    prompt = swarm(*only_maps_travel).fly().check(agreement(0.5, by=18))
     late = swarm(*only_maps_travel).fault("delay", links=["all"], delay=1.0, at=18, until=24).fly()
-    late.check(~agreement(0.05, by=18), always(error_below(2 * prompt.error[prompt.tick(18) :].max()), since=18))
+    late.check(~agreement(0.5, by=18), always(error_below(2 * prompt.error[prompt.tick(18) :].max()), since=18))
 
 
 def test_a_split_that_waits_for_calm_strikes_when_all_is_well(swarm):
@@ -66,4 +67,4 @@ def test_a_split_that_waits_for_calm_strikes_when_all_is_well(swarm):
     run = air.fault("partition", groups="leaders", when=calm, lasts=3).fly()
     struck = run.tick(run.bites[0].at)
     assert (run.error[struck - 20 : struck] < 0.05).all()
-    run.check(~always(error_below(0.3), since=8), bounded(1.5), converged(0.3, by=15))
+    run.check(~always(error_below(0.15), since=8), bounded(1.5), converged(0.3, by=15))

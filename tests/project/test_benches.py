@@ -16,7 +16,7 @@ SMALLEST = {
 ELSEWHERE = {
     "accuracy": "netem/impairments/test_models.py",
     "kills": "system/test_kills.py",
-    "redcho": "agents/algebra/test_redcho.py",
+    "redcho": "system/test_redcho.py",
 }
 STARTED_BY = {"floor": "lockstep"}
 

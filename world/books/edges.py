@@ -17,21 +17,20 @@ class EdgesByTick(NamedTuple):
 
     Parameters
     ----------
-    estimate, true, measured
+    estimate, true
         Relative positions, shape (..., S, N, n, D), in metres.
     covariance
         Upper triangles of the covariances of the estimates, shape (..., S, N, n, D (D + 1) / 2), in square metres.
-    R
-        Covariances of the measurements, shape (..., S, N, n, D, D), in square metres.
+    nis
+        How far off the predictions of those measured were, as estimators say (`analysis.models.reports`), shape (..., S, N, n).
     known, seen
-        Which are estimated, and which of these were measured in this tick, shape (..., S, N, n).
+        Which are estimated, and which of these were measured in this tick by estimators that say so, shape (..., S, N, n).
     """
 
     estimate: Array
     true: Array
-    measured: Array
     covariance: Array
-    R: Array
+    nis: Array
     known: Mask
     seen: Mask
 
@@ -39,12 +38,13 @@ class EdgesByTick(NamedTuple):
 def of_swarms(
     world: World,
     *,
+    present: Mask,
     position: Array,
-    measured: Array,
     verdicts: VerdictCodes,
     estimate: Array,
     covariance: Array,
     known: Mask,
+    nis: Array | None,
 ) -> EdgesByTick:
     """Edges of all agents of a world, each agent in its swarm.
 
@@ -52,12 +52,14 @@ def of_swarms(
     ----------
     world
         Of the swarms.
+    present
+        Which agents take part, shape (..., S N): an edge of another does not count.
     position
         Of all agents, shape (..., S N, D), in metres.
-    measured, verdicts
-        What the sensors said of every link, shape (..., L, D), in metres, and what became of it, shape (..., L).
-    estimate, covariance, known
-        As in `world.books.history.Moment`, shape (..., S N, n, *).
+    verdicts
+        What became of the measurement of every link, shape (..., L).
+    estimate, covariance, known, nis
+        As in `world.books.history.Moment`, shape (..., S N, n, *); the last, if the estimator reports it.
     """
     slots, swarms = world.links.slots, world.swarms
 
@@ -66,16 +68,14 @@ def of_swarms(
         shape = of_agents.shape
         return of_agents.reshape(*shape[:axis], swarms, shape[axis] // swarms, *shape[len(shape) + axis + 1 :])
 
-    positions = world.sensor.says_positions  # innovations are of them
-    said = each(measured[..., slots, :], -3)
+    counted = known & present[..., :, None] & present[..., world.links.neighbours]
+    # Of a direction an innovation has fewer axes than a position.
+    reported = nis is not None and world.sensor.says_positions
     return EdgesByTick(
         estimate=each(estimate, -3),
         true=each(sensors.relative(position, world.links)[..., slots, :], -3),
-        measured=said,
-        covariance=each(covariance, -3),
-        R=world.sensor.spread(said)
-        if positions
-        else np.broadcast_to(np.eye(said.shape[-1]), (*said.shape, said.shape[-1])),
-        known=each(known, -2),
-        seen=each(positions & known & (verdicts == Verdict.DELIVERED)[..., slots], -2),
+        covariance=each(np.where(counted[..., None], covariance, 0.0), -3),
+        nis=each(np.full(known.shape, np.nan) if nis is None else nis, -2),
+        known=each(counted, -2),
+        seen=each(reported & counted & (verdicts == Verdict.DELIVERED)[..., slots], -2),
     )

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from analysis.metrics import consistency
 from analysis.metrics.errors import procrustes_error
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Mask
+from analysis.models.reports import NIS
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
@@ -132,7 +133,7 @@ class Recorder:
         shape = procrustes_error(moments.position[kept], self._formation.nominal, present)
         self._scalars("metrics/procrustes", time, shape[:, None])
         self._scalars("metrics/psi", time, moments.psi[kept])
-        self._log_consistency(time, moments, kept)
+        self._log_consistency(time, moments, kept, present)
         numbers = np.arange(1.0, self._formation.agents + 1.0)
         self._scalars("metrics/infeasible", time, np.where(moments.feasible[kept] == 0, numbers, np.nan))
         self._scalars("metrics/messages", time, self._messages_per_tick(moments))
@@ -235,18 +236,19 @@ class Recorder:
         counts = np.stack([realised.feasible.sum(axis=-1), realised.stress_dimension[:, 0]], axis=-1)
         self._scalars("graph/rigidity", time, counts.astype(np.float64))
 
-    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice) -> None:
+    def _log_consistency(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, present: Mask) -> None:
         edges = of_swarms(
             self._world,
+            present=present,
             position=moments.position[kept],
-            measured=moments.measured[kept],
             verdicts=moments.verdicts[kept, 0],
             estimate=moments.estimate[kept],
             covariance=moments.covariance[kept],
             known=moments.known[kept],
+            nis=moments.reports[NIS][kept] if NIS in moments.reports else None,
         )
         errors = consistency.of_errors(edges.estimate, edges.true, edges.covariance, edges.known)
-        innovations = consistency.of_innovations(edges.estimate, edges.measured, edges.covariance, edges.R, edges.seen)
+        innovations = consistency.of_innovations(edges.nis, edges.seen)
         number = np.maximum(errors.number, 1)
         bands = consistency.band(consistency.DRAWN, self._formation.dimension, number)
         self._scalars("metrics/consistency", time, np.concatenate([errors.mean, innovations.mean, *bands], axis=-1))

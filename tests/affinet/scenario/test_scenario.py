@@ -545,3 +545,24 @@ def test_a_scenario_that_does_not_exist_is_refused_with_those_that_are_shipped(n
         match=rf"^{name}: no such file, and no such scenario; (did you mean 'corridor'\? )?shipped are corridor, hexa, ",
     ):
         loading.load(name)
+
+
+SENSORS = [
+    ("sensing.covariance=[[0.01, 0.0], [0.0, 0.02]]",),
+    ("sensing.sigma_range=0.1", "sensing.sigma_bearing=0.2"),
+    ("sensing.sigma_along=0.1", "sensing.sigma_across=0.2"),
+    ("sensing.sigma_direction=0.1",),
+    ("sensing.sigma=0.3",),
+]
+
+
+@pytest.mark.parametrize("overrides", SENSORS, ids=lambda overrides: overrides[0].partition("=")[0])
+def test_another_sensor_stands_in_place_of_that_of_the_file(overrides):
+    """Before: refused, as two sensors, with no word of which had been given."""
+    given = loading.load("corridor", overrides).sensing.model_dump(exclude_none=True)
+    assert given.keys() - {"samples"} == {one.partition("=")[0].removeprefix("sensing.") for one in overrides}
+
+
+def test_two_sensors_in_a_file_are_named():
+    with pytest.raises(ScenarioError, match=r"one of them, where sigma and covariance are given$"):
+        loading.load("corridor", ("sensing={ sigma = 0.1, covariance = [[1.0, 0.0], [0.0, 1.0]] }",))

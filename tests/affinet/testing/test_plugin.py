@@ -12,8 +12,6 @@ from flying import PROCESSES
 from affinet.cli.commands import main
 from affinet.scenario.sections import ScenarioError
 
-pytestmark = PROCESSES
-
 # A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
 for module in ("affinet.testing.swarm", "netem.medium.journal", "world.recording.logbook", "cvxpy", "hypothesis"):
     importlib.import_module(module)
@@ -185,6 +183,7 @@ def test_both():
     result.stdout.fnmatch_lines(["*test_seeded?seed11?*", "*test_seeded?seed12?*"])
 
 
+@PROCESSES
 def test_the_command_line_says_where_to_fly_and_a_mark_says_otherwise(tested):
     text = """
 AIR = "corridor", "time.dt=0.05", "time.duration=0.5"

@@ -120,7 +120,12 @@ def test_what_names_no_checker_is_refused_with_all_there_are(text):
         invariants.parse(text)
     said = str(refused.value)
     assert said.startswith(f"invariant {text!r}: ")
-    for word in ("bounded(level)", "converged(level, by)", "never_heard_across_a_cut()", "consistent(level, since)"):
+    for word in (
+        "bounded(level)",
+        "converged(level, by)",
+        "never_heard_across_a_cut()",
+        "consistent(level, within, since)",
+    ):
         assert word in said
     assert "& | ~" in said
     assert all(name in said for name in invariants.NAMED)

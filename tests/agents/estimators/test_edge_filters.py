@@ -310,6 +310,28 @@ def test_a_model_of_order_two_remembers_two_ticks():
     np.testing.assert_allclose(flown.last[1], np.broadcast_to(0.04 * 1.25 * np.eye(2), (2, 2, 2)))
 
 
+@pytest.mark.parametrize("a", [(0.9,), (1.9, -0.9), (0.5, 0.25), (1.2, -0.5, 0.25)])
+def test_after_losses_in_a_row_inputs_are_as_wrong_as_they_say(a):
+    """The doubt is that of the process driven so many times, whose inputs are correlated."""
+    sigma, flown = 0.5, inputs.hear(inputs.at_rest((2,), 2, len(a)), said(U, True, True), a, 0.5)
+    answers = [1.0]  # the input k ticks after a unit impulse
+    for losses in range(1, 21):
+        flown = inputs.hear(flown, LOST, a, sigma)
+        variance = sigma**2 * sum(answer**2 for answer in answers)
+        np.testing.assert_allclose(flown.last[1], np.broadcast_to(variance * np.eye(2), (2, 2, 2)), rtol=1e-9)
+        assert losses == len(answers)
+        answers.append(sum(weight * answer for weight, answer in zip(a, answers[::-1], strict=False)))
+
+
+def test_what_is_heard_leaves_the_doubt_of_what_was_lost_before():
+    a, sigma = (0.5, 0.25), 0.2
+    flown = inputs.hear(inputs.at_rest((2,), 2, 2), LOST, a, sigma)
+    flown = inputs.hear(flown, said(U, True, True), a, sigma)
+    last, doubt = inputs.hear(flown, LOST, a, sigma).last
+    np.testing.assert_allclose(last, 0.5 * U)
+    np.testing.assert_allclose(doubt, np.broadcast_to(0.04 * (1 + 0.25**2) * np.eye(2), (2, 2, 2)))
+
+
 @BOTH
 def test_accelerations_are_refused(kind):
     agent, filters = brief(HEXA4), kind()

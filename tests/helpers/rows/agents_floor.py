@@ -15,6 +15,7 @@ from agents.centre.checked import CheckedCentre
 from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
 from agents.estimators.centralized import SwarmFilter, Whole
+from agents.estimators.conral import Indicator
 from agents.estimators.none import LastMeasured
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Heard
@@ -128,14 +129,14 @@ CASES = {
     ),
     "agents.algebra.inputs.NeighbourInputs.last": of(
         lambda flown, spread: inputs.NeighbourInputs(flown, spread).last,
-        real(NEIGHBOURS, 2, 2),
-        covariance(NEIGHBOURS, 2, 2, 2),
+        real(NEIGHBOURS, 3, 2),
+        covariance(NEIGHBOURS, 3, 3),
     ),
     "agents.algebra.inputs.hear": of(
         lambda flown, spread, velocity, fresh: inputs.hear(
             inputs.NeighbourInputs(flown, spread), Heard({"velocity": velocity}, fresh), np.linspace(0.5, -0.3, 9), 0.2
         ),
-        *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 2, 2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+        *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 9), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
     "agents.estimators.joint_kf.corrected": of(
         joint_kf.corrected,
@@ -144,6 +145,7 @@ CASES = {
     "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)
     ),
+    "agents.algebra.kalman.normalised": of(kalman.normalised, real(NEIGHBOURS, 2), covariance(NEIGHBOURS, 2, 2)),
     "agents.algebra.kalman.correct": of(
         lambda mean, spread, seen, usable: kalman.correct(mean, spread, seen, NOISE, usable),
         *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
@@ -168,15 +170,14 @@ CASES = {
             covariance(NEIGHBOURS, 2, 2),
         ),
     ),
-    "agents.estimators.rkf.EdgeFilters.advance": of(
-        lambda mean, spread, known, position, usable: FILTERS.advance(
-            BRIEF, Tracks(mean, spread, known), position, NOISE, usable
-        ),
-        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), truth(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.estimators.conral.Indicator.psi": of(lambda heard, age: Indicator(heard, age).psi, real(), real()),
+    "agents.estimators.rkf.EdgeFilters.ahead": of(
+        lambda mean, spread, nis, known: FILTERS.ahead(BRIEF, Tracks(mean, spread, nis, known)),
+        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
     ),
     "agents.estimators.rkf.EdgeFilters.estimate": of(
-        lambda mean, spread, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, known), known[..., 0]),
-        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), truth(NEIGHBOURS)),
+        lambda mean, spread, nis, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, nis, known), known[..., 0]),
+        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
     ),
     "agents.algebra.redcho.Consensus.outputs": of(CONSENSUS.outputs, real(4, 9, axis=1), real(4, 9), out=1),
     "agents.algebra.redcho.Consensus.step": of(

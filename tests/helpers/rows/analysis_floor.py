@@ -57,6 +57,7 @@ CASES = {
         for what, function, arguments in (
             ("measured", one.measured, (real(9, dimension), real(9, dimension))),
             ("spread", one.spread, (real(9, dimension),)),
+            ("observed", one.observed, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),
         )
     },
     **{
@@ -66,7 +67,7 @@ CASES = {
         for what, function, arguments in (
             ("measured", one.measured, (real(9, dimension), real(9, dimension - 1))),
             ("exact", one.exact, (real(9, dimension),)),
-            ("observed", one.observed, (real(9, dimension), real(9, dimension))),
+            ("observed", one.observed, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),
         )
     },
     "analysis.models.sensor.moments": of(lambda polar: sensor.moments(polar, np.array([0.1, 0.2, 0.3])), real(9, 3)),
@@ -78,10 +79,7 @@ CASES = {
     "analysis.metrics.consistency.of_errors": of(
         consistency.of_errors, real(4, 9, 2), real(4, 9, 2), real(4, 9, 3), truth(4, 9)
     ),
-    "analysis.metrics.consistency.of_innovations": of(
-        consistency.of_innovations,
-        *(real(4, 9, 2), real(4, 9, 2), share(4, 9, 3), covariance(4, 9, 2, 2), truth(4, 9)),
-    ),
+    "analysis.metrics.consistency.of_innovations": of(consistency.of_innovations, real(4, 9), truth(4, 9)),
     "analysis.metrics.consistency.band": of(lambda number: consistency.band(0.9, 2, number), whole(99)),
     "analysis.metrics.consistency.nees": of(consistency.nees, real(9, 3), real(9, 6)),
     "analysis.metrics.consistency.whole": of(consistency.whole, real(9, 6)),

@@ -53,15 +53,16 @@ def _carried_off(body, position, motion, flown, push):
     return tuple(one.reshape(*position.shape[:-1], *one.shape[1:]) for one in moved)
 
 
-def _of_swarms(position, measured, verdicts, estimate, spread, known):
+def _of_swarms(present, position, verdicts, estimate, spread, known, nis):
     return edges.of_swarms(
         _plan().world,
+        present=present,
         position=position,
-        measured=measured,
         verdicts=verdicts,
         estimate=estimate,
         covariance=spread,
         known=known,
+        nis=nis,
     )
 
 
@@ -154,7 +155,7 @@ CASES = {
     ),
     "world.books.edges.of_swarms": of(
         _of_swarms,
-        *(real(10, 2), real(DIRECTED, 2), whole(3, DIRECTED), real(*SLOTS, 2), real(*SLOTS, 3), truth(*SLOTS)),
+        *(truth(10), real(10, 2), whole(3, DIRECTED), real(*SLOTS, 2), real(*SLOTS, 3), truth(*SLOTS), real(*SLOTS)),
     ),
     "world.formation.manoeuvre.corridor": _moments(lambda seconds: manoeuvre.corridor(100.0 * seconds)),
     "world.formation.manoeuvre.ravine": _moments(lambda seconds: manoeuvre.ravine(60.0 * seconds)),

@@ -48,7 +48,7 @@ def test_it_says_nothing_of_the_distance(dimension):
 def test_a_filter_is_told_where_across_the_line_of_sight_and_next_to_nothing_of_how_far(dimension):
     sensor, expected = directional(0.02, dimension), np.zeros(dimension)
     expected[0] = 4.0
-    place, R = sensor.observed(sensor.measured(expected, np.full(dimension - 1, 0.01)), expected)
+    place, R = sensor.observed(sensor.measured(expected, np.full(dimension - 1, 0.01)), expected, np.eye(dimension))
     np.testing.assert_allclose(np.linalg.norm(place[1:]), 4.0 * np.sin(0.01 * np.sqrt(dimension - 1)), rtol=1e-9)
     np.testing.assert_allclose(place[0], 4.0)
     np.testing.assert_allclose(np.diag(R), [(1e3 * 4.0) ** 2, *[(0.02 * 4.0) ** 2] * (dimension - 1)])

@@ -238,8 +238,40 @@ def test_estimators_fly_with_ranges_and_bearings(estimator):
 
 
 @SPACES
+@pytest.mark.parametrize("reads", ["range-bearing", "line-of-sight"])
+def test_a_measurement_counts_by_where_it_is_expected_once_that_is_surer(reads, dimension):
+    """Before: by where it says to be, so that its weight came from its own noise."""
+    sensor = Sensor(reads, np.diag([0.01, 0.04, 0.09][:dimension]))
+    measured, expected = np.random.default_rng(3).normal(size=(2, 20, dimension))
+    sharp, vague = (size * np.broadcast_to(np.eye(dimension), (20, dimension, dimension)) for size in (1e-9, 1e9))
+    for doubt, where in ((sharp, expected), (vague, measured)):
+        place, R = sensor.observed(measured, expected, doubt)
+        np.testing.assert_array_equal(place, measured)
+        np.testing.assert_allclose(R, sensor.spread(where), atol=1e-8)
+    mixed = np.where((np.arange(20) % 2 == 0)[:, None, None], sharp, vague)
+    _, R = sensor.observed(measured, expected, mixed)
+    np.testing.assert_allclose(R[::2], sensor.spread(expected)[::2], atol=1e-8)
+    np.testing.assert_array_equal(R[1::2], sensor.spread(measured)[1::2])
+
+
+def test_what_is_expected_at_hand_is_not_measured_without_error():
+    """As wrong as it is far, and it may be as far as the doubt says."""
+    sensor = Sensor("line-of-sight", np.diag([0.02, 0.01]))
+    _, R = sensor.observed(np.array([20.0, 0.0]), np.zeros(2), np.eye(2))
+    np.testing.assert_allclose(R, 0.03 * np.eye(2))
+
+
+@SPACES
 @pytest.mark.parametrize("name", [name for name in FILTERS if name != "crkf"])
-def test_estimators_trust_every_measurement_by_its_own_covariance(name, dimension):
+def test_estimators_trust_every_measurement_by_its_own_covariance(name, dimension, monkeypatch):
+    counted = []
+
+    def observed(sensor, *given, honest=Sensor.observed):
+        said = honest(sensor, *given)
+        counted.append(said[1])
+        return said
+
+    monkeypatch.setattr(Sensor, "observed", observed)
     found = by_affinet("estimators")[name]
     estimator, rng = found.load()(), np.random.default_rng(9)
     sensor = ranging(*[0.1, 0.2, 0.3][:dimension])
@@ -247,10 +279,12 @@ def test_estimators_trust_every_measurement_by_its_own_covariance(name, dimensio
     state = other = estimator.init(told, ())
     seen = np.ones(1, dtype=bool)
     for y in rng.normal(size=(5, 1, dimension)):
+        counted.clear()
         state, _ = estimator.sense(told, state, y, seen)
         state, estimate = estimator.fuse(told, state, hears(seen, np.zeros((1, dimension))), at_rest(dimension))
         # As if there were a sensor for it alone.
-        alone = replace(told, sensor=Sensor("coordinates", sensor.spread(y[0])))
+        (R,) = counted or [sensor.spread(y)]
+        alone = replace(told, sensor=Sensor("coordinates", R[0]))
         other, _ = estimator.sense(alone, other, y, seen)
         other, expected = estimator.fuse(alone, other, hears(seen, np.zeros((1, dimension))), at_rest(dimension))
         np.testing.assert_array_equal(estimate.relative, expected.relative)
@@ -343,3 +377,17 @@ def test_what_was_measured_is_where_the_neighbour_is_and_the_noise_of_the_sensor
     assert 0.45 < heard[:, links.present].mean() < 0.55
     np.testing.assert_array_equal(arrays["known"], heard)
     np.testing.assert_array_equal(arrays["estimate"][heard], measured[:, links.slots][heard])
+
+
+@pytest.mark.parametrize(
+    "sensing", ["sensing={sigma_range=0.1, sigma_bearing=0.2}", "sensing={sigma_along=0.15, sigma_across=0.1}"]
+)
+@pytest.mark.parametrize("estimator", ["edge-kf", "joint-kf", "crkf"])
+def test_a_measurements_weight_does_not_come_from_its_own_noise(estimator, sensing):
+    """Before: NEES of 37 to 120, and twice to six times the error; the innovations did not show it."""
+    over = (f'agents.estimator="{estimator}"', "time.dt=0.02", "time.duration=4", sensing)
+    found = fly_all(plan_of("rigid", *over), range(1, 9), 10).quantities
+    settled = {name: found[name][:, 10:].mean() for name in ("nees", "nis", "estimation_error")}
+    assert 1.7 < settled["nees"] < 2.3
+    assert 1.8 < settled["nis"] < 2.2
+    assert settled["estimation_error"] < 0.26
