@@ -75,6 +75,7 @@ class InteractingMultipleModel(Estimator[Modes]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Modes:
         """All edges unknown, all models as probable."""
+        brief.sensor.require_positions()
         shape = (*batch, brief.relative.shape[-2])
         deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
         filters = kalman.unknown((*shape, 3), brief.dimension, deviations)

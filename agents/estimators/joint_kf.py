@@ -64,6 +64,7 @@ class JointEdgeFilter(Estimator[Joint]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Joint:
         """Everybody at the same place, as far as is known: B_i^T B_i (x) P (14b)."""
+        brief.sensor.require_positions()
         slots, dimension = brief.relative.shape[-2:]
         shape = (*batch, slots)
         edges = np.ones((slots, slots)) + np.eye(slots)

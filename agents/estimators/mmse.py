@@ -47,6 +47,7 @@ class MinimumMeanSquareError(Estimator[Recent]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Recent:
         """Everybody at the same place."""
+        brief.sensor.require_positions()
         square = (*batch, brief.relative.shape[-2], brief.dimension, brief.dimension)
         prior = np.broadcast_to(self._prior(brief), square).copy()
         return Recent(np.zeros(square[:-1]), prior, np.full(square[:-2], np.nan))

@@ -92,6 +92,7 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
         """All edges unknown."""
+        brief.sensor.require_positions()
         return self.unknown(brief, batch)
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:

@@ -82,6 +82,7 @@ class SilentEdgeFilter(Estimator[Silent]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Silent:
         """Everybody at the same place, as far as is known, and at rest."""
+        brief.sensor.require_positions()
         slots, dimension = brief.relative.shape[-2:]
         kept = (*batch, self.window + 1, slots)
         prior = 2.0 * self.prior_position * self.prior_position * identity(dimension)
