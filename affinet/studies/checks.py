@@ -201,9 +201,9 @@ def _those(cases: Sequence[Case], labels: Mapping[str, str]) -> list[Case]:
 
 def _quantity(key: str, quantity: str, planned: Sequence[Planned]) -> Iterator[Wrong]:
     for case, plan in planned:
-        if quantity.startswith(REPORT) and (name := quantity.removeprefix(REPORT)) not in plan.reports.keys() - {NIS}:
-            others = [name for name in plan.reports if name != NIS]
-            has = f"has {', '.join(others)}" if others else "has none"
+        reports = [name for name in plan.reports if name != NIS]  # which is a metric
+        if quantity.startswith(REPORT) and (name := quantity.removeprefix(REPORT)) not in reports:
+            has = f"has {', '.join(reports)}" if reports else "has none"
             yield key, f"no report is called {name!r}: the estimator of the case {named(case.labels)} {has}"
             return
         if quantity in _PLACES and channels.PLACE not in plan.reports:

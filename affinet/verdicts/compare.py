@@ -68,7 +68,7 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     """The first difference of two runs over the same links and channels; None when every bit is the same."""
     names = (*_MADE, *sorted((one.keys() | other.keys()) - {*_MADE, "input"}), "input")
     for name in names:
-        forms = [_form(arrays.get(name)) for arrays in (one, other)]
+        forms = [history.form(arrays.get(name)) for arrays in (one, other)]
         if forms[0] != forms[1]:  # their values cannot be held against each other
             return Difference(0, name, "", *forms)
     parted = [
@@ -87,11 +87,6 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     return Difference(
         tick, name, _where(name, place[1:], links, channels), repr(here[place].item()), repr(there[place].item())
     )
-
-
-def _form(array: NDArray[Any] | None) -> str:
-    """What kind of numbers, and how many of them in a tick."""
-    return "missing" if array is None else f"{array.dtype} {array.shape[1:]}"
 
 
 def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:

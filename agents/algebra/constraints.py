@@ -32,15 +32,7 @@ _GENERATORS = {
 
 
 class Maps(Protocol):
-    """A class of maps.
-
-    Attributes
-    ----------
-    linear
-        Whether a map of it is linear in what is measured: its covariance then depends on the neighbours, not on the map.
-    """
-
-    linear: bool
+    """A class of maps."""
 
     def feasible(self, gram: Array) -> Mask:
         """Whether neighbours of this H H^T (..., D, D) determine a map, shape (...)."""
@@ -76,8 +68,6 @@ class Maps(Protocol):
 class Affine:
     """Any matrix: at least D neighbours, not in a line (plane) with the agent."""
 
-    linear = True
-
     def feasible(self, gram: Array) -> Mask:
         """Rank H = D (Remark 1)."""
         return geometry.regular(gram)
@@ -102,8 +92,6 @@ class Affine:
 
 class Scaling:
     """A factor for each coordinate (13): one neighbour will do that differs from the agent in every coordinate."""
-
-    linear = True
 
     def feasible(self, gram: Array) -> Mask:
         """Whether some neighbour differs from the agent in each coordinate."""
@@ -134,8 +122,6 @@ class Rotation:
     In space one neighbour leaves the turn about its edge open, whatever section IV-B says (errata).
     """
 
-    linear = False
-
     def feasible(self, gram: Array) -> Mask:
         """Rank H >= D - 1; with the determinant fixed, the last direction follows from the others."""
         scale = np.einsum("...ii", gram) / gram.shape[-1]
@@ -159,8 +145,6 @@ class Rotation:
 
 class Similarity:
     """A rotation and one scale, feasible where a rotation is; its determinant is s^D."""
-
-    linear = False
 
     def feasible(self, gram: Array) -> Mask:
         """Rank H >= D - 1."""

@@ -129,10 +129,10 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     precision = inverse(covariance[..., :dimension, :dimension] + R)
     gain = np.where(usable[..., None, None], product(covariance[..., :dimension], precision), 0.0)
     corrected = mean + product(gain, innovation[..., None])[..., 0]
-    nis = np.where(usable, normalised(innovation, precision), np.nan)
-    return Corrected(corrected, covariance - product(gain, covariance[..., :dimension, :]), nis)
+    left = covariance - product(gain, covariance[..., :dimension, :])
+    return Corrected(corrected, left, normalised(innovation, precision, usable))
 
 
-def normalised(error: Array, precision: Array) -> Array:
-    """e^T P^-1 e of errors (..., D), by the inverses of their covariances (..., D, D), shape (...)."""
-    return sum_over(error * product(precision, error[..., None])[..., 0], -1)
+def normalised(innovation: Array, precision: Array, made: Mask) -> Array:
+    """Innovations (..., D) squared, by the inverses (..., D, D) of their covariances, shape (...); NaN where none was made."""
+    return np.where(made, sum_over(innovation * product(precision, innovation[..., None])[..., 0], -1), np.nan)

@@ -118,9 +118,8 @@ class SwarmFilter(Centre[Whole]):
         covariance = state.covariance + self.swarm.process
         expected, doubt = self._edges(position), self._spread(covariance, agents, dimension)
         innovation = measured - expected
-        _, R = self.swarm.sensor.observed(measured, expected, doubt)
-        R = np.where(seen[..., None, None], R, np.eye(dimension))
-        nis = np.where(seen, normalised(innovation, np.asarray(np.linalg.inv(doubt + R))), np.nan)
+        R = np.where(seen[..., None, None], self.swarm.sensor.weight(measured, expected, doubt), np.eye(dimension))
+        nis = normalised(innovation, np.asarray(np.linalg.inv(doubt + R)), seen)
         precision = np.where(seen[..., None, None], np.linalg.inv(R), 0.0)
         surprise = product(precision, innovation[..., None])
         pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))

@@ -84,10 +84,8 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
             R = R + doubt[..., None, None] * identity(brief.dimension)
         usable = seen | (observed.known & trusted[..., None])
         corrected = kalman.correct(*self.ahead(brief, state.tracks), observed.relative, R, usable)
-        measured = corrected._replace(
-            nis=np.where(seen, corrected.nis, np.nan)
-        )  # what the shape says is no measurement
-        tracks = Tracks(*measured, state.tracks.known | usable)
+        nis = np.where(seen, corrected.nis, np.nan)  # what the shape says is no measurement
+        tracks = Tracks(*corrected._replace(nis=nis), state.tracks.known | usable)
         return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)._replace(feasible=observed.feasible)
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:

@@ -75,7 +75,6 @@ class InteractingMultipleModel(Estimator[Modes]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Modes:
         """All edges unknown, all models as probable."""
-        brief.sensor.require_positions()
         shape = (*batch, brief.relative.shape[-2])
         deviations = (self.prior_position, self.prior_velocity, self.prior_acceleration)
         filters = kalman.unknown((*shape, 3), brief.dimension, deviations)
@@ -90,9 +89,9 @@ class InteractingMultipleModel(Estimator[Modes]):
         mean, covariance = _mix(state.mean, state.covariance, weights)
         mean, covariance = product(F, mean[..., None])[..., 0], product(F, covariance, np.swapaxes(F, -1, -2)) + Q
         place, doubt = self._predicted(mean, covariance, expected, brief.dimension)
-        observed, R = brief.sensor.observed(measured, place, doubt)
-        nis = np.where(seen, kalman.normalised(observed - place, inverse(doubt + R)), np.nan)
-        observed, R, usable = observed[..., None, :], R[..., None, :, :], seen[..., None]
+        R = brief.sensor.weight(measured, place, doubt)
+        nis = kalman.normalised(measured - place, inverse(doubt + R), seen)
+        observed, R, usable = measured[..., None, :], R[..., None, :, :], seen[..., None]
         surprise = _surprise(mean, covariance, observed, R)
         mean, covariance, _ = kalman.correct(mean, covariance, observed, R, usable)
         probability = np.where(usable, _weighed(expected, surprise), expected)

@@ -64,7 +64,6 @@ class JointEdgeFilter(Estimator[Joint]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Joint:
         """Everybody at the same place, as far as is known: B_i^T B_i (x) P (14b)."""
-        brief.sensor.require_positions()
         slots, dimension = brief.relative.shape[-2:]
         shape = (*batch, slots)
         edges = np.ones((slots, slots)) + np.eye(slots)
@@ -94,9 +93,9 @@ class JointEdgeFilter(Estimator[Joint]):
         mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
         doubts = diagonal_blocks(covariance, brief.dimension)
-        measured, R = brief.sensor.observed(state.measured, mean, doubts)
-        nis = np.where(state.seen, kalman.normalised(measured - mean, inverse(doubts + R)), np.nan)
-        mean, covariance = corrected(mean, covariance, measured, block_diagonal(R), state.seen)
+        R = brief.sensor.weight(state.measured, mean, doubts)
+        nis = kalman.normalised(state.measured - mean, inverse(doubts + R), state.seen)
+        mean, covariance = corrected(mean, covariance, state.measured, block_diagonal(R), state.seen)
         known, edges = np.broadcast_to(brief.present, state.seen.shape), diagonal_blocks(covariance, brief.dimension)
         estimate = Estimate(mean, known, edges, no_indicator(state.seen), reports={NIS: nis})
         return state._replace(mean=mean, covariance=covariance, flown=flown), estimate

@@ -47,7 +47,6 @@ class MinimumMeanSquareError(Estimator[Recent]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Recent:
         """Everybody at the same place."""
-        brief.sensor.require_positions()
         square = (*batch, brief.relative.shape[-2], brief.dimension, brief.dimension)
         prior = np.broadcast_to(self._prior(brief), square).copy()
         return Recent(np.zeros(square[:-1]), prior, np.full(square[:-2], np.nan))
@@ -55,8 +54,8 @@ class MinimumMeanSquareError(Estimator[Recent]):
     def sense(self, brief: Brief, state: Recent, measured: Array, seen: Mask) -> tuple[Recent, Mapping[str, Fields]]:
         """Correct the last estimates (4.20)."""
         prior = np.broadcast_to(self._prior(brief), state.covariance.shape)
-        observed = brief.sensor.observed(measured, state.mean, prior)
-        return Recent(*kalman.correct(state.mean, prior, *observed, seen)), {}
+        R = brief.sensor.weight(measured, state.mean, prior)
+        return Recent(*kalman.correct(state.mean, prior, measured, R, seen)), {}
 
     def fuse(
         self,

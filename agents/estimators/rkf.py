@@ -63,7 +63,8 @@ class EdgeFilters:
 
     def ahead(self, brief: Brief, tracks: Tracks) -> tuple[Array, Array]:
         """Mean and covariance of all filters one tick ahead."""
-        return kalman.predict(tracks.mean, tracks.covariance, *self._motion(brief))
+        F, Q = kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
+        return kalman.predict(tracks.mean, tracks.covariance, F, Q)
 
     def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
         """What the filters say."""
@@ -78,9 +79,6 @@ class EdgeFilters:
             reports={NIS: tracks.nis},
         )
 
-    def _motion(self, brief: Brief) -> tuple[Array, Array]:
-        return kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
-
 
 @dataclass(frozen=True)
 class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
@@ -92,15 +90,14 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
         """All edges unknown."""
-        brief.sensor.require_positions()
         return self.unknown(brief, batch)
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""
         mean, covariance = self.ahead(brief, state)
         D = brief.dimension
-        observed = brief.sensor.observed(measured, mean[..., :D], covariance[..., :D, :D])
-        return Tracks(*kalman.correct(mean, covariance, *observed, seen), state.known | seen), {}
+        R = brief.sensor.weight(measured, mean[..., :D], covariance[..., :D, :D])
+        return Tracks(*kalman.correct(mean, covariance, measured, R, seen), state.known | seen), {}
 
     def fuse(
         self,

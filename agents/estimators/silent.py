@@ -82,7 +82,6 @@ class SilentEdgeFilter(Estimator[Silent]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Silent:
         """Everybody at the same place, as far as is known, and at rest."""
-        brief.sensor.require_positions()
         slots, dimension = brief.relative.shape[-2:]
         kept = (*batch, self.window + 1, slots)
         prior = 2.0 * self.prior_position * self.prior_position * identity(dimension)
@@ -117,8 +116,8 @@ class SilentEdgeFilter(Estimator[Silent]):
         theirs, doubt = self._neighbours(brief, past)
         mean = past.mean[..., 0, :, :] + brief.dt * (own.velocity[..., None, :] - theirs)
         covariance = past.covariance[..., 0, :, :, :] + of_edges(brief) + brief.dt * brief.dt * doubt
-        observed = brief.sensor.observed(state.measured, mean, covariance)
-        mean, covariance, nis = kalman.correct(mean, covariance, *observed, state.seen)
+        R = brief.sensor.weight(state.measured, mean, covariance)
+        mean, covariance, nis = kalman.correct(mean, covariance, state.measured, R, state.seen)
         newer = Past(
             mean=_pushed(mean, past.mean, -3),
             covariance=_pushed(covariance, past.covariance, -4),

@@ -69,10 +69,7 @@ class Sensor:
         return true if self.says_positions else _swung(true, np.zeros((*true.shape[:-1], true.shape[-1] - 1)))
 
     def observed(self, measured: Array, expected: Array, doubt: Array) -> tuple[Array, Array]:
-        """Measurements as relative positions (..., D), and their covariances (..., D, D), in square metres.
-
-        Where the covariance of a position hangs on where it is, it is that at the position expected, once that is surer than
-        the measurement: taken at the measurement it hangs on the error, and draws a filter to one side.
+        """Measurements as relative positions (..., D), and their covariances (..., D, D), in square metres, as in `weight`.
 
         A direction says where across the line to where a thing is expected it is, at the distance at which it is expected, and
         next to nothing of how far: an extended Kalman filter's measurement of a bearing (Aidala, IEEE Transactions on Aerospace
@@ -87,12 +84,8 @@ class Sensor:
             Where the estimator takes things to be before this, shape (..., D), in metres, and the covariance of that, shape
             (..., D, D), in square metres.
         """
-        if self.reads == "coordinates":
-            return measured, self.spread(measured)
         if self.says_positions:
-            spread = self.spread(measured)
-            surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
-            return measured, np.where(surer[..., None, None], self._expected(expected, doubt), spread)
+            return measured, self.weight(measured, expected, doubt)
         distance = np.maximum(np.linalg.norm(expected, axis=-1, keepdims=True), _NEAREST)
         toward = expected / distance
         aside = measured - (measured * toward).sum(axis=-1, keepdims=True) * toward
@@ -100,6 +93,28 @@ class Sensor:
         line = toward[..., :, None] * toward[..., None, :]
         across = np.eye(measured.shape[-1]) - line
         return expected + distance * aside, squared * (self._variances[0] * across + _BLIND * _BLIND * line)
+
+    def weight(self, measured: Array, expected: Array, doubt: Array) -> Array:
+        """The covariances (..., D, D) by which a filter weighs measured positions (..., D), in square metres.
+
+        Where the covariance of a position hangs on where it is, it is that at the position expected, once that is surer than
+        the measurement: taken at the measurement it hangs on the error, and draws a filter to one side.
+
+        Parameters
+        ----------
+        measured, expected, doubt
+            As in `observed`.
+
+        Raises
+        ------
+        Unsuited
+            When it says directions alone.
+        """
+        spread = self.spread(measured)
+        if self.reads == "coordinates":
+            return spread
+        surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
+        return np.where(surer[..., None, None], self._expected(expected, doubt), spread)
 
     def require_positions(self) -> None:
         """Fail where it says none.

@@ -10,6 +10,7 @@ from importlib import resources
 import numpy as np
 import psutil
 import pytest
+from awaiting import PATIENCE, await_true
 from flying import PROCESSES
 from rerun.chunk import RrdReader
 
@@ -18,7 +19,6 @@ from netem.medium.medium import JOURNAL
 
 pytestmark = PROCESSES
 
-PATIENCE = 180.0
 SOON = 30.0  # what takes half a second on a quiet machine; a hang would take all of the patience
 
 
@@ -79,13 +79,6 @@ class Running:
         _, alive = psutil.wait_procs(self.children, timeout=PATIENCE)
         assert not alive
         return time.monotonic() - began, said, complained
-
-
-def await_true(condition, otherwise):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, otherwise
-        time.sleep(0.02)
 
 
 def moments(recording):

@@ -4,24 +4,15 @@ import json
 import signal
 import subprocess
 import sys
-import time
 
 import psutil
 import pytest
+from awaiting import PATIENCE, await_true
 from flying import PROCESSES
 from own_code import ESTIMATOR, broken
 
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from netem.medium import journal
-
-PATIENCE = 180.0
-
-
-def await_true(condition, otherwise):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, otherwise
-        time.sleep(0.02)
 
 
 def rows(book):

@@ -310,14 +310,15 @@ def refuse_those_of_another(path: Path, arrays: Arrays, world: World, channels: 
     """
     due = History(replace(world, ticks=0), channels, reports).arrays()
     for name in sorted(due.keys() | arrays.keys()):
-        said, wanted = _form(arrays.get(name)), _form(due.get(name))
+        said, wanted = form(arrays.get(name)), form(due.get(name))
         if said != wanted:
             raise Damaged(path, f"{name} is {said} in a tick, where its scenario makes it {wanted}")
     if (ticks := len(arrays["error"])) > world.ticks:
         raise Damaged(path, f"it has {ticks} ticks, where its scenario has {world.ticks}")
 
 
-def _form(array: NDArray[Any] | None) -> str:
+def form(array: NDArray[Any] | None) -> str:
+    """What kind of numbers an array has, and how many of them in a tick."""
     return "missing" if array is None else f"{array.dtype} {array.shape[1:]}"
 
 

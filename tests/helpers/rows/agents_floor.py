@@ -145,7 +145,9 @@ CASES = {
     "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)
     ),
-    "agents.algebra.kalman.normalised": of(kalman.normalised, real(NEIGHBOURS, 2), covariance(NEIGHBOURS, 2, 2)),
+    "agents.algebra.kalman.normalised": of(
+        kalman.normalised, real(NEIGHBOURS, 2), covariance(NEIGHBOURS, 2, 2), truth(NEIGHBOURS)
+    ),
     "agents.algebra.kalman.correct": of(
         lambda mean, spread, seen, usable: kalman.correct(mean, spread, seen, NOISE, usable),
         *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),

@@ -57,6 +57,7 @@ CASES = {
         for what, function, arguments in (
             ("measured", one.measured, (real(9, dimension), real(9, dimension))),
             ("spread", one.spread, (real(9, dimension),)),
+            ("weight", one.weight, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),
             ("observed", one.observed, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),
         )
     },

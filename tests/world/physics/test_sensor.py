@@ -266,12 +266,11 @@ def test_what_is_expected_at_hand_is_not_measured_without_error():
 def test_estimators_trust_every_measurement_by_its_own_covariance(name, dimension, monkeypatch):
     counted = []
 
-    def observed(sensor, *given, honest=Sensor.observed):
-        said = honest(sensor, *given)
-        counted.append(said[1])
-        return said
+    def weight(sensor, *given, honest=Sensor.weight):
+        counted.append(honest(sensor, *given))
+        return counted[-1]
 
-    monkeypatch.setattr(Sensor, "observed", observed)
+    monkeypatch.setattr(Sensor, "weight", weight)
     found = by_affinet("estimators")[name]
     estimator, rng = found.load()(), np.random.default_rng(9)
     sensor = ranging(*[0.1, 0.2, 0.3][:dimension])
