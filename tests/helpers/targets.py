@@ -16,6 +16,7 @@ from agents.estimators.target import TargetEstimator
 from agents.exchange import Heard
 from analysis.models.information import unpacked
 from analysis.models.pursuit import Sighting, Target
+from netem.core.channels import TARGET
 from world.physics.target import MovingTarget
 
 ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -125,3 +126,22 @@ class Textbook:
 
 OPTIMAL = TargetEstimator(output="optimal", fusion="none")
 SMOOTH = TargetEstimator(fusion="none")
+
+
+@cache
+def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
+    """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
+    target = target_of(order, latencies)
+    estimator = TargetEstimator(theta=10.0, **parameters)
+    chase_of, who = MovingTarget(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
+    chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
+    agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
+    state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
+    for tick in range(round(seconds / dt)):
+        sighting = chase_of.sighting(tick, 5, who, chase)
+        state, said = estimator.sense(agents, state, agents.relative, agents.present)
+        heard = {TARGET: Heard({"information": said[TARGET]["information"][neighbours]}, agents.present)}
+        state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=sighting))
+        flown.append((state, estimate, sighting, said))
+        chase = chase_of.step(tick, 5, who, chase)
+    return flown

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from briefs import HEXA4, REST, brief, hears, only
 from filterpy.kalman import KalmanFilter
-from flying import plan_of
 from offered import by_affinet
 
 from affinet.planning.making import make
-from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.run import rehearse
-from affinet.runtimes.side_by_side import side_by_side
 from affinet.scenario import loading
 from agents.algebra import inputs
 from agents.brief import Own
@@ -21,9 +18,7 @@ from agents.estimators.joint_kf import JointEdgeFilter, corrected
 from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.exchange import Heard
-from analysis.metrics.consistency import nees
 from netem.core.links import Links
-from world.books.history import History
 from world.formation.nominal import PRESETS
 
 DT = 0.1  # of the briefs
@@ -430,29 +425,3 @@ def test_padding_changes_nothing(kind, dimension):
         np.testing.assert_allclose(estimate.relative[:4], expected.relative, atol=1e-12)
         np.testing.assert_allclose(estimate.covariance[:4], expected.covariance, atol=1e-12)
     np.testing.assert_array_equal(estimate.known, only(6, 0, 1, 2, 3))
-
-
-# In flight
-
-
-HALF_BLIND = 'network.links=[{links="all",channels="sensing",availability=0.5}]'
-
-
-@pytest.mark.parametrize("estimator", ["edge-kf", "joint-kf"])
-def test_in_flight_the_filters_are_as_wrong_as_they_say(estimator):
-    runs = 150
-    coarse = ("time.dt=0.01", "time.duration=0.6", "dynamics.disturbance=0.02", "network.coupled=false")
-    plan = plan_of("rigid", *coarse, HALF_BLIND, f"agents.estimator={estimator}")
-    batch = side_by_side(plan, range(1, 1 + runs))
-    links, flown = batch.world.links, History(batch.world, len(batch.channels), batch.reports)
-    InProcessSwarm(batch).fly(flown.extend, 60)
-    arrays = flown.arrays()
-    position = arrays["position"][:-1]
-    off = arrays["estimate"] - (position[:, :, None] - position[:, links.neighbours])
-    for now in (0, 1, 5, 59):
-        wrong = nees(off[now], arrays["covariance"][now])
-        of_runs = np.array(
-            [wrong[links.present & (np.arange(10 * runs) // 10 == run)[:, None]].mean() for run in range(runs)]
-        )
-        # Edges of a run have their disturbances in common, and runs have nothing.
-        assert abs(of_runs.mean() - 2.0) < 4 * of_runs.std() / np.sqrt(runs) < 0.5

@@ -24,7 +24,7 @@ def covariance(dimension):
     return root @ root.T + 0.01 * np.eye(dimension)
 
 
-def sequence(dimension, edges=4, ticks=200):
+def sequence(dimension, edges=4, ticks=80):
     """Measurements of wandering edges (ticks, edges, D), and which of them are made."""
     rng = np.random.default_rng(dimension)
     return rng.normal(size=(ticks, edges, dimension)).cumsum(axis=0), rng.random((ticks, edges)) < 0.5

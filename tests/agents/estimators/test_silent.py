@@ -6,7 +6,6 @@ from flying import plan_of
 
 from affinet.runtimes.run import rehearse
 from affinet.scenario.sections import ScenarioError
-from affinet.studies.batch import fly_all
 from agents.brief import Own
 from agents.estimators.silent import SilentEdgeFilter
 from agents.exchange import Heard
@@ -14,7 +13,6 @@ from analysis.models.autoregressive import fit
 from netem.core.channels import INPUT
 
 COARSE = ("time.dt=0.01", "record.enabled=false")
-MUTE = ("network.coupled=false", 'network.links=[{links="all",channels="comms",availability=0.000001}]')
 
 
 QUIET = {INPUT: Heard({"velocity": np.zeros((8, 2))}, np.zeros(8, dtype=bool))}
@@ -67,18 +65,6 @@ def test_a_window_counts_ticks_from_one():
 def test_accelerations_are_refused(estimator):
     with pytest.raises(ScenarioError, match="it is for single integrators"):
         plan_of("ravine", f'agents.estimator="{estimator}"')
-
-
-def test_without_communication_it_beats_taking_neighbours_for_at_rest_and_not_the_clairvoyant():
-    rest = ('agents.estimator="edge-kf"', "agents.parameters.edge-kf.coefficients=[]", *MUTE)
-    cases = (('agents.estimator="edge-kf"',), ('agents.estimator="silent-kf"', *MUTE), rest)
-    errors = [
-        fly_all(plan_of("rigid", *COARSE, "time.duration=2", *case), range(1, 11), 1)
-        .quantities["estimation_error"][:, 10:]
-        .mean()
-        for case in cases
-    ]
-    assert errors[0] < 0.5 * errors[1] < 0.5 * errors[2]
 
 
 # ---- models of inputs

@@ -1,79 +1,19 @@
 """What agents make of what others found of a target: by consensus, and by the mean of what is heard."""
 
 from dataclasses import replace
-from functools import cache
-from itertools import pairwise
 from math import factorial
 
 import numpy as np
 import pytest
 from briefs import brief
-from targets import SMOOTH, Textbook, target_of, watch
+from targets import SMOOTH, Textbook, agreed, target_of, watch
 
 from agents.brief import Own
 from agents.estimators.target import TargetEstimator
 from agents.exchange import Heard
-from analysis.models.information import position, unpacked
+from analysis.models.information import unpacked
 from analysis.models.pursuit import Sighting
 from netem.core.channels import TARGET
-from world.physics.target import MovingTarget
-
-
-@cache
-def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
-    """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
-    target = target_of(order, latencies)
-    estimator = TargetEstimator(theta=10.0, **parameters)
-    chase_of, who = MovingTarget(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
-    chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
-    agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
-    state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))
-    for tick in range(round(seconds / dt)):
-        sighting = chase_of.sighting(tick, 5, who, chase)
-        state, said = estimator.sense(agents, state, agents.relative, agents.present)
-        heard = {TARGET: Heard({"information": said[TARGET]["information"][neighbours]}, agents.present)}
-        state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=sighting))
-        flown.append((state, estimate, sighting, said))
-        chase = chase_of.step(tick, 5, who, chase)
-    return flown
-
-
-def test_agents_agree_on_the_position_that_all_their_information_stands_for():
-    state, estimate, *_ = agreed()[-1]
-    ideal = position(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)
-    apart = np.abs(estimate.reports["found"] - ideal).max()
-    assert np.abs(estimate.reports["reference"][:, 0] - ideal).max() < apart / 50
-    assert np.abs(state.internal.sum(axis=0)).max() < 1e-6 * np.abs(state.internal).max()
-    Q = unpacked(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)[0]
-    np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=0.06)
-
-
-def test_what_is_said_is_the_agents_own_information_less_its_internals():
-    for (before, estimate, *_), (*_, said) in list(pairwise(agreed()))[::50]:
-        assert said[TARGET]["information"].shape == (3, 7)
-        assert np.isfinite(estimate.reports["information"]).all()
-        assert before.internal.shape == estimate.reports["fused"].shape == (3, 3, 7)
-    _, estimate, _, said = agreed()[-1]
-    # The internals of the tick before are in what was said; nothing was detected in this tick.
-    np.testing.assert_allclose(
-        said[TARGET]["information"], estimate.reports["information"][:, 0] - agreed()[-2][0].internal[:, 0], rtol=1e-9
-    )
-    # It is what is agreed on so far, with derivatives that are not said.
-    np.testing.assert_allclose(said[TARGET]["information"], estimate.reports["fused"][:, 0], rtol=1e-9)
-
-
-def test_derivatives_are_the_agents_own_where_wanted():
-    own = agreed(0.35, derivatives="own")
-    shared, alone = agreed()[349][1].reports, own[-1][1].reports
-    np.testing.assert_array_equal(shared["reference"][:, 0], alone["reference"][:, 0])
-    assert np.abs(shared["reference"][:, 1] - alone["reference"][:, 1]).max() > 1e-3
-    target = target_of(2, (400, 200))
-    agents = replace(brief(np.ones((3, 2, 2))), dt=1e-3, target=target)
-    nothing = np.zeros((3, 2))
-    idle = Sighting(nothing, np.zeros(3, dtype=bool), own[-1][0].method, own[-1][0].method)
-    _, by_itself = SMOOTH.fuse(agents, own[-1][0], {}, Own(nothing, nothing, int(own[-1][0].now[0]), sighting=idle))
-    np.testing.assert_allclose(alone["reference"][:, 1:], by_itself.reports["reference"][:, 1:], rtol=1e-9)
-    np.testing.assert_allclose(alone["found"], by_itself.reports["found"], rtol=1e-9)
 
 
 @pytest.mark.parametrize("fusion", ["redcho", "mean"])

@@ -1,13 +1,19 @@
-"""Over a thousand runs: estimates of a target are right on average, and as wrong as they say."""
+"""Targets as they are found over many ticks and a thousand runs: agreed on, right on average, as wrong as said."""
 
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from targets import informed, target_of, watch
+from briefs import brief
+from targets import SMOOTH, agreed, informed, target_of, watch
 
+from agents.brief import Own
 from agents.estimators.target import TargetEstimator
-from analysis.models.pursuit import diffusion, transition
+from analysis.models.information import position, unpacked
+from analysis.models.pursuit import Sighting, diffusion, transition
+from netem.core.channels import TARGET
 
 RUNS = 1000
 
@@ -74,3 +80,41 @@ def test_the_smooth_output_is_no_better_than_the_optimal_and_no_worse_than_it_sa
         for tick in done:
             # Just when a detection is done, all is as the prediction before has it.
             np.testing.assert_allclose(relative_to(moments[tick], said[tick].mean(axis=0)), 1.0, atol=0.14)
+
+
+def test_agents_agree_on_the_position_that_all_their_information_stands_for():
+    state, estimate, *_ = agreed()[-1]
+    ideal = position(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)
+    apart = np.abs(estimate.reports["found"] - ideal).max()
+    assert np.abs(estimate.reports["reference"][:, 0] - ideal).max() < apart / 50
+    assert np.abs(state.internal.sum(axis=0)).max() < 1e-6 * np.abs(state.internal).max()
+    Q = unpacked(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)[0]
+    np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=0.06)
+
+
+def test_what_is_said_is_the_agents_own_information_less_its_internals():
+    for (before, estimate, *_), (*_, said) in list(pairwise(agreed()))[::50]:
+        assert said[TARGET]["information"].shape == (3, 7)
+        assert np.isfinite(estimate.reports["information"]).all()
+        assert before.internal.shape == estimate.reports["fused"].shape == (3, 3, 7)
+    _, estimate, _, said = agreed()[-1]
+    # The internals of the tick before are in what was said; nothing was detected in this tick.
+    np.testing.assert_allclose(
+        said[TARGET]["information"], estimate.reports["information"][:, 0] - agreed()[-2][0].internal[:, 0], rtol=1e-9
+    )
+    # It is what is agreed on so far, with derivatives that are not said.
+    np.testing.assert_allclose(said[TARGET]["information"], estimate.reports["fused"][:, 0], rtol=1e-9)
+
+
+def test_derivatives_are_the_agents_own_where_wanted():
+    own = agreed(0.35, derivatives="own")
+    shared, alone = agreed()[349][1].reports, own[-1][1].reports
+    np.testing.assert_array_equal(shared["reference"][:, 0], alone["reference"][:, 0])
+    assert np.abs(shared["reference"][:, 1] - alone["reference"][:, 1]).max() > 1e-3
+    target = target_of(2, (400, 200))
+    agents = replace(brief(np.ones((3, 2, 2))), dt=1e-3, target=target)
+    nothing = np.zeros((3, 2))
+    idle = Sighting(nothing, np.zeros(3, dtype=bool), own[-1][0].method, own[-1][0].method)
+    _, by_itself = SMOOTH.fuse(agents, own[-1][0], {}, Own(nothing, nothing, int(own[-1][0].now[0]), sighting=idle))
+    np.testing.assert_allclose(alone["reference"][:, 1:], by_itself.reports["reference"][:, 1:], rtol=1e-9)
+    np.testing.assert_allclose(alone["found"], by_itself.reports["found"], rtol=1e-9)
