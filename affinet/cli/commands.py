@@ -205,7 +205,7 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
 
 
 def _study(parsed: argparse.Namespace) -> int:
-    from affinet.studies import judging, report  # pyarrow and matplotlib take a while to import
+    from affinet.studies import judging, record, report  # pyarrow and matplotlib take a while to import
     from affinet.studies import study as studies
 
     study = studies.load(parsed.study)
@@ -226,9 +226,9 @@ def _study(parsed: argparse.Namespace) -> int:
             if results:  # whatever happened meanwhile, what was flown is kept
                 report.save(out, study, results)
     try:
-        verdicts = judging.judge(study, results)
-        report.tell(out, verdicts)
-        show.claims(study, verdicts, out)
+        judged = record.recorded(study, results, judging.judge(study, results), quick=parsed.quick)
+        record.write(out, judged)
+        show.claims(judged, record.full_study(parsed.study), out)
         report.draw(out, study, results)
     except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
         log = report.failed(out)

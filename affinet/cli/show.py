@@ -19,13 +19,18 @@ from analysis.models.finding import Finding
 from netem.faults.control import Answer
 
 if TYPE_CHECKING:
-    from affinet.studies.study import Result, Study
+    from affinet.studies.record import StudyRecord
+    from affinet.studies.study import Result
     from affinet.testing.hunt import Counterexample, Coverage
     from affinet.testing.strategies import Entries
-    from analysis.claims.checks import ClaimVerdict
 
 _SAYS = "{task.fields[says]}"
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
+_DECISIONS = {
+    "holds": "[green]holds[/]",
+    "does not hold": "[red]does not hold[/]",
+    "undecided": "[yellow]undecided[/]",
+}
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
 
 
@@ -101,14 +106,18 @@ class Grid:
         self._bar.see(self._done, f"{self._done}/{self._cases} cases  {', '.join(result.labels.values())}")
 
 
-def claims(study: Study, verdicts: Sequence[ClaimVerdict], out: Path) -> None:
-    """What a study says of the claims it examines."""
-    table = Table("claim", "", "found", title=_plain(f"{study.title} ({study.source})"))
-    for verdict in verdicts:
-        holds = "[green]holds[/]" if verdict.holds else "[red]does not hold[/]"
-        table.add_row(_plain(verdict.says), holds, _plain(verdict.found))
+def claims(judged: StudyRecord, full: StudyRecord | None, out: Path) -> None:
+    """What a study says of the claims it examines, and where a quick one contradicts the full one."""
+    quick = f", quick: {judged.runs} runs of a coarse form" if judged.quick else ""
+    table = Table("claim", "", "found", title=_plain(f"{judged.title} ({judged.source}){quick}"))
+    for claim in judged.claims:
+        table.add_row(_plain(claim.says), _DECISIONS[claim.decision], _plain(claim.found))
     console = Console()
     console.print(table)
+    if judged.quick and full is not None:
+        for _, other in judged.contradicted(full):
+            said = f"{other.says}: in the full study, of {full.runs} runs, it {other.decision}: {other.found}"
+            console.print(_plain(said))
     console.print(_plain(f"data and figure in {out}"))
 
 

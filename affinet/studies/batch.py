@@ -43,7 +43,7 @@ class Runs:
     psi
         Convergence indicators (16) in those ticks, shape (R, T, N).
     quantities
-        By name, in those ticks, shape (R, T): `error`, the tracking error, NaN or infinite where a run has diverged; all of
+        By name, in those ticks, shape (R, T): `error`, the tracking error, infinite where a run has left the numbers; all of
         `affinet.verdicts.metrics`, NaN where no edge counts; and `report:name`, how long what the estimator reports is, in the
         mean over the agents awake.
 
@@ -117,7 +117,8 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         for instant in swarm.ticks():
             flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
             target = of_runs(together.world.goal(instant.tick, instant.scene))
-            tracking.append(errors.tracking_error(flown, target, present))
+            lost = (present & ~np.isfinite(flown).all(axis=-1)).any(axis=-1)
+            tracking.append(np.where(lost, np.inf, errors.tracking_error(flown, target, present)))
             places.measure(instant, plan.timeline)
             peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
         return np.array([over_time(one.runs, what, span) for one in of])
 
     other = [one for one in results if selected(one, claim.to or {})]
-    others = claim.to_quantity or quantity
+    others, paired = claim.to_quantity or quantity, _paired([*chosen, *other])
     seconds = chosen[0].runs.seconds
     values = np.concatenate([one.runs.quantities[quantity] for one in chosen])
     match claim.check:
@@ -71,10 +71,11 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
         case "approaches":
             return checks.approaches(claim.says, means(chosen), means(other), level)
         case "lower":
-            return checks.lower(claim.says, means(chosen), means(other, others), unit)
+            compared = np.broadcast_to(means(other, others), (len(chosen), len(other[0].runs.mean_error)))
+            return checks.lower(claim.says, means(chosen), compared, unit, paired=paired)
         case "ratio":
             (one,), (another,) = means(chosen), means(other, others)
-            return checks.ratio(claim.says, one, another, between)
+            return checks.ratio(claim.says, one, another, between, paired=paired)
         case "stays_below":
             return checks.stays_below(claim.says, seconds, values, level, span, unit)
         case "leaves":
@@ -83,7 +84,7 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
             return checks.exponential(claim.says, seconds, values, span)
         case "value":
             (one,) = means(chosen)
-            return checks.ratio(claim.says, one, np.full_like(one, level), between)
+            return checks.value(claim.says, one, level, between, unit)
         case "slower_with_anchor":
             return checks.never_above(claim.says, *graph_rates().T)
         case "indicator_below_error":
@@ -91,3 +92,11 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
             followers, limits, runs = one.followers, one.bounds, one.runs
             psi, error = (runs.psi - limits.offset)[:, :, followers], runs.quantities["error"]
             return checks.below_in_mean(claim.says, runs.seconds, psi, error[..., None] * limits.slope[followers])
+
+
+def _paired(results: Sequence[Result]) -> bool:
+    """Whether runs of the same number meet the same draws: of noise, disturbances, losses and a target, tick by tick."""
+    flown = [one.plan.scenario for one in results]
+    alike = ("seed", "formation", "sensing", "dynamics", "target")
+    ticks = {one.time.dt for one in flown}
+    return len(ticks) == 1 and all(getattr(one, name) == getattr(flown[0], name) for one in flown for name in alike)

@@ -6,9 +6,7 @@ row for each run, with what stands for each quantity over its time.
 
 from __future__ import annotations
 
-import json
 import traceback
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +14,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from affinet.runtimes import directories
+from affinet.studies import record
 from affinet.studies.judging import graph_rates
 from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Result, Study
-from analysis.claims.checks import ClaimVerdict
 from analysis.figures import curves, target
 from analysis.figures.curves import Curve
 from analysis.figures.target import TargetRun
@@ -27,7 +25,6 @@ from analysis.models.arrays import Array
 from analysis.models.information import reported, unpacked
 from netem.core.channels import PLACE
 
-_CLAIMS = "claims.json"
 _MOST_FLIGHTS = 8  # in one picture
 
 
@@ -42,7 +39,7 @@ def prepare(out: Path | str) -> Path:
     if isinstance(out, str):
         return directories.for_study(out)
     out.mkdir(parents=True, exist_ok=True)
-    if (out / _CLAIMS).exists():
+    if (out / record.FILE).exists():
         raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
     return out
 
@@ -56,11 +53,6 @@ def save(out: Path, study: Study, results: list[Result]) -> None:
 def _joined(tables: list[pa.Table]) -> pa.Table:
     """What only some cases have, estimators' reports, is null in the others."""
     return pa.concat_tables(tables, promote_options="default")
-
-
-def tell(out: Path, verdicts: list[ClaimVerdict]) -> None:
-    """Write the verdicts into a directory."""
-    (out / _CLAIMS).write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=2) + "\n")
 
 
 def failed(out: Path) -> Path:

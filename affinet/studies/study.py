@@ -102,6 +102,8 @@ class Claim(Section):
             raise ValueError(f"the check {self.check!r} has no use for {' and '.join(useless)}")
         if self.to_quantity is not None and self.to is None:
             raise ValueError("to_quantity is that of what is compared with: give to")
+        if self.check == "value" and 0.0 in (self.level, *(self.levels or {}).values()):
+            raise ValueError("a value is between multiples of its level: give one that is not 0")
         if self.levels is not None and (len(self.each) != 1 or self.level is not None):
             raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
         return self

@@ -1,7 +1,5 @@
 """What an estimator of a user's own reports is a quantity of a study: drawn, judged, written down. And metrics by name."""
 
-import json
-
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -14,7 +12,7 @@ from affinet.planning import making as planning
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
-from affinet.studies import study
+from affinet.studies import record, study
 from affinet.studies.batch import fly_all
 from affinet.verdicts import checkers
 from affinet.verdicts.metrics import METRICS
@@ -83,7 +81,8 @@ def test_a_study_draws_judges_and_writes_down_what_an_estimator_reports(own, cap
     only = STUDY.replace("NAME", name).replace(', rkf = ["agents.estimator=rkf"]', "")
     (folder / "ages.toml").write_text(only)
     assert commands.main(["study", str(folder / "ages.toml"), "--out", str(folder / "out")]) == 0, capsys.readouterr()
-    assert json.loads((folder / "out" / "claims.json").read_text())[0]["holds"]
+    (claim,) = record.read(folder / "out" / "claims.json").claims
+    assert claim.found.startswith("2 of 2 runs stay below 13")
     table = pq.read_table(folder / "out" / "curves.parquet").to_pydict()
     assert max(table["mean_report:age"]) <= 12.0
     assert "report:first" in pq.read_table(folder / "out" / "runs.parquet").column_names

@@ -1,20 +1,21 @@
 """Studies: their grid, their data, their figure and a verdict on every claim."""
 
-import json
+from functools import cache
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from flying import PROCESSES
+from flying import PROCESSES, plan_of
 from matplotlib.text import Text
 from PIL import Image
 from scipy.stats import chi2
 
 from affinet.cli import commands
 from affinet.scenario.sections import ScenarioError
-from affinet.studies import judging, report, study
+from affinet.studies import judging, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.quantities import NAMES, over_time
+from analysis.claims.intervals import Decision
 from analysis.figures import curves
 
 pytestmark = PROCESSES
@@ -64,7 +65,7 @@ def reported(out, what, results):
     """All that is written down of it, in a new directory."""
     out.mkdir()
     report.save(out, what, results)
-    report.tell(out, judging.judge(what, results))
+    record.write(out, record.recorded(what, results, judging.judge(what, results), quick=True))
     report.draw(out, what, results)
 
 
@@ -78,8 +79,12 @@ def tiny(tmp_path):
 def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     out = tmp_path / "out"
     assert commands.main(["study", str(tiny), "--quick", "--out", str(out)]) == 0
-    verdicts = json.loads((out / "claims.json").read_text())
-    assert [verdict["holds"] for verdict in verdicts] == [True, False]
+    judged = record.read(out / "claims.json")
+    assert (judged.title, judged.quick, judged.runs) == ("Tiny", True, 2)
+    # Two runs decide nothing: the means of both may be nothing at all.
+    assert [claim.decision for claim in judged.claims] == ["undecided", "undecided"]
+    assert [case.labels["estimator"] for case in judged.cases] == ["none", "none", "ga-rkf", "ga-rkf"]
+    assert all(case.low < case.found < case.high for case in judged.cases)
     moments, runs = (pq.read_table(out / f"{name}.parquet").to_pydict() for name in ("curves", "runs"))
     assert len(runs["run"]) == 2 * 2 * 2
     assert len(moments["seconds"]) == 2 * 2 * 20
@@ -89,7 +94,9 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     with Image.open(out / "figure.png") as figure:
         assert min(figure.size) > 300
     assert not (out / "consistency.png").exists()  # that goes with curves
-    assert "does not hold" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "undecided" in shown
+    assert "quick: 2 runs of a coarse form" in shown
 
 
 @pytest.mark.parametrize("name", study.shipped())
@@ -235,13 +242,21 @@ def pair(tmp_path):
     return study.load(str(path))
 
 
+RUNS = 50
+
+
+@cache
+def at_rest():
+    return plan_of("rigid")
+
+
 def made_up(labels, **values_of):
     """A case whose runs hold these values, over four seconds."""
-    shape = (5, 4)
+    shape = (RUNS, 4)
     rest = {name: np.full(shape, 7e7) for name in NAMES}
     rest |= {name: np.broadcast_to(values, shape) for name, values in values_of.items()}
-    runs = Runs(np.arange(4.0), mean_error=np.full(5, 9e9), psi=np.zeros((5, 4, 10)), first={}, quantities=rest)
-    return study.Result(labels, None, runs)
+    runs = Runs(np.arange(4.0), mean_error=np.full(RUNS, 9e9), psi=np.zeros((RUNS, 4, 10)), first={}, quantities=rest)
+    return study.Result(labels, at_rest(), runs)
 
 
 LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "behind", "effort"}
@@ -250,7 +265,7 @@ LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "behind", "effo
 @pytest.mark.parametrize("span", [(0.0, None), (1.0, None), (0.0, 2.0), (1.5, 3.0)], ids=str)
 @pytest.mark.parametrize("quantity", NAMES)
 def test_what_stands_for_a_run_over_time_is_the_mean_the_root_mean_square_or_the_largest(quantity, span):
-    values = np.random.default_rng(1).uniform(1.0, 5.0, (5, 4))
+    values = np.random.default_rng(1).uniform(1.0, 5.0, (RUNS, 4))
     since, until = span
     inside = values[:, [second for second in range(4) if since <= second <= (until or 9.0)]]
     expected = inside.mean(axis=1)
@@ -259,7 +274,7 @@ def test_what_stands_for_a_run_over_time_is_the_mean_the_root_mean_square_or_the
     elif quantity in ROOTS:
         expected = np.sqrt((inside**2).mean(axis=1))
     elif quantity == "error" and span == (0.0, None):
-        expected = np.full(5, 9e9)  # that over all ticks, and not over those kept
+        expected = np.full(RUNS, 9e9)  # that over all ticks, and not over those kept
     found = over_time(made_up({}, **{quantity: values}).runs, quantity, span)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
@@ -277,10 +292,10 @@ def test_a_claim_is_judged_by_its_quantity_or_else_by_that_of_the_study(pair):
         made_up(labels[1], procrustes=0.1, estimation_error=later, covariance_trace=0.04),
     ]
     verdicts = judging.judge(pair, results)
-    assert [verdict.holds for verdict in verdicts] == [True, True, False, True]
-    assert verdicts[0].found.startswith("ratio 0.5,")
-    assert verdicts[1].found.startswith("ratio 0.333,")
-    assert verdicts[2].found.startswith("ratio 0.667,")
+    assert [verdict.decision for verdict in verdicts] == ["holds", "holds", "does not hold", "holds"]
+    assert verdicts[0].found.startswith("ratio 0.5 (")
+    assert verdicts[1].found.startswith("ratio 0.333 (")
+    assert verdicts[2].found.startswith("ratio 0.667 (")
 
 
 PRINTED = """
@@ -310,16 +325,16 @@ def test_a_claim_with_levels_is_judged_for_each_label_by_its_own(tmp_path):
     results = [made_up(one, agreed=values[one["estimator"]]) for one in labels]
     rkf, mle = judging.judge(printed, results)
     assert (rkf.says, mle.says) == ("RKF: the error printed, 0.25 m", "MLE: the error printed, 0.5 m")
-    assert (rkf.holds, mle.holds) == (False, True)
-    assert rkf.found.startswith("ratio 1.2,")
-    assert mle.found.startswith("ratio 1,")
+    assert (rkf.decision, mle.decision) == ("does not hold", "holds")
+    assert rkf.found.startswith("0.3 (0.3 to 0.3) m, asked 0.247 to 0.253")
+    assert mle.found.startswith("0.5 (")
 
 
 def test_a_claim_with_levels_says_nothing_of_other_labels(tmp_path):
     printed = claiming(tmp_path, PRINTED.replace("RKF = 0.25, MLE = 0.5", "MLE = 0.5"))
     results = [made_up(case.labels, agreed=0.5) for case in study.cases(printed, quick=True)]
     (verdict,) = judging.judge(printed, results)
-    assert (verdict.says, verdict.holds) == ("MLE: the error printed, 0.5 m", True)
+    assert (verdict.says, verdict.decision) == ("MLE: the error printed, 0.5 m", Decision.HOLDS)
 
 
 def test_a_level_of_a_label_that_there_is_not_is_named(tmp_path):
@@ -446,7 +461,7 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path,
     traces = np.array(moments["mean_covariance_trace"]).reshape(2, 20)
     assert np.ptp(traces[0]) < 1e-12 < 0.1 < traces[1, 0] / traces[0, 0]
     assert traces[1, -1] < 0.2 * traces[0, -1]
-    assert json.loads((tmp_path / "out" / "claims.json").read_text())[0]["found"].startswith("ratio")
+    assert record.read(tmp_path / "out" / "claims.json").claims[0].found.startswith("ratio")
     # Nothing is filtered by MLE; the filter, and the measurement as an estimate, are as wrong as they say.
     nees, nis = (np.array(moments[f"mean_{name}"]).reshape(2, 20) for name in ("nees", "nis"))
     assert np.isnan(nis[0]).all()
@@ -501,9 +516,9 @@ def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, dra
     path.write_text(SWEEP)
     swept = study.load(str(path))
     rng = np.random.default_rng(1)
-    early = np.full((5, 1), 1e3)  # too early to count
+    early = np.full((RUNS, 1), 1e3)  # too early to count
     results = [
-        made_up(case.labels, peak=np.hstack([early, rng.uniform(1.0, 2.0, (5, 3))]))
+        made_up(case.labels, peak=np.hstack([early, rng.uniform(1.0, 2.0, (RUNS, 3))]))
         for case in study.cases(swept, quick=True)
     ]
     reported(tmp_path / "out", swept, results)

@@ -1,0 +1,133 @@
+"""What is kept of a study's verdicts: read as it was written, of which grid it is, and where a quick one contradicts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flying import plan_of
+
+from affinet.cli import show
+from affinet.scenario.sections import ScenarioError
+from affinet.studies import judging, record, study
+from affinet.studies.batch import fly_all
+from affinet.studies.record import JudgedClaim, StudyRecord
+from analysis.claims.checks import ClaimVerdict
+from analysis.claims.intervals import Decision
+
+STUDY = """
+title = "Two lengths of ticks"
+source = "nobody"
+figure = "curves"
+scenario = "rigid"
+quantity = "procrustes"
+set = ["time.duration=0.2"]
+full = { runs = 4 }
+quick = { runs = 3 }
+axes = [
+  { name = "graph", values = { hexa10 = [] } },
+  { name = "dt", values = { short = ["time.dt=0.01"], long = ["time.dt=0.02"] } },
+  { name = "estimator", values = { mle = ['agents.estimator="mle"'], rkf = ["agents.estimator=rkf"] } },
+]
+
+[[claims]]
+says = "paired"
+check = "lower"
+each = ["dt"]
+of = { estimator = "rkf" }
+to = { estimator = "mle" }
+
+[[claims]]
+says = "apart"
+check = "lower"
+of = { estimator = "rkf", dt = "short" }
+to = { estimator = "rkf", dt = "long" }
+"""
+
+
+@pytest.fixture
+def two(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(STUDY)
+    return study.load(str(path))
+
+
+def test_cases_of_other_ticks_are_not_called_paired(two):
+    results = [*study.fly(study.plans(two, quick=True), 3)]
+    *paired, apart = judging.judge(two, results)
+    assert apart.found.endswith("of runs with draws of their own")
+    assert not any("draws" in one.found for one in paired)
+
+
+@pytest.mark.parametrize(
+    "over",
+    ["seed=2", "time.dt=0.02", "sensing={sigma=0.2}", "dynamics={}", "formation.spread=2.0"],
+)
+def test_runs_are_paired_where_they_meet_the_same_draws(over):
+    def result(*overrides):
+        return study.Result({}, plan_of("rigid", "time.dt=0.01", *overrides), None)
+
+    assert judging._paired([result(), result("agents.estimator=rkf", "network.availability=0.5")])
+    assert not judging._paired([result(), result(over)])
+
+
+def test_it_is_read_as_it_was_written_and_what_is_no_number_is_null(two, tmp_path):
+    results = [*study.fly(study.plans(two, quick=True)[:1], 1)]
+    kept = record.recorded(two, results, [ClaimVerdict("s", Decision.UNDECIDED, "f")], quick=True)
+    record.write(tmp_path, kept)
+    assert record.read(tmp_path / record.FILE) == kept
+    (mean,) = kept.cases
+    assert mean.quantity == "procrustes"
+    assert (mean.low, mean.high) == (None, None)  # of a single run
+    assert mean.found > 0.0
+
+
+def test_a_grid_is_what_flies_and_not_what_is_said_of_it(two):
+    claims, axes = two.model_copy(update={"claims": []}), two.model_copy(update={"axes": two.axes[:2]})
+    grids = {record.grid(one, quick=quick) for one in (two, claims) for quick in (True, False)}
+    assert len(grids) == 2
+    assert record.grid(axes, quick=True) not in grids
+
+
+def judged(quick, **decisions):
+    claims = [JudgedClaim(says=says, decision=Decision(said), found=f"as {said}") for says, said in decisions.items()]
+    return StudyRecord(title="t", source="s", flown="", quick=quick, runs=3, confidence=0.99, claims=claims, cases=[])
+
+
+def test_a_quick_study_says_where_it_contradicts_the_full_one(tmp_path, capsys):
+    quick = judged(True, one="holds", two="undecided", three="does not hold", four="holds", five="holds")
+    full = judged(False, one="does not hold", two="holds", three="does not hold", four="holds")
+    show.claims(quick, full, tmp_path)
+    shown = capsys.readouterr().out
+    assert "quick: 3 runs of a coarse form" in shown
+    assert "one: in the full study, of 3 runs, it does not hold: as does not hold" in shown
+    assert shown.count("in the full study") == 1
+    show.claims(judged(False, one="holds"), full, tmp_path)
+    assert "quick:" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", [name for name in study.shipped() if record.full_study(name)])
+def test_full_verdicts_that_come_with_affinet_are_of_the_claims_of_their_studies(name):
+    full, shipped = record.full_study(name), study.load(name)
+    assert not full.quick
+    assert full.runs == shipped.full.runs
+    said = [claim.says for claim in full.claims]
+    assert said == [claim.says for one in shipped.claims for claim in judging._spelled_out(shipped, one)]
+
+
+def test_a_value_has_no_multiples_of_nothing(tmp_path):
+    path = tmp_path / "nothing.toml"
+    path.write_text(
+        STUDY.replace('check = "lower"\nof', 'check = "value"\nbetween = [0.9, 1.1]\nlevel = 0.0\nof').replace(
+            'to = { estimator = "rkf", dt = "long" }\n', ""
+        )
+    )
+    with pytest.raises(ScenarioError, match="give one that is not 0"):
+        study.load(str(path))
+
+
+def test_a_run_that_leaves_the_numbers_is_infinitely_far_off():
+    plan = plan_of("rigid", "time.dt=0.05", "time.duration=60", "record.enabled=false")
+    runs = fly_all(replace(plan, law=replace(plan.law, parameters={"alpha": 1000.0})), [1, 2], 10)  # which no scenario may ask for
+    assert not np.isnan(runs.quantities["error"]).any()
+    assert np.isinf(runs.quantities["error"][:, -1]).all()
+    assert np.isinf(runs.mean_error).all()
