@@ -27,8 +27,8 @@ class RecordOptions:
         Whether to make a recording.
     viewer
         URL of a viewer to stream to.
-    localizes, pursues
-        Whether agents report where they believe they are, and where a target is.
+    localizes, pursues, perceives
+        Whether agents report where they believe they are, where a target is, and the map Theta that they perceive.
     """
 
     every: int
@@ -37,6 +37,7 @@ class RecordOptions:
     viewer: str | None
     localizes: bool
     pursues: bool
+    perceives: bool
 
     @property
     def batch(self) -> int:

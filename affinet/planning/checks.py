@@ -134,10 +134,12 @@ def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
 
 def _connected(formation: Formation) -> Finding:
     B = stress.incidence(formation.agents, formation.edges)
-    with_first = reached((B @ B.T) != 0.0)[0]
+    laplacian = B @ B.T
+    with_first = reached(laplacian != 0.0)[0]
     if with_first.all():
-        edges = len(formation.edges)
-        return Finding("graph", "ok", f"{formation.agents} agents, {edges} undirected edges, connected")
+        edges, connectivity = len(formation.edges), np.linalg.eigvalsh(laplacian)[1]
+        says = f"{formation.agents} agents, {edges} undirected edges, algebraic connectivity {connectivity:.3f}"
+        return Finding("graph", "ok", says)
     apart = (np.flatnonzero(~with_first) + 1).tolist()
     return Finding("graph", "error", f"the graph is disconnected: agents {apart} cannot be reached from agent 1")
 

@@ -96,7 +96,15 @@ class Plan:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
         pursues = self.world.pursuit is not None and reported(self.reports)
-        return RecordOptions(record.every, self.window, record.enabled, viewer, channels.PLACE in self.reports, pursues)
+        return RecordOptions(
+            every=record.every,
+            window=self.window,
+            record=record.enabled,
+            viewer=viewer,
+            localizes=channels.PLACE in self.reports,
+            pursues=pursues,
+            perceives=self.reports.get(channels.THETA) == (self.world.formation.dimension,) * 2,
+        )
 
     @property
     def window(self) -> int:

@@ -14,13 +14,17 @@ from affinet.runtimes.inprocess import BatchTick, InProcessSwarm
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.verdicts.metrics import METRICS, seen
 from analysis.metrics import errors
+from analysis.metrics.indicator import Bounds, bounds
 from analysis.metrics.localization import centroid, distance, ringing
 from analysis.models.arrays import Array, Mask
+from analysis.models.graph import adjacency
 from analysis.models.information import position, reported
 from analysis.models.jacobi import EdgeInformation, weights
 from analysis.models.reports import NIS
 from netem.core import channels
+from netem.faults import lie
 from netem.faults.timeline import Timeline
+from netem.medium.verdict import Verdict, VerdictCodes
 from world.books.history import Moment
 from world.books.localized import FirstMeasurements
 
@@ -42,6 +46,9 @@ class Runs:
         Tracking error (15), its mean over all ticks of each run, shape (R,), in square metres.
     psi
         Convergence indicators (16) in those ticks, shape (R, T, N).
+    bounds
+        Slopes and offsets (18) of the graph of each of those ticks, shape (R, T, N) each; NaN where a map is not told, or
+        sensors read no coordinates.
     quantities
         By name, in those ticks, shape (R, T): `error`, the tracking error, infinite where a run has left the numbers; all of
         `affinet.verdicts.metrics`, NaN where no edge counts; and `report:name`, how long what the estimator reports is, in the
@@ -65,8 +72,17 @@ class Runs:
     seconds: Array
     mean_error: Array
     psi: Array
+    bounds: Bounds
     quantities: Mapping[str, Array]
     first: Mapping[str, Array]
+
+    @property
+    def corrected(self) -> Array:
+        """Mean indicators over the runs, corrected by their mean bounds, (psi - b) / c, shape (T, N), in square metres."""
+        defined = np.isfinite(self.bounds.slope)
+        excess = np.where(defined, self.psi - self.bounds.offset, 0.0).sum(axis=0)
+        slope = np.where(defined, self.bounds.slope, 0.0).sum(axis=0)
+        return np.where(slope > 0.0, excess / np.where(slope > 0.0, slope, 1.0), np.nan)
 
     def together(self, other: Runs) -> Runs:
         """These runs and others of the same ticks."""
@@ -74,6 +90,7 @@ class Runs:
             seconds=self.seconds,
             mean_error=np.concatenate([self.mean_error, other.mean_error]),
             psi=np.concatenate([self.psi, other.psi]),
+            bounds=Bounds(*(np.concatenate(both) for both in zip(self.bounds, other.bounds, strict=True))),
             quantities={
                 name: np.concatenate([values, other.quantities[name]]) for name, values in self.quantities.items()
             },
@@ -106,12 +123,16 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     tracking: list[Array] = []
     kept: list[dict[str, Array]] = []
     psi: list[Array] = []
+    limits: list[Bounds] = []
     first: list[dict[str, Array]] = []
     peak = np.zeros(len(seeds))
     places = _Places(plan, len(seeds))
 
     def of_runs(array: Any) -> Any:
         return array.reshape(len(seeds), size, *array.shape[1:])
+
+    def of_links(array: Any) -> Any:
+        return np.moveaxis(array.reshape(len(array), len(seeds), -1), 0, 1)
 
     with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
         for instant in swarm.ticks():
@@ -128,6 +149,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
                 pursued = _pursued(together, awake, moment, of_runs)
                 kept.append({"peak": peak, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
                 psi.append(of_runs(moment.psi))
+                limits.append(_bounds(plan, present, of_links(moment.entry.verdicts)))
                 first.append(_shown(plan, moment))
                 places.keep(moment)
                 peak = np.zeros(len(seeds))
@@ -137,6 +159,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
         mean_error=mean_error,
         psi=np.stack(psi, axis=1),
+        bounds=Bounds(*(np.stack(each, axis=1) for each in zip(*limits, strict=True))),
         quantities={
             "error": error[:, ::every],
             **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
@@ -144,6 +167,19 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         },
         first={name: np.stack([one[name] for one in first]) for name in first[0]},
     )
+
+
+def _bounds(plan: Plan, present: Mask, verdicts: VerdictCodes) -> Bounds:
+    """Those of the indicators in a tick in which links fared so, (R, C, L), and these agents were present, (R, N)."""
+    world = plan.world
+    if lie.CHANNEL not in plan.channels or world.sensor.reads != "coordinates":
+        return Bounds(*np.full((2, *present.shape), np.nan))
+    links, delivered = world.links, verdicts == Verdict.DELIVERED
+    seen, heard = (
+        adjacency(delivered[:, channel], links.src, links.dst, links.agents)
+        for channel in (0, plan.channels.index(lie.CHANNEL))
+    )
+    return bounds(world.formation.nominal, heard, world.sensor.common, seen, present)
 
 
 class _Places:

@@ -29,8 +29,9 @@ _PANELS = {
     "map": "one for panels, one for rows, one for columns",
     "sweep": "one for panels, one for the curves, and the one that it runs along",
 }
-_ONE_CASE = {"ratio", "value", "indicator_below_error"}  # checks of a single case
-_SPREAD = {"lower", "ratio", "value", "indicator_below_error"}  # checks that need more than one run
+_INDICATED = {"indicator_below_error", "indicator_follows_error"}
+_ONE_CASE = {"ratio", "value", *_INDICATED}  # checks of a single case
+_SPREAD = {"lower", "ratio", "value", *_INDICATED}  # checks that need more than one run
 _PLACES = {"localization", "drift", "ringing"}
 _PURSUED = {"found", "agreed", "ideal", "apart", "behind", "effort"}
 
@@ -89,7 +90,7 @@ def of_plans(study: Study, planned: Sequence[Planned], every: Sequence[int]) -> 
             yield from _quantity(f"{key}.quantity", claim.quantity or study.quantity, flown)
             yield from _quantity(f"{key}.to_quantity", claim.to_quantity or claim.quantity or study.quantity, others)
             yield from _span(f"{key}.since", (claim.since, claim.until), [*flown, *others], moments)
-            if claim.check == "indicator_below_error":
+            if claim.check in _INDICATED:
                 yield from _maps(f"{key}.check", flown)
             if len({len(moments[id(plan)]) for _, plan in flown}) > 1:
                 yield (

@@ -31,7 +31,7 @@ def judge(study: Study, results: list[Result]) -> list[ClaimVerdict]:
         When a claim looks at what was not flown.
     """
     verdicts = []
-    for claim in itertools.chain.from_iterable(_spelled_out(study, claim) for claim in study.claims):
+    for claim in itertools.chain.from_iterable(spelled_out(study, claim) for claim in study.claims):
         try:
             verdicts.append(_judge(claim, results, claim.quantity or study.quantity))
         except ValueError as error:
@@ -39,7 +39,7 @@ def judge(study: Study, results: list[Result]) -> list[ClaimVerdict]:
     return verdicts
 
 
-def _spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
+def spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
     """A claim for each label of the axes it is for."""
     for where in claim.settings(study.axes):
         labels = list(where.values())
@@ -89,9 +89,13 @@ def _judge(claim: Claim, results: list[Result], quantity: Quantity) -> ClaimVerd
             return checks.never_above(claim.says, *graph_rates().T)
         case "indicator_below_error":
             (one,) = chosen
-            followers, limits, runs = one.followers, one.bounds, one.runs
-            psi, error = (runs.psi - limits.offset)[:, :, followers], runs.quantities["error"]
-            return checks.below_in_mean(claim.says, runs.seconds, psi, error[..., None] * limits.slope[followers])
+            slope, offset = (each[..., one.followers] for each in one.runs.bounds)
+            excess, bound = one.runs.psi[..., one.followers] - offset, slope * one.runs.quantities["error"][..., None]
+            return checks.below_in_mean(claim.says, seconds, excess, bound, np.isfinite(slope))
+        case "indicator_follows_error":
+            (one,) = chosen
+            psi, slope = one.runs.psi[..., one.followers], one.runs.bounds.slope[..., one.followers]
+            return checks.follows(claim.says, seconds, psi, one.runs.quantities["error"], np.isfinite(slope), span)
 
 
 def _paired(results: Sequence[Result]) -> bool:

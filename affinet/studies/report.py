@@ -88,9 +88,8 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
         curves.settings(out / "figure.png", study.title, drawn, axes)
     else:
         (one,) = results
-        corrected = (one.runs.psi - one.bounds.offset) / one.bounds.slope
         numbers = np.flatnonzero(one.followers)
-        path, seen = out / "figure.png", corrected[:, :, numbers]
+        path, seen = out / "figure.png", one.runs.corrected[:, numbers]
         curves.indicator(
             path, study.title, one.runs.seconds, one.runs.quantities["error"], seen, (numbers + 1).tolist()
         )

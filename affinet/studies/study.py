@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from affinet.planning import making as planning
@@ -30,9 +29,7 @@ from affinet.studies.batch import Runs, fly_all
 from affinet.studies.checks import Wrong
 from affinet.studies.pool import in_processes
 from affinet.studies.quantities import Quantity
-from analysis.metrics.indicator import Bounds, bounds
 from analysis.models.arrays import Mask
-from analysis.models.graph import adjacency
 from netem.processes.user_code import UserCodeError
 
 Labels = dict[str, str]
@@ -73,6 +70,7 @@ class Claim(Section):
         "stays_below",
         "leaves",
         "indicator_below_error",
+        "indicator_follows_error",
         "lower",
         "ratio",
         "exponential",
@@ -198,13 +196,6 @@ class Result:
     def followers(self) -> Mask:
         """Who is no leader, shape (N,)."""
         return ~self.plan.world.formation.is_leader
-
-    @property
-    def bounds(self) -> Bounds:
-        """Those of the indicator (18) where nothing is lost."""
-        world = self.plan.world
-        heard = adjacency(np.ones(len(world.links), dtype=bool), world.links.src, world.links.dst, world.links.agents)
-        return bounds(world.formation.nominal, heard, world.sensor.common)
 
 
 def shipped() -> list[str]:

@@ -86,7 +86,9 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
         corrected = kalman.correct(*self.ahead(brief, state.tracks), observed.relative, R, usable)
         nis = np.where(seen, corrected.nis, np.nan)  # what the shape says is no measurement
         tracks = Tracks(*corrected._replace(nis=nis), state.tracks.known | usable)
-        return Fusion(tracks, shape), self.estimate(brief, tracks, observed.psi)._replace(feasible=observed.feasible)
+        filtered = self.estimate(brief, tracks, observed.psi)
+        reports = {**filtered.reports, **observed.reports}
+        return Fusion(tracks, shape), filtered._replace(feasible=observed.feasible, reports=reports)
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Those of the geometry."""

@@ -78,7 +78,7 @@ class RelativeAffineLocalization(Estimator[Perceived]):
 
 
 def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric: Array, psi: Array) -> Estimate:
-    """Measured edges as measured, the others from a shape (Algorithm 2, lines 9-13, by the errata).
+    """Measured edges as measured, the others from a shape (Algorithm 2, lines 9-13, by the errata), which is reported.
 
     Parameters
     ----------
@@ -95,4 +95,5 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
     relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))
     covariance = np.where(seen[..., None, None], brief.sensor.common, geometric)
     known = brief.present & (seen | shape.feasible[..., None])
-    return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible)
+    theta = np.where(shape.feasible[..., None, None], shape.theta, np.nan)
+    return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible, reports={THETA: theta})

@@ -20,6 +20,8 @@ _MOST = 0.9  # of the runs
 _DOUBLE = 2.0
 _STRAIGHT = 0.99
 _FEWEST_MOMENTS = 5  # of a line that is found, not drawn
+_PARTS = 10  # of the runs, for what only means over runs show
+_HIGH = 0.9  # a correlation
 _ROUNDING = 1e-9  # differences below this share are none
 
 
@@ -183,14 +185,25 @@ def never_above(says: str, values: Array, bounds: Array) -> ClaimVerdict:
     return ClaimVerdict(says, Decision.HOLDS if sure else Decision.UNDECIDED, found)
 
 
-def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> ClaimVerdict:
-    """Values (R, T, N) lie below a bound (R, T, 1) in the mean over the runs, at all moments at once."""
-    runs, excess = len(values), values - bound
-    mean = excess.mean(axis=0)
-    reach = np.full_like(mean, np.inf)
-    if runs > 1:
-        quantile = -special.stdtrit(runs - 1, (1.0 - CONFIDENCE) / (2.0 * mean.size))
-        reach = quantile * excess.std(axis=0, ddof=1) / np.sqrt(runs)
+def below_in_mean(says: str, seconds: Array, values: Array, bound: Array, defined: Mask) -> ClaimVerdict:
+    """Values (R, T, N) lie below a bound (R, T, N) in the mean over the runs, at all moments at once.
+
+    Parameters
+    ----------
+    says, seconds
+        The claim, and the moments, shape (T,).
+    values, bound
+        Of the runs, shape (R, T, N).
+    defined
+        Where there is a value at all, shape (R, T, N): the mean is over these; two runs at a moment are the fewest.
+    """
+    number = defined.sum(axis=0)
+    excess = np.where(defined, values - bound, 0.0)
+    mean = excess.sum(axis=0) / np.maximum(number, 1)
+    variance = np.where(defined, whole_power(excess - mean, 2), 0.0).sum(axis=0) / np.maximum(number - 1, 1)
+    with np.errstate(invalid="ignore"):
+        quantile = -special.stdtrit(np.maximum(number - 1, 1), (1.0 - CONFIDENCE) / (2.0 * mean.size))
+        reach = np.where(number > 1, quantile * np.sqrt(variance / np.maximum(number, 1)), np.inf)
     above = np.argwhere(mean - reach > 0.0)
     if len(above):
         tick, which = above[0]
@@ -201,6 +214,48 @@ def below_in_mean(says: str, seconds: Array, values: Array, bound: Array) -> Cla
         f"at {below.all(axis=1).sum()} of {len(seconds)} moments, for all {values.shape[-1]}; closest {mean.max():.3g}"
     )
     return ClaimVerdict(says, Decision.HOLDS if below.all() else Decision.UNDECIDED, found)
+
+
+def follows(says: str, seconds: Array, values: Array, others: Array, defined: Mask, span: Span) -> ClaimVerdict:
+    """Over a span of seconds, values rise and fall with others: the rank correlation of their means over runs is high.
+
+    It is that over each of ten parts of the runs, so that it has an interval.
+
+    Parameters
+    ----------
+    says, seconds
+        The claim, and the moments, shape (T,).
+    values, others
+        Of the runs, shapes (R, T, N) and (R, T).
+    defined
+        Where there is a value at all, shape (R, T, N): means are over these.
+    span
+        In seconds.
+    """
+    if len(values) < 2 * _PARTS:
+        return ClaimVerdict(says, Decision.UNDECIDED, f"{len(values)} runs are not ten parts of two or more")
+    inside = within(seconds, span)
+    parts = [np.arange(part, len(values), _PARTS) for part in range(_PARTS)]
+    counted = np.where(defined, values, 0.0)[:, inside]
+    number = np.stack([defined[part][:, inside].sum(axis=0) for part in parts])
+    total = np.stack([counted[part].sum(axis=0) for part in parts])
+    one = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    other = np.stack([others[part][:, inside].mean(axis=0) for part in parts])
+    with np.errstate(invalid="ignore"):
+        found = [intervals.mean(_rank_correlation(one[..., which], other)) for which in range(one.shape[-1])]
+    least = min(found, key=lambda each: each.low)
+    decision = all_of(each.decide(least=_HIGH) for each in found)
+    return ClaimVerdict(says, decision, f"least rank correlation {least}, asked {_HIGH:g}")
+
+
+def _rank_correlation(values: Array, others: Array) -> Array:
+    """Spearman's, of series (P, T), shape (P,); NaN where a value is none."""
+    ranks = [each.argsort(axis=1).argsort(axis=1).astype(np.float64) for each in (values, others)]
+    one, other = (each - each.mean(axis=1, keepdims=True) for each in ranks)
+    correlation = (one * other).sum(axis=1) / np.sqrt(
+        whole_power(one, 2).sum(axis=1) * whole_power(other, 2).sum(axis=1)
+    )
+    return np.where(np.isfinite(values).all(axis=1) & np.isfinite(others).all(axis=1), correlation, np.nan)
 
 
 def _either_side(seconds: Array, error: Array, level: float, span: Span) -> tuple[Mask, Mask]:

@@ -187,11 +187,11 @@ def sweep(
 
 
 def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: Array, numbers: Sequence[int]) -> None:
-    """Mean tracking error (R, T), and mean corrected indicators (R, T, F) of the followers with these numbers."""
+    """Mean tracking error (R, T), and corrected indicators (T, F) of the followers with these numbers."""
     figure = Figure(figsize=(4.6, 3.0), layout="constrained", dpi=160)
     panel = figure.subplots()
     for place, number in enumerate(numbers):
-        panel.plot(seconds, _positive(corrected[:, :, place].mean(axis=0)), lw=0.8, label=f"agent {number}")
+        panel.plot(seconds, _positive(corrected[:, place]), lw=0.8, label=f"agent {number}")
     panel.plot(seconds, error.mean(axis=0), color="black", lw=1.2, label="tracking error")
     _finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
     figure.savefig(path)

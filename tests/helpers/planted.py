@@ -91,7 +91,8 @@ def _exponential(rng: _Rng, by: float) -> ClaimVerdict:
 
 def _below_in_mean(rng: _Rng, by: float) -> ClaimVerdict:
     noise = 0.2 * rng.standard_normal((2, RUNS, len(_SECONDS), 1))
-    return checks.below_in_mean("", _SECONDS, 1.0 - by + noise[0], 1.0 + noise[1])
+    everywhere = np.ones(noise[0].shape, dtype=bool)
+    return checks.below_in_mean("", _SECONDS, 1.0 - by + noise[0], 1.0 + noise[1], everywhere)
 
 
 PLANTED = [

@@ -65,6 +65,7 @@ class RunWriter:
                 world=world,
                 localizes=books.localizes,
                 pursues=books.pursues,
+                perceives=books.perceives,
                 every=books.every,
                 viewer=books.viewer,
             )

@@ -27,6 +27,7 @@ from world.books.realised import Realised
 from world.formation.nominal import Formation
 from world.physics.world import World
 from world.recording.file import NotRecorded, make_room, writing, wrong_with
+from world.recording.perceived import PerceivedFormations
 from world.recording.places import Places
 from world.recording.stage import TIMELINE, origin, scalars, spatial
 from world.recording.target import Pursued
@@ -68,8 +69,8 @@ class Recorder:
         What people call it.
     world
         What is flown.
-    localizes, pursues
-        Whether agents report where they believe they are, and where a target is.
+    localizes, pursues, perceives
+        Whether agents report where they believe they are, where a target is, and the map Theta that they perceive.
     every
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
@@ -90,6 +91,7 @@ class Recorder:
         world: World,
         localizes: bool,
         pursues: bool,
+        perceives: bool,
         every: int,
         viewer: str | None = None,
     ) -> None:
@@ -115,7 +117,7 @@ class Recorder:
         self._stream.send_recording_name(name)
         self._origin = origin(world)
         self._log_static()
-        kinds = ((Places, localizes), (Pursued, pursues))
+        kinds = ((Places, localizes), (Pursued, pursues), (PerceivedFormations, perceives))
         self._layers = [layer(self._stream, world, self._origin) for layer, wanted in kinds if wanted]
         self._flush()  # what a killed run leaves can be read from the first tick on
 

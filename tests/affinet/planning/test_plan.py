@@ -69,7 +69,7 @@ def test_every_shipped_scenario_can_fly(shipped):
 
 def test_the_plan_of_the_corridor_says_what_was_checked(shipped):
     found = findings(shipped["corridor"])
-    assert found["graph"].says == "7 agents, 12 undirected edges, connected"
+    assert found["graph"].says == "7 agents, 12 undirected edges, algebraic connectivity 2.325"
     assert found["leaders"].says == "leaders [1, 2, 3] span the plane"
     assert found["rigidity"].says == "universally rigid: stress eigenvalues 0.3383 to 1.4432"
     assert found["followers"].says == "follower block eigenvalues 0.0235 to 0.9593"

@@ -111,7 +111,7 @@ def test_full_verdicts_that_come_with_affinet_are_of_the_claims_of_their_studies
     assert not full.quick
     assert full.runs == shipped.full.runs
     said = [claim.says for claim in full.claims]
-    assert said == [claim.says for one in shipped.claims for claim in judging._spelled_out(shipped, one)]
+    assert said == [claim.says for one in shipped.claims for claim in judging.spelled_out(shipped, one)]
 
 
 def test_a_value_has_no_multiples_of_nothing(tmp_path):
@@ -127,7 +127,9 @@ def test_a_value_has_no_multiples_of_nothing(tmp_path):
 
 def test_a_run_that_leaves_the_numbers_is_infinitely_far_off():
     plan = plan_of("rigid", "time.dt=0.05", "time.duration=60", "record.enabled=false")
-    runs = fly_all(replace(plan, law=replace(plan.law, parameters={"alpha": 1000.0})), [1, 2], 10)  # which no scenario may ask for
+    runs = fly_all(
+        replace(plan, law=replace(plan.law, parameters={"alpha": 1000.0})), [1, 2], 10
+    )  # which no scenario may ask for
     assert not np.isnan(runs.quantities["error"]).any()
     assert np.isinf(runs.quantities["error"][:, -1]).all()
     assert np.isinf(runs.mean_error).all()

@@ -17,6 +17,7 @@ from affinet.studies.batch import Runs
 from affinet.studies.quantities import NAMES, over_time
 from analysis.claims.intervals import Decision
 from analysis.figures import curves
+from analysis.metrics.indicator import Bounds
 
 pytestmark = PROCESSES
 
@@ -255,7 +256,14 @@ def made_up(labels, **values_of):
     shape = (RUNS, 4)
     rest = {name: np.full(shape, 7e7) for name in NAMES}
     rest |= {name: np.broadcast_to(values, shape) for name, values in values_of.items()}
-    runs = Runs(np.arange(4.0), mean_error=np.full(RUNS, 9e9), psi=np.zeros((RUNS, 4, 10)), first={}, quantities=rest)
+    runs = Runs(
+        np.arange(4.0),
+        mean_error=np.full(RUNS, 9e9),
+        psi=np.zeros((RUNS, 4, 10)),
+        bounds=Bounds(*np.ones((2, RUNS, 4, 10))),
+        first={},
+        quantities=rest,
+    )
     return study.Result(labels, at_rest(), runs)
 
 

@@ -167,13 +167,18 @@ def test_a_run_out_of_numbers_leaves_from_then_on():
 # Bounds
 
 
+def below_in_mean(values, bound, defined=None):
+    everywhere = np.ones(values.shape, dtype=bool)
+    return checks.below_in_mean("says", SECONDS, values, bound, everywhere if defined is None else defined)
+
+
 def test_below_in_mean_names_the_first_moment_above():
     rng = np.random.default_rng(2)
-    bound = 1.0 + 0.1 * rng.standard_normal((400, 10, 1))
+    bound = 1.0 + 0.1 * rng.standard_normal((400, 10, 3))
     values = 0.5 + 0.1 * rng.standard_normal((400, 10, 3))
-    assert checks.below_in_mean("says", SECONDS, values, bound).decision is HOLDS
+    assert below_in_mean(values, bound).decision is HOLDS
     values[:, 7, 2] += 0.6
-    verdict = checks.below_in_mean("says", SECONDS, values, bound)
+    verdict = below_in_mean(values, bound)
     assert verdict.decision is FAILS
     assert "first at 7 s" in verdict.found
 
@@ -181,9 +186,55 @@ def test_below_in_mean_names_the_first_moment_above():
 @pytest.mark.parametrize("values", [np.full((400, 10, 3), np.nan), 0.1 * np.ones((1, 10, 3)), np.ones((400, 10, 3))])
 def test_nothing_is_below_in_mean_of_no_number_of_one_run_or_by_nothing_at_all(values):
     noise = 1.0 + 0.1 * np.random.default_rng(3).standard_normal((len(values), 10, 1))
-    verdict = checks.below_in_mean("says", SECONDS, values, noise)
+    verdict = below_in_mean(values, noise)
     assert verdict.decision is OPEN
     assert verdict.found.startswith("at 0 of 10 moments")
+
+
+def test_where_nothing_is_defined_nothing_counts_and_a_moment_of_one_run_is_open():
+    rng = np.random.default_rng(4)
+    bound = 1.0 + 0.1 * rng.standard_normal((400, 10, 3))
+    values = 0.5 + 0.1 * rng.standard_normal((400, 10, 3))
+    defined = rng.random(values.shape) < 0.5
+    values[~defined] = 9.0
+    assert below_in_mean(values, bound, defined).decision is HOLDS
+    assert below_in_mean(values, bound).decision is FAILS
+    values[~defined] = np.nan
+    assert below_in_mean(values, bound, defined).decision is HOLDS
+    defined[1:, 4, 1] = False
+    assert below_in_mean(values, bound, defined).decision is OPEN
+
+
+def follows(values, others, defined=None):
+    everywhere = np.ones(values.shape, dtype=bool)
+    return checks.follows("says", SECONDS, values, others, everywhere if defined is None else defined, ALL)
+
+
+FELL = np.exp(-SECONDS) + 0.01
+
+
+@pytest.mark.parametrize(
+    ("shape", "decision"),
+    [(3.0 * FELL, HOLDS), (FELL**2, HOLDS), (FELL[::-1], FAILS), (FELL[[1, 0, 3, 2, 5, 4, 9, 8, 7, 6]], FAILS)],
+    ids=["a multiple", "a power", "rises", "shuffled"],
+)
+def test_what_rises_and_falls_with_another_follows_it(shape, decision):
+    rng = np.random.default_rng(5)
+    error = FELL * (1.0 + 0.1 * rng.standard_normal((50, 1)))
+    values = shape[:, None] * (1.0 + 1e-3 * rng.standard_normal((50, 10, 3)))
+    assert follows(values, error).decision is decision
+    assert follows(values[:19], error[:19]).decision is OPEN
+    defined = rng.random(values.shape) < 0.9
+    values[~defined] = np.nan
+    assert follows(values, error, defined).decision is decision
+    assert follows(values, error).decision is OPEN
+    defined[:, 4, 1] = False
+    assert follows(values, error, defined).decision is not HOLDS
+
+
+def test_noise_follows_nothing():
+    rng = np.random.default_rng(6)
+    assert follows(rng.random((50, 10, 1)), rng.random((50, 10))).decision is FAILS
 
 
 @pytest.mark.parametrize(
@@ -290,7 +341,8 @@ EVERY = {
     "stays_below": lambda error: checks.stays_below("says", SECONDS, error[0], 1.0, ALL, "m"),
     "leaves": lambda error: checks.leaves("says", SECONDS, error[0], 1.0, ALL, "m"),
     "exponential": lambda error: checks.exponential("says", SECONDS, error[0], ALL),
-    "below_in_mean": lambda error: checks.below_in_mean("says", SECONDS, error[0][..., None], error[1][..., None]),
+    "below_in_mean": lambda error: below_in_mean(error[0][..., None], error[1][..., None]),
+    "follows": lambda error: follows(error[0][..., None], error[1]),
     "never_above": lambda error: checks.never_above("says", error[0].ravel(), error[1].ravel()),
 }
 OF_RUNS = {

@@ -64,7 +64,13 @@ def test_a_recording_of_another_flight_shows_no_pursuit_and_no_places(tmp_path):
     mute = plan_of("localization", "time.duration=0.1", 'agents.estimator="none"')
     fly(mute, "inprocess", tmp_path / "run", lambda *_: None)
     paths = {str(chunk.entity_path) for chunk in recorded(tmp_path / "run")}
-    assert not paths & {"/swarm/agreed/at", "/metrics/target", "/swarm/place", "/metrics/localization"}
+    assert not paths & {
+        "/swarm/agreed/at",
+        "/metrics/target",
+        "/swarm/place",
+        "/metrics/localization",
+        "/swarm/perceived",
+    }
 
 
 def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(tmp_path):
@@ -111,6 +117,28 @@ def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
     assert np.isfinite(np.delete(place, 3, axis=1)).all()
     off = np.delete(place - best, 3, axis=1)[4:]
     np.testing.assert_allclose(np.sqrt((off**2).sum(axis=-1).mean(axis=-1)), told[4:], rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("estimator", ["ral", "conral", "ga-rkf"])
+def test_a_recording_of_maps_shows_the_formation_as_each_agent_perceives_it(estimator, tmp_path):
+    """Paper 000, Fig. 7."""
+    deaf = timeline({"verb": "cut", "at": 0, "links": ["leaders->7", "followers->7"]})
+    plan, out = (
+        plan_of("corridor", f"agents.estimator={estimator}", "time.duration=0.4", "network={}", deaf),
+        tmp_path / "run",
+    )
+    fly(plan, "inprocess", out, lambda *_: None)
+    arrays, nominal = dict(np.load(out / "arrays.npz")), plan.world.formation.nominal
+    shown = np.array(column(recorded(out), "/swarm/perceived", "Points3D:positions"), dtype=float)[..., :2]
+    moments = len(shown)
+    step = len(arrays["error"]) // moments
+    theta, position = arrays["theta"][::step], arrays["position"][:-1][::step]
+    expected = position[:, :, None] + np.einsum("tiab,ijb->tija", theta, nominal[None] - nominal[:, None])
+    np.testing.assert_allclose(shown.reshape(expected.shape), expected, atol=1e-4)
+    # Who hears nobody has no map; the others have one, and by it itself is where it is.
+    assert np.isnan(theta[:, 6]).all()
+    assert np.isfinite(theta[:, :6]).all()
+    np.testing.assert_allclose(shown.reshape(expected.shape)[:, 2, 2], position[:, 2], atol=1e-4)
 
 
 def test_a_distance_over_agents_is_that_of_those_who_say_anything():

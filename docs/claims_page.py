@@ -1,0 +1,195 @@
+"""docs/claims.md: what becomes of every numbered claim of the five papers, from `claims.toml` and what studies left.
+
+python docs/claims_page.py                      write the page
+python docs/claims_page.py NAME=DIRECTORY ...   take in full studies first, their verdicts and figures
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from pydantic import Field, model_validator
+
+from affinet.scenario.profiles import Section
+from affinet.studies import judging, record
+from affinet.studies import study as studies
+from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
+from affinet.studies.study import Study
+
+DOCS = Path(__file__).parent
+PAGE = DOCS / "claims.md"
+PICTURES = DOCS / "pictures"
+RESULTS = DOCS.parent / "affinet" / "shipped" / "results"
+PAPERS = {
+    "000": "Robust affine formation control of multiagent systems",
+    "001": "Distributed Kalman filters for relative formation control",
+    "002": "Perception-latency aware distributed target tracking",
+    "003": "Distributed relative localization using the multi-dimensional weighted centroid",
+    "004": "Edge state Kalman filtering",
+}
+
+
+class PaperClaim(Section):
+    """What a paper says somewhere, and what judges it: claims of a study, tests, or neither, for a reason."""
+
+    paper: str
+    where: str
+    says: str
+    study: str | None = None
+    claims: list[str] = Field(default_factory=list)
+    tests: list[str] = Field(default_factory=list)
+    why: str | None = None
+
+    @model_validator(mode="after")
+    def _judged(self) -> PaperClaim:
+        if self.paper not in PAPERS:
+            raise ValueError(f"{self.where}: no paper {self.paper!r}")
+        if bool(self.study) != bool(self.claims):
+            raise ValueError(f"{self.where}: a study and the claims of it go together")
+        if not (self.claims or self.tests or self.why):
+            raise ValueError(f"{self.where}: name the claims of a study, tests, or why it is not judged")
+        return self
+
+
+def paper_claims() -> list[PaperClaim]:
+    """All of `claims.toml`."""
+    text = (DOCS / "claims.toml").read_text(encoding="utf-8")
+    return [PaperClaim.model_validate(one) for one in tomllib.loads(text)["claims"]]
+
+
+def page() -> str:
+    """The page, from what is there."""
+    rows = paper_claims()
+    named = {name: studies.load(name) for name in studies.shipped()}
+    lines = [
+        "# What becomes of the papers' claims",
+        "",
+        "`python docs/claims_page.py` writes this page from `docs/claims.toml` and from the `claims.json` of full",
+        "studies, which are in `affinet/shipped/results/`. Intervals are of 99 % confidence; a claim holds where all of",
+        "its interval is inside what is asked, and is undecided where only a part is",
+        "([decision 22](decisions/0022-claims-hold-fail-or-are-undecided.md)). What is proved in a paper and computed",
+        "exactly is judged by tests, against the formulas, other implementations, or the definition.",
+        "",
+        *_tally(rows, named),
+    ]
+    for paper, title in PAPERS.items():
+        lines += [
+            "",
+            f"## Paper {paper}: {title}",
+            "",
+            "| where | what it says | what was found | by |",
+            "|---|---|---|---|",
+        ]
+        lines += [_row(one, named) for one in rows if one.paper == paper]
+    lines += ["", "## Means of all cases", "", "Over the runs of each case, with their intervals."]
+    for name in named:
+        if full := record.full_study(name):
+            lines += ["", f"### {name}: {full.title} ({full.source})", "", *_cases(full)]
+    return "\n".join(lines) + "\n"
+
+
+def verdicts(one: PaperClaim, study: Study) -> Iterator[tuple[str, JudgedClaim | None]]:
+    """Every verdict on its claims, for each label: the labels, and what was judged, if it was flown.
+
+    Raises
+    ------
+    KeyError
+        When the study makes no such claim.
+    """
+    full = record.full_study(one.study or "")
+    found = {} if full is None else {claim.says: claim for claim in full.claims}
+    for says in one.claims:
+        matching = [claim for claim in study.claims if claim.says == says]
+        if not matching:
+            raise KeyError(f"{one.study} makes no claim {says!r}")
+        for spelled in (spelled for claim in matching for spelled in judging.spelled_out(study, claim)):
+            labels = spelled.says if len(one.claims) > 1 else spelled.says.replace(says, "").strip(" :")
+            yield labels, found.get(spelled.says)
+
+
+def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
+    yield "| paper | claims | hold | do not hold | undecided | by tests | not flown yet | not judged |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for paper in PAPERS:
+        ours = [one for one in rows if one.paper == paper]
+        flown = [judged for one in ours if one.study for _, judged in verdicts(one, named[one.study])]
+        decided = [sum(judged is not None and judged.decision == what for judged in flown) for what in record.Decision]
+        tested = sum(bool(one.tests) for one in ours)
+        left = sum(not one.tests and not one.study for one in ours)
+        numbers = [len(ours), *decided, tested, sum(judged is None for judged in flown), left]
+        yield f"| {paper} | " + " | ".join(map(str, numbers)) + " |"
+
+
+def _row(one: PaperClaim, named: dict[str, Study]) -> str:
+    said, by = [], []
+    if one.study:
+        said += [_said(labels, judged) for labels, judged in verdicts(one, named[one.study])]
+        by.append(f"`{one.study}`" + _picture(one.study))
+    if one.tests:
+        said.append("holds, by tests")
+        by += [f"`{test.partition('::')[2]}`" for test in one.tests]
+    if one.why:
+        said.append(one.why if said else f"not judged: {one.why}")
+    return f"| {one.where} | {one.says} | {'<br>'.join(said)} | {'<br>'.join(by)} |"
+
+
+def _said(labels: str, judged: JudgedClaim | None) -> str:
+    where = f"{labels}: " if labels else ""
+    if judged is None:
+        return f"{where}not flown in full yet"
+    decision = judged.decision if judged.decision == "holds" else f"**{judged.decision}**"
+    return f"{where}{decision}: {judged.found}"
+
+
+def _picture(study: str) -> str:
+    file = PICTURES / f"{study}.png"
+    return f" ([picture](pictures/{file.name}))" if file.exists() else ""
+
+
+def _cases(full: StudyRecord) -> Iterator[str]:
+    quantities = list(dict.fromkeys(case.quantity for case in full.cases))
+    units = {case.quantity: f", {case.unit}" if case.unit else "" for case in full.cases}
+    names = list(full.cases[0].labels)
+    yield f"{full.runs} runs of each case."
+    yield ""
+    yield "| " + " | ".join([*names, *(f"{name}{units[name]}" for name in quantities)]) + " |"
+    yield "|---" * (len(names) + len(quantities)) + "|"
+    for labels in dict.fromkeys(tuple(case.labels.values()) for case in full.cases):
+        means = {case.quantity: case for case in full.cases if tuple(case.labels.values()) == labels}
+        yield "| " + " | ".join([*labels, *(_mean(means[name]) for name in quantities)]) + " |"
+
+
+def _mean(case: CaseMean) -> str:
+    if case.found is None:
+        return "no number"
+    return f"{case.found:.3g}" if case.low is None else f"{case.found:.3g} ({case.low:.3g} to {case.high:.3g})"
+
+
+def take(name: str, directory: Path) -> None:
+    """Take in what a full study left.
+
+    Raises
+    ------
+    ValueError
+        When it is a quick one, or of another grid than the study has now.
+    """
+    kept, study = record.read(directory / record.FILE), studies.load(name)
+    if kept.quick or kept.flown != record.grid(study, quick=False):
+        raise ValueError(f"{directory} is not of the full study {name} as it is: fly it again")
+    RESULTS.mkdir(exist_ok=True)
+    shutil.copy(directory / record.FILE, RESULTS / f"{name}.json")
+    for figure in directory.glob("*.png"):
+        target = PICTURES / (f"{name}.png" if figure.stem == "figure" else f"{name}-{figure.name}")
+        if figure.stem == "figure" or target.exists():
+            shutil.copy(figure, target)
+
+
+if __name__ == "__main__":
+    for given in sys.argv[1:]:
+        study_name, _, folder = given.partition("=")
+        take(study_name, Path(folder))
+    PAGE.write_text(page(), encoding="utf-8")

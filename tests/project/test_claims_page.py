@@ -1,0 +1,51 @@
+"""docs/claims.md is what its script writes, of all claims that shipped studies of papers make, and of tests that are there."""
+
+import ast
+
+import claims_page
+import pytest
+from paths import ROOT
+
+from affinet.studies import record, study
+
+ROWS = claims_page.paper_claims()
+TESTS = sorted({test for one in ROWS for test in one.tests})
+
+
+def test_the_page_is_what_its_script_writes():
+    written = claims_page.PAGE.read_text(encoding="utf-8")
+    assert written == claims_page.page(), "`python docs/claims_page.py` writes it again"
+
+
+@pytest.mark.parametrize("name", [name for name in study.shipped() if name.startswith("paper-")])
+def test_every_claim_of_a_study_of_a_paper_is_on_the_page(name):
+    made = {claim.says for claim in study.load(name).claims if not claim.says.startswith("(our own)")}
+    assert made <= {says for one in ROWS if one.study == name for says in one.claims}
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_what_judges_a_claim_is_there(test):
+    path, _, name = test.partition("::")
+    names = {node.name for node in ast.parse((ROOT / path).read_text()).body if isinstance(node, ast.FunctionDef)}
+    assert name in names
+
+
+def test_a_claim_that_no_study_makes_is_not_passed_over():
+    first = next(one for one in ROWS if one.study)
+    wrong = first.model_copy(update={"claims": ["what nobody says"]})
+    with pytest.raises(KeyError, match="makes no claim 'what nobody says'"):
+        list(claims_page.verdicts(wrong, study.load(first.study)))
+
+
+@pytest.mark.parametrize("left_out", ["study", "claims"])
+def test_what_judges_a_claim_has_to_be_said(left_out):
+    first = next(one for one in ROWS if one.study).model_dump()
+    del first[left_out]
+    with pytest.raises(ValueError, match=r"go together|name the claims of a study, tests, or why"):
+        claims_page.PaperClaim.model_validate(first)
+
+
+@pytest.mark.parametrize("name", [name for name in study.shipped() if record.full_study(name)])
+def test_full_verdicts_are_of_the_grid_that_the_study_has(name):
+    full = record.full_study(name)
+    assert full.flown == record.grid(study.load(name), quick=False), f"fly {name} again, or take its verdicts away"
