@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from affinet.scenario import sections, selectors
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario, ScenarioError, TargetSection, TimeSection, Waypoint
 from agents.brief import Brief
 from agents.swarm import SwarmBrief
 from analysis.models.affine import Manoeuvre
@@ -106,15 +106,32 @@ def _pursuit(given: Scenario, dimension: int) -> MovingTarget | None:
     section, dt = given.target, given.time.dt
     if section is None:
         return None
-    start = np.zeros((section.order, dimension))
-    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
-        if values is not None and derivative < section.order:
-            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
     ticks = np.round(np.array(section.latencies) / dt).astype(np.int64)
     if (np.abs(ticks * dt - section.latencies) > 1e-6 * dt).any():
         raise ScenarioError(f"target.latencies: {section.latencies} s are not whole numbers of ticks of {dt:g} s")
     target = Target(section.order, section.intensity, ticks, np.array(section.variances, dtype=np.float64))
-    return MovingTarget(target, dt, start)
+    driven = section.intensity if section.true_intensity is None else section.true_intensity
+    path = None if section.path is None else _course(section.path, section.order, given.time, dimension)
+    return MovingTarget(target, dt, _start(section, dimension) if path is None else path[0], driven, path)
+
+
+def _start(section: TargetSection, dimension: int) -> Array:
+    start = np.zeros((section.order, dimension))
+    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
+        if values is not None and derivative < section.order:
+            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
+    return start
+
+
+def _course(path: Sequence[Waypoint], order: int, time: TimeSection, dimension: int) -> Array:
+    times = [point.time for point in path]
+    _refuse_within_a_tick("target.path", times, time.dt)
+    points = [
+        sections.array(f"target.path.{number}.position", point.position, (dimension,))
+        for number, point in enumerate(path, start=1)
+    ]
+    seconds: Array = np.arange(time.ticks + 1, dtype=np.float64) * time.dt
+    return manoeuvre.course(seconds, times, np.array(points), order)
 
 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
@@ -130,13 +147,17 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
             )
         return flown(seconds)
     frames = keyframes_of(given, dimension)
-    for number, (earlier, later) in enumerate(pairwise(frames.times), start=2):
-        if later - earlier < given.time.dt:
+    _refuse_within_a_tick("manoeuvre.keyframes", frames.times, given.time.dt)
+    return manoeuvre.keyframes(seconds, *frames)
+
+
+def _refuse_within_a_tick(key: str, times: Sequence[float], dt: float) -> None:
+    for number, (earlier, later) in enumerate(pairwise(times), start=2):
+        if later - earlier < dt:
             raise ScenarioError(
-                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after "
+                f"{key}.{number}.time: {later:g} s is less than a tick ({dt:g} s) after "
                 "the one before; move it, or lower time.dt"
             )
-    return manoeuvre.keyframes(seconds, *frames)
 
 
 def keyframes_of(given: Scenario, dimension: int) -> Keyframes:

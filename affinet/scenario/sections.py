@@ -238,15 +238,25 @@ class DynamicsSection(Section):
         return self.body.build().order
 
 
+class Waypoint(Section):
+    """Where a target is at a time, in metres."""
+
+    time: NotNegative
+    position: list[Finite]
+
+
 class TargetSection(Section):
     """A target to pursue: position in m, velocity in m/s.
 
-    `intensity` is W of the noise that drives it, per axis, in m2/s^(2 order - 1). Detectors take one of `latencies` (s), chosen
-    at random for each detection, and find it with the variance (m2) of that one.
+    `intensity` is W of the noise that drives it, per axis, in m2/s^(2 order - 1), as agents know it; `true_intensity` the true
+    one, where it is another. Or it takes a `path`. Detectors take one of `latencies` (s), chosen at random for each detection,
+    and find it with the variance (m2) of that one.
     """
 
     order: Annotated[int, Field(ge=1, le=4)] = 2
     intensity: NotNegative = 1.0
+    true_intensity: NotNegative | None = None
+    path: Annotated[list[Waypoint], Field(min_length=2)] | None = None
     position: list[Finite] | None = None
     velocity: list[Finite] | None = None
     latencies: Annotated[list[Positive], Field(min_length=1)]
@@ -256,6 +266,17 @@ class TargetSection(Section):
     def _paired(self) -> TargetSection:
         if len(self.latencies) != len(self.variances):
             raise ValueError("give a variance for each latency")
+        return self
+
+    @model_validator(mode="after")
+    def _moved(self) -> TargetSection:
+        if self.path is None:
+            return self
+        if other := [key for key in ("true_intensity", "position", "velocity") if getattr(self, key) is not None]:
+            raise ValueError(f"a target on a path has no {' and no '.join(other)}: give the one or the other")
+        times = [point.time for point in self.path]
+        if any(later <= earlier for earlier, later in pairwise(times)):
+            raise ValueError(f"times of the path must increase, got {times}")
         return self
 
 

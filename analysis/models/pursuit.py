@@ -42,7 +42,7 @@ class Target:
     order
         m: how often what drives it is integrated to a position.
     intensity
-        W of the Wiener process that drives it, per axis, in m2/s^(2m - 1).
+        W of the Wiener process that drives it, as far as is known, per axis, in m2/s^(2m - 1).
     latencies
         How long each method of detection takes, shape (M,), in ticks.
     variances

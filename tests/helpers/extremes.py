@@ -142,10 +142,22 @@ BASES: dict[str, dict[str, Any]] = {
         "target": {
             "order": 2,
             "intensity": 1.0,
+            "true_intensity": 0.5,
             "position": [0.0, 0.0],
             "velocity": [1.0, 0.0],
             "latencies": [0.1, 0.05],
             "variances": [0.01, 0.1],
+        },
+        "agents": {"estimator": "target", "law": "pursuit"},
+    },
+    "target on a path": {
+        **_FLOWN,
+        "formation": {"nodes": _FLOWN["formation"]["nodes"], "edges": _RULED, "leaders": []},
+        "dynamics": {"model": "double-integrator"},
+        "target": {
+            "path": [{"time": 0.0, "position": [0.0, 0.0]}, {"time": 0.2, "position": [1.0, 0.0]}],
+            "latencies": [0.1],
+            "variances": [0.01],
         },
         "agents": {"estimator": "target", "law": "pursuit"},
     },

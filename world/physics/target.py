@@ -43,16 +43,22 @@ class MovingTarget:
     Parameters
     ----------
     target
-        What it is.
+        What agents take it for, and how it can be found.
     dt
         Tick, in seconds.
     start
         Its position and derivatives in tick 0, shape (m, D).
+    intensity
+        W of the noise that truly drives it, per axis, whatever agents take it for.
+    path
+        Its position and derivatives in every tick, shape (T + 1, m, D), of one that no noise drives.
     """
 
     target: Target
     dt: float
     start: Array
+    intensity: float
+    path: Array | None
 
     def begin(self, swarms: int, agents: int) -> PursuitState:
         """Targets at the start; every detector is about to begin."""
@@ -69,20 +75,26 @@ class MovingTarget:
     def step(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> PursuitState:
         """The next tick: detectors that are done begin again, and targets move on."""
         over, method = chase.due == tick, self.sighting(tick, seed, numbers, chase).method
-        swarms, order, axes = chase.target.shape
+        swarms, axes = len(chase.target), chase.target.shape[-1]
         here = np.repeat(chase.target[:, 0], len(numbers) // swarms, axis=0)
         deviation = np.sqrt(self.target.variances[method])[:, None]
         seen = here + deviation * normal(seed, Purpose.DETECTION, tick=tick, src=numbers, axes=axes)
         firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
-        white = normal(firsts, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
-        drift, root = self._motion
-        moved = product(drift, chase.target) + product(root, white.reshape(swarms, order, axes))
         return PursuitState(
-            target=moved,
+            target=self._moved(tick, firsts, chase.target),
             method=method,
             due=np.where(over, tick + self.target.latencies[method], chase.due),
             found=np.where(over[:, None], seen, chase.found),
         )
+
+    def _moved(self, tick: int, seed: Seed, targets: Array) -> Array:
+        """Where the targets (S, m, D) of swarms with these seeds are a tick later."""
+        if self.path is not None:
+            return np.broadcast_to(self.path[tick + 1], targets.shape).copy()
+        swarms, order, axes = targets.shape
+        white = normal(seed, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
+        drift, root = self._motion
+        return product(drift, targets) + product(root, white.reshape(targets.shape))
 
     def _chosen(self, tick: int, seed: Seed, numbers: Integers) -> Integers:
         methods = len(self.target.latencies)
@@ -92,6 +104,6 @@ class MovingTarget:
     @cached_property
     def _motion(self) -> tuple[Array, Array]:
         seconds, order = np.array(self.dt), self.target.order
-        spread = diffusion(order, seconds, self.target.intensity)
-        root = np.linalg.cholesky(spread) if self.target.intensity > 0.0 else np.zeros_like(spread)
+        spread = diffusion(order, seconds, self.intensity)
+        root = np.linalg.cholesky(spread) if self.intensity > 0.0 else np.zeros_like(spread)
         return transition(order, seconds), np.asarray(root, dtype=np.float64)

@@ -6,6 +6,8 @@ from pursuits import ALONE, NAME, SINGLE, TRIPLE, bodies, refusal
 
 from agents.laws.pursuit import Pursuit
 
+POINT = "{time=%s,position=[%s]}"
+
 
 @pytest.mark.parametrize(
     ("overrides", "says"),
@@ -32,6 +34,17 @@ from agents.laws.pursuit import Pursuit
         (("target.latencies=[0.5,0.0031]",), "target.latencies"),
         (("target.latencies=[0.5]",), "a variance for each latency"),
         (("target.position=[1,2,3]",), "target.position"),
+        ((f"target.path=[{POINT % (0, '0,0')}]",), "target.path"),
+        ((f"target.path=[{POINT % (0, '0,0')},{POINT % (1, '0,0,0')}]",), "target.path.2.position: must be 2 numbers"),
+        ((f"target.path=[{POINT % (1, '0,0')},{POINT % (1, '0,1')}]",), "times of the path must increase"),
+        (
+            (f"target.path=[{POINT % (1, '0,0')},{POINT % (1.001, '0,1')}]",),
+            "target.path.2.time: 1.001 s is less than a tick (0.002 s) after the one before",
+        ),
+        (
+            (f"target.path=[{POINT % (0, '0,0')},{POINT % (1, '0,1')}]", "target.true_intensity=1"),
+            "a target on a path has no true_intensity",
+        ),
     ],
 )
 def test_what_cannot_pursue_is_refused_in_one_line(overrides, says):
