@@ -186,6 +186,7 @@ def brief_of(world: World, L: Array) -> Brief:
     weights = -np.take_along_axis(L, links.neighbours, axis=1)
     return Brief(
         dt=world.dt,
+        number=np.arange(1, formation.agents + 1),
         nominal=formation.nominal,
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,

@@ -31,8 +31,8 @@ _PANELS = {
 }
 _ONE_CASE = {"ratio", "value", "indicator_below_error"}  # checks of a single case
 _SPREAD = {"lower", "ratio", "value", "indicator_below_error"}  # checks that need more than one run
-_PLACES = {"localization", "drift", "ringing"}
-_PURSUED = {"found", "agreed", "ideal", "apart", "behind", "effort"}
+_PLACES = {"localization", "drift", "ringing", "place_error", "place_nees"}
+_PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"}
 
 
 def of_file(study: Study) -> Iterator[Wrong]:
