@@ -20,6 +20,7 @@ from netem.loading.given import protect
 from world.formation import manoeuvre
 from world.formation.nominal import PRESETS, Formation
 from world.physics.bodies import BodyModel
+from world.physics.detectors import Detectors
 from world.physics.disturbance import Disturbance, Kernel
 from world.physics.target import MovingTarget
 from world.physics.world import World
@@ -79,7 +80,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         manoeuvre=_manoeuvre(given, formation.dimension),
         sensor=sections.sensor(given.sensing, formation.dimension),
         disturbance=_disturbance(given, formation.dimension),
-        pursuit=_pursuit(given, formation.dimension),
+        pursuit=_pursuit(given, formation),
         start=given.formation.start,
         spread=given.formation.spread,
         swarms=1,
@@ -102,8 +103,8 @@ def _disturbance(given: Scenario, dimension: int) -> Disturbance:
     return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
 
 
-def _pursuit(given: Scenario, dimension: int) -> MovingTarget | None:
-    section, dt = given.target, given.time.dt
+def _pursuit(given: Scenario, formation: Formation) -> MovingTarget | None:
+    section, dt, dimension = given.target, given.time.dt, formation.dimension
     if section is None:
         return None
     ticks = np.round(np.array(section.latencies) / dt).astype(np.int64)
@@ -112,7 +113,26 @@ def _pursuit(given: Scenario, dimension: int) -> MovingTarget | None:
     target = Target(section.order, section.intensity, ticks, np.array(section.variances, dtype=np.float64))
     driven = section.intensity if section.true_intensity is None else section.true_intensity
     path = None if section.path is None else _course(section.path, section.order, given.time, dimension)
-    return MovingTarget(target, dt, _start(section, dimension) if path is None else path[0], driven, path)
+    start = _start(section, dimension) if path is None else path[0]
+    return MovingTarget(target, dt, start, driven, path, _detectors(section, formation.agents))
+
+
+def _detectors(section: TargetSection, agents: int) -> Detectors:
+    methods, schedule = len(section.latencies), None
+    if section.schedule is not None:
+        schedule = np.tile(np.array(section.schedule, dtype=np.int64) - 1, (agents, 1))
+    if section.methods is not None:
+        if len(section.methods) != agents:
+            raise ScenarioError(f"target.methods: give one for each of the {agents} agents, in their order")
+        schedule = np.array(section.methods, dtype=np.int64)[:, None] - 1
+    even = [1.0 / methods] * methods
+    return Detectors(
+        probabilities=np.array(section.probabilities or even, dtype=np.float64),
+        schedule=schedule,
+        misses=section.misses,
+        false_positives=section.false_positives,
+        clutter=section.clutter,
+    )
 
 
 def _start(section: TargetSection, dimension: int) -> Array:

@@ -44,7 +44,7 @@ def _all_within(word: str, within: float, by: float, off_of: Callable[[Evidence,
             return CheckResult(name, "vacuous", None, "nobody pursued a target")
         span = span_of(evidence, by, None)
         steered = evidence.arrays["reference"][:, :, 0]
-        told = ~np.isnan(steered).any(axis=-1)[span.start : span.stop]
+        told = np.asarray(~np.isnan(steered).any(axis=-1))[span.start : span.stop]
         if len(told) and not told.any(axis=1).all():
             return CheckResult(name, "vacuous", None, "in some tick nobody said where it is")
         off = np.linalg.norm(off_of(evidence, steered)[span.start : span.stop], axis=-1)

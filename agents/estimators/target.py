@@ -89,6 +89,8 @@ class TargetEstimator(Estimator[Track]):
         For how many ticks REDCHO counts a neighbour that it does not hear with what that said last.
     prior_position, prior_derivatives
         Standard deviations of the target's position and of each of its derivatives in tick 0, in SI units.
+    gate
+        By how many standard deviations a detection may be off what was expected and still be of the target; 0 counts all.
     first
         Where each agent takes the target to be in tick 0, in metres; none, at the origin.
     internal
@@ -106,6 +108,7 @@ class TargetEstimator(Estimator[Track]):
     hold: int = 10
     prior_position: float = 1.0
     prior_derivatives: float = 1.0
+    gate: float = 0.0
     first: Sequence[Sequence[float]] = ()
     internal: Sequence[Sequence[Sequence[float]]] = ()
 
@@ -118,6 +121,8 @@ class TargetEstimator(Estimator[Track]):
             raise ValueError(f"alpha must be above 0, not {self.alpha}")
         if min(self.theta, *self.k, *self.gamma) <= 0.0:
             raise ValueError(f"REDCHO's gains must be above 0: theta {self.theta}, k {self.k}, gamma {self.gamma}")
+        if self.gate < 0.0:
+            raise ValueError(f"gate is a number of standard deviations, or 0, not {self.gate:g}")
         if self.hold < 0:
             raise ValueError(f"hold is a number of ticks, not {self.hold}")
         for name in ("prior_position", "prior_derivatives"):
@@ -259,8 +264,14 @@ class TargetEstimator(Estimator[Track]):
         lag = np.maximum(state.now - state.last.made - latency, 0)
         mean, P = carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        L = product(A, P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
-        corrected = product(A, mean) + product(L, sighting.position[..., None, :] - mean[..., :1, :])
+        innovation, doubt = sighting.position - mean[..., 0, :], P[..., 0, 0] + R
+        counts = np.asarray(~np.isnan(innovation).any(axis=-1))
+        innovation = np.where(counts[..., None], innovation, 0.0)
+        if self.gate > 0.0:
+            counts = counts & (sum_over(innovation * innovation, -1) <= self.gate * self.gate * doubt)
+        # A detection of nothing, or of something else, leaves the prediction.
+        L = np.where(counts[..., None, None], product(A, P[..., :, :1]) / doubt[..., None, None], 0.0)
+        corrected = product(A, mean) + product(L, innovation[..., None, :])
         closed = A - product(L, np.eye(1, target.order))
         covariance = (
             product(closed, P, np.swapaxes(closed, -1, -2))

@@ -18,7 +18,8 @@ class Sighting(NamedTuple):
     Parameters
     ----------
     position
-        Of the target, when the detection began, shape (..., D), in metres; of no meaning where none is done.
+        Of the target, when the detection began, shape (..., D), in metres; NaN of one that found nothing, of no meaning where
+        none is done.
     done
         Whether a detection is done in this tick, shape (...).
     by

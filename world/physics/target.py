@@ -11,7 +11,8 @@ import numpy as np
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Integers
 from analysis.models.pursuit import Sighting, Target, diffusion, transition
-from netem.core.draws import Purpose, Seed, uniform
+from netem.core.draws import Purpose, Seed
+from world.physics.detectors import Detectors
 from world.physics.noise import normal
 
 
@@ -27,13 +28,16 @@ class PursuitState(NamedTuple):
     due
         The tick in which it will be done, shape (N,).
     found
-        What it will then say of the target at the tick in which it began, shape (N, D), in metres.
+        What it will then say of the target at the tick in which it began, shape (N, D), in metres; NaN if nothing.
+    turn
+        How often it has begun, shape (N,).
     """
 
     target: Array
     method: Integers
     due: Integers
     found: Array
+    turn: Integers
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,8 @@ class MovingTarget:
         W of the noise that truly drives it, per axis, whatever agents take it for.
     path
         Its position and derivatives in every tick, shape (T + 1, m, D), of one that no noise drives.
+    detectors
+        How it is found.
     """
 
     target: Target
@@ -59,32 +65,33 @@ class MovingTarget:
     start: Array
     intensity: float
     path: Array | None
+    detectors: Detectors
 
     def begin(self, swarms: int, agents: int) -> PursuitState:
         """Targets at the start; every detector is about to begin."""
         targets = np.broadcast_to(self.start, (swarms, *self.start.shape)).copy()
         nothing = np.zeros(agents, dtype=np.int64)
-        return PursuitState(targets, nothing, nothing, np.zeros((agents, self.start.shape[-1])))
+        return PursuitState(targets, nothing, nothing, np.zeros((agents, self.start.shape[-1])), nothing)
 
     def sighting(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> Sighting:
         """What detectors say; `numbers` are those of the agents in their swarms, shape (N,)."""
         over = chase.due == tick
-        method = np.where(over, self._chosen(tick, seed, numbers), chase.method)
+        method = np.where(over, self.detectors.chosen(tick, seed, numbers, chase.turn), chase.method)
         return Sighting(chase.found, over & (tick > 0), chase.method, method)
 
     def step(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> PursuitState:
         """The next tick: detectors that are done begin again, and targets move on."""
         over, method = chase.due == tick, self.sighting(tick, seed, numbers, chase).method
-        swarms, axes = len(chase.target), chase.target.shape[-1]
+        swarms = len(chase.target)
         here = np.repeat(chase.target[:, 0], len(numbers) // swarms, axis=0)
-        deviation = np.sqrt(self.target.variances[method])[:, None]
-        seen = here + deviation * normal(seed, Purpose.DETECTION, tick=tick, src=numbers, axes=axes)
+        seen = self.detectors.found(tick, seed, numbers, here, np.sqrt(self.target.variances[method]))
         firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
         return PursuitState(
             target=self._moved(tick, firsts, chase.target),
             method=method,
             due=np.where(over, tick + self.target.latencies[method], chase.due),
             found=np.where(over[:, None], seen, chase.found),
+            turn=chase.turn + over,
         )
 
     def _moved(self, tick: int, seed: Seed, targets: Array) -> Array:
@@ -95,11 +102,6 @@ class MovingTarget:
         white = normal(seed, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
         drift, root = self._motion
         return product(drift, targets) + product(root, white.reshape(targets.shape))
-
-    def _chosen(self, tick: int, seed: Seed, numbers: Integers) -> Integers:
-        methods = len(self.target.latencies)
-        draw = uniform(seed, Purpose.LATENCY, tick=tick, src=numbers)[..., 0]
-        return (draw * methods).astype(np.int64)
 
     @cached_property
     def _motion(self) -> tuple[Array, Array]:
