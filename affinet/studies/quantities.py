@@ -26,7 +26,7 @@ NAMES: dict[str, tuple[str, str]] = {
     "agreed": ("error of the target steered for", "m"),
     "ideal": ("error of the target with all that is known", "m"),
     "apart": ("distance of agreement from all that is known", "m"),
-    "disagreed": ("distance of agents' agreements from their mean", "m"),
+    "disagreed": ("disagreement about the target", "m"),
     "behind": ("distance from the places steered for", "m"),
     "effort": ("input", "m/s²"),
     "peak": ("longest input", "m/s²"),
