@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from flying import plan_of
 from pursuits import COARSE, FEW, NAME, refusal
-from targets import AT_RANDOM
+from targets import at_random
 
 from affinet.runtimes.run import rehearse
 
+AT_RANDOM = at_random(2)
 MANY = 20_000
 WHO = np.tile(np.arange(1, 11), MANY // 10)
 SEEDS = np.repeat(np.arange(1, MANY // 10 + 1, dtype=np.uint64), 10)

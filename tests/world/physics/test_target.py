@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 from pursuits import ALONE, COARSE, NAME
-from targets import AT_RANDOM, target_of, van_loan
+from targets import at_random, target_of, van_loan
 
 from affinet.runtimes.run import rehearse
 from world.formation.manoeuvre import course
@@ -17,7 +17,9 @@ from world.physics.target import MovingTarget
 
 def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3, intensity=None):
     start = np.zeros((target.order, 2)) if start is None else start
-    chase_of = MovingTarget(target, dt, start, target.intensity if intensity is None else intensity, None, AT_RANDOM)
+    chase_of = MovingTarget(
+        target, dt, start, target.intensity if intensity is None else intensity, None, at_random(len(target.latencies))
+    )
     seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
     return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
 
@@ -103,7 +105,7 @@ class Detection(NamedTuple):
 def detections(agents=60, ticks=400):
     target = target_of(2, (7, 3), (0.04, 0.25))
     chase_of, who = (
-        MovingTarget(target, 0.05, np.zeros((2, 2)), target.intensity, None, AT_RANDOM),
+        MovingTarget(target, 0.05, np.zeros((2, 2)), target.intensity, None, at_random(len(target.latencies))),
         np.arange(1, agents + 1),
     )
     chase, made = chase_of.begin(1, agents), []
