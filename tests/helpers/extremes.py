@@ -166,6 +166,13 @@ BASES: dict[str, dict[str, Any]] = {
         },
         "agents": {"estimator": "target", "law": "pursuit"},
     },
+    "target seen by each in its own way": {
+        **_FLOWN,
+        "formation": {"nodes": _FLOWN["formation"]["nodes"], "edges": _RULED, "leaders": []},
+        "dynamics": {"model": "double-integrator"},
+        "target": {"latencies": [0.1, 0.05], "variances": [0.01, 0.1], "methods": [1, 2, 1, 2, 1, 2, 1]},
+        "agents": {"estimator": "target", "law": "pursuit"},
+    },
 }
 
 Place = tuple[str | int, ...]
