@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from affinet.verdicts.checking import Checker as Checker
     from affinet.verdicts.checking import CheckResult as CheckResult
     from affinet.verdicts.evidence import Evidence as Evidence
+    from affinet.verdicts.pursued import agreed as agreed
+    from affinet.verdicts.pursued import found as found
     from agents.brief import Brief as Brief
     from agents.brief import Own as Own
     from agents.brief import Reading as Reading
@@ -92,6 +94,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
         ),
         *("eventually", "localized", "never_heard_across_a_cut", "recovers", "smooth"),
     ),
+    ("affinet", "verdicts.pursued"): ("agreed", "found"),
     ("affinet", "verdicts.checking"): ("Checker", "CheckResult"),
     ("affinet", "verdicts.evidence"): ("Evidence",),
     ("agents", "brief"): ("Brief", "Own", "Reading"),

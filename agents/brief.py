@@ -52,6 +52,8 @@ class Brief:
     ----------
     dt
         Tick, in seconds.
+    number
+        Which agent of the swarm it is, from 1, shape (...).
     nominal
         Own nominal position p_i, shape (..., D), in metres.
     relative
@@ -78,6 +80,7 @@ class Brief:
     """
 
     dt: float
+    number: Integers
     nominal: Array
     relative: Array
     present: Mask
@@ -94,6 +97,7 @@ class Brief:
         """One place among those of a batch; the mission goes with it."""
         return replace(
             self,
+            number=self.number[row],
             nominal=self.nominal[row],
             relative=self.relative[row],
             present=self.present[row],

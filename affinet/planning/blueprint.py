@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from affinet.scenario import sections, selectors
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario, ScenarioError, TargetSection, TimeSection, Waypoint
 from agents.brief import Brief
 from agents.swarm import SwarmBrief
 from analysis.models.affine import Manoeuvre
@@ -20,6 +20,7 @@ from netem.loading.given import protect
 from world.formation import manoeuvre
 from world.formation.nominal import PRESETS, Formation
 from world.physics.bodies import BodyModel
+from world.physics.detectors import Detectors
 from world.physics.disturbance import Disturbance, Kernel
 from world.physics.target import MovingTarget
 from world.physics.world import World
@@ -79,7 +80,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         manoeuvre=_manoeuvre(given, formation.dimension),
         sensor=sections.sensor(given.sensing, formation.dimension),
         disturbance=_disturbance(given, formation.dimension),
-        pursuit=_pursuit(given, formation.dimension),
+        pursuit=_pursuit(given, formation),
         start=given.formation.start,
         spread=given.formation.spread,
         swarms=1,
@@ -102,19 +103,55 @@ def _disturbance(given: Scenario, dimension: int) -> Disturbance:
     return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
 
 
-def _pursuit(given: Scenario, dimension: int) -> MovingTarget | None:
-    section, dt = given.target, given.time.dt
+def _pursuit(given: Scenario, formation: Formation) -> MovingTarget | None:
+    section, dt, dimension = given.target, given.time.dt, formation.dimension
     if section is None:
         return None
-    start = np.zeros((section.order, dimension))
-    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
-        if values is not None and derivative < section.order:
-            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
     ticks = np.round(np.array(section.latencies) / dt).astype(np.int64)
     if (np.abs(ticks * dt - section.latencies) > 1e-6 * dt).any():
         raise ScenarioError(f"target.latencies: {section.latencies} s are not whole numbers of ticks of {dt:g} s")
     target = Target(section.order, section.intensity, ticks, np.array(section.variances, dtype=np.float64))
-    return MovingTarget(target, dt, start)
+    driven = section.intensity if section.true_intensity is None else section.true_intensity
+    path = None if section.path is None else _course(section.path, section.order, given.time, dimension)
+    start = _start(section, dimension) if path is None else path[0]
+    return MovingTarget(target, dt, start, driven, path, _detectors(section, formation.agents))
+
+
+def _detectors(section: TargetSection, agents: int) -> Detectors:
+    methods, schedule = len(section.latencies), None
+    if section.schedule is not None:
+        schedule = np.tile(np.array(section.schedule, dtype=np.int64) - 1, (agents, 1))
+    if section.methods is not None:
+        if len(section.methods) != agents:
+            raise ScenarioError(f"target.methods: give one for each of the {agents} agents, in their order")
+        schedule = np.array(section.methods, dtype=np.int64)[:, None] - 1
+    even = [1.0 / methods] * methods
+    return Detectors(
+        probabilities=np.array(section.probabilities or even, dtype=np.float64),
+        schedule=schedule,
+        misses=section.misses,
+        false_positives=section.false_positives,
+        clutter=section.clutter,
+    )
+
+
+def _start(section: TargetSection, dimension: int) -> Array:
+    start = np.zeros((section.order, dimension))
+    for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
+        if values is not None and derivative < section.order:
+            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
+    return start
+
+
+def _course(path: Sequence[Waypoint], order: int, time: TimeSection, dimension: int) -> Array:
+    times = [point.time for point in path]
+    _refuse_within_a_tick("target.path", times, time.dt)
+    points = [
+        sections.array(f"target.path.{number}.position", point.position, (dimension,))
+        for number, point in enumerate(path, start=1)
+    ]
+    seconds: Array = np.arange(time.ticks + 1, dtype=np.float64) * time.dt
+    return manoeuvre.course(seconds, times, np.array(points), order)
 
 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
@@ -130,13 +167,17 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
             )
         return flown(seconds)
     frames = keyframes_of(given, dimension)
-    for number, (earlier, later) in enumerate(pairwise(frames.times), start=2):
-        if later - earlier < given.time.dt:
+    _refuse_within_a_tick("manoeuvre.keyframes", frames.times, given.time.dt)
+    return manoeuvre.keyframes(seconds, *frames)
+
+
+def _refuse_within_a_tick(key: str, times: Sequence[float], dt: float) -> None:
+    for number, (earlier, later) in enumerate(pairwise(times), start=2):
+        if later - earlier < dt:
             raise ScenarioError(
-                f"manoeuvre.keyframes.{number}.time: {later:g} s is less than a tick ({given.time.dt:g} s) after "
+                f"{key}.{number}.time: {later:g} s is less than a tick ({dt:g} s) after "
                 "the one before; move it, or lower time.dt"
             )
-    return manoeuvre.keyframes(seconds, *frames)
 
 
 def keyframes_of(given: Scenario, dimension: int) -> Keyframes:
@@ -165,6 +206,7 @@ def brief_of(world: World, L: Array) -> Brief:
     weights = -np.take_along_axis(L, links.neighbours, axis=1)
     return Brief(
         dt=world.dt,
+        number=np.arange(1, formation.agents + 1),
         nominal=formation.nominal,
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,

@@ -83,6 +83,7 @@ def _brief(one: Brief, number: int) -> Brief:
 
     return replace(
         one,
+        number=tiled(one.number),
         nominal=tiled(one.nominal),
         relative=tiled(one.relative),
         present=np.tile(one.present, (number, 1)),

@@ -20,6 +20,8 @@ EXAMPLES: Mapping[str, Any] = {
     "formation.leaders": [1, 2, 3],
     "manoeuvre": {"preset": "hover"},
     "manoeuvre.keyframes.offset": [0.0, 0.0],
+    "target.path": [{"time": 0.0, "position": [0.0, 0.0]}, {"time": 10.0, "position": [5.0, 0.0]}],
+    "target.path.position": [0.0, 0.0],
     "time": {"dt": 0.01, "duration": 60.0},
     "time.dt": 0.01,
     "time.duration": 60.0,

@@ -15,7 +15,7 @@ from affinet.runtimes.side_by_side import side_by_side
 from affinet.verdicts.metrics import METRICS, seen
 from analysis.metrics import errors
 from analysis.metrics.indicator import Bounds, bounds
-from analysis.metrics.localization import centroid, distance, ringing
+from analysis.metrics.localization import centroid, distance, place_error, place_nees, ringing
 from analysis.models.arrays import Array, Mask
 from analysis.models.graph import adjacency
 from analysis.models.information import position, reported
@@ -56,12 +56,14 @@ class Runs:
 
         `localization`, `drift`, `ringing`: distance from the optimal places, and of the weighted centroid from where it began,
         in metres, and which share of the steps since the moment before went back; NaN where nobody localizes, the second also
-        while anybody is silent.
+        while anybody is silent. `place_error`, `place_nees`: how far the places are from the true ones, in metres, and the same
+        squared, normalised by what all measurements make of it.
 
-        `found`, `agreed`, `ideal`, `apart`, `behind`, `effort`, of agents that pursue a target: how far the target is from
-        where each finds it by itself, from where the agents agree that it is, and from where all they know together puts it
-        (8); how far agreed and ideal are apart; how far agents are from the places that they steer for; how hard they steer.
-        Root mean squares over the agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
+        `found`, `agreed`, `ideal`, `apart`, `disagreed`, `behind`, `effort`, of agents that pursue a target: how far the target
+        is from where each finds it by itself, from where the agents agree that it is, and from where all they know together
+        puts it (8); how far agreed and ideal are apart; how far each agent's agreed one is from their mean; how far agents are
+        from the places that they steer for; how hard they steer. Root mean squares over the agents, in metres, and metres per
+        second or per second squared. NaN where nobody pursues.
 
         `peak`: the longest input of any agent since the moment before, in metres per second or per second squared.
     first
@@ -190,6 +192,7 @@ class _Places:
         self._runs = runs
         self._first = FirstMeasurements(plan.world.links, plan.world.sensor, (runs,), plan.world.formation.dimension)
         self._kept: list[Array] = []
+        self._true: list[Array] = []
         self._recent: list[Array] = []
         self._since = 0
         self._rang: list[Array] = []
@@ -206,21 +209,24 @@ class _Places:
         """Keep what the agents believe in a tick."""
         if self._wanted:
             self._kept.append(self._of_runs(moment.reports[channels.PLACE]))
+            self._true.append(self._of_runs(moment.position))
             self._rang.append(ringing(np.stack(self._recent, axis=1))[:, -self._since :].mean(axis=1))
             self._recent, self._since = self._recent[-2:], 0  # a step, and the step before it
 
     def found(self, moments: int) -> dict[str, Array]:
-        """How far off they were, how far their centroid has gone, and how much they rang, shape (R, T)."""
+        """How far off they were, how far their centroid has gone, how much they rang, and how far from the truth, (R, T)."""
         if not self._wanted:
             nothing = np.full((self._runs, moments), np.nan)
-            return {"localization": nothing, "drift": nothing, "ringing": nothing}
-        place, edges = np.stack(self._kept, axis=1), self._first.edges()
+            return dict.fromkeys(("localization", "drift", "ringing", "place_error", "place_nees"), nothing)
+        place, true, edges = np.stack(self._kept, axis=1), np.stack(self._true, axis=1), self._first.edges()
         edges = EdgeInformation(edges.information[:, None], edges.pull[:, None])
         centre = centroid(place, weights(edges))
         return {
             "localization": distance(place, edges),
             "drift": np.linalg.norm(centre - centre[:, :1], axis=-1),
             "ringing": np.stack(self._rang, axis=1),
+            "place_error": place_error(place, true),
+            "place_nees": place_nees(place, true, edges),
         }
 
     def _of_runs(self, array: Any) -> Any:
@@ -258,7 +264,7 @@ def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
 
 def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:
     """How well a target is found and followed by those awake (R, N) in a tick of all runs, shape (R,)."""
-    names = ("found", "agreed", "ideal", "apart", "behind", "effort")
+    names = ("found", "agreed", "ideal", "apart", "disagreed", "behind", "effort")
     pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
     if pursuit is None or not reported(moment.reports):
         return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
@@ -268,5 +274,7 @@ def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], A
     number = np.where(awake.any(axis=1), awake.sum(axis=1), np.nan)
     mean = np.where(awake[..., None], information, 0.0).sum(axis=1) / number[:, None]
     ideal = position(mean, target.shape[-1], pursuit.target.order)[:, None]
-    off = (found - target, agreed - target, ideal - target, agreed - ideal, flown - agreed, of_runs(moment.input))
+    together = np.where(awake[..., None], agreed, 0.0).sum(axis=1, keepdims=True) / number[:, None, None]
+    steered = (flown - agreed, of_runs(moment.input))
+    off = (found - target, agreed - target, ideal - target, agreed - ideal, agreed - together, *steered)
     return {name: errors.root_mean_square(each, awake) for name, each in zip(names, off, strict=True)}

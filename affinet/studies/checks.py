@@ -32,8 +32,8 @@ _PANELS = {
 _INDICATED = {"indicator_below_error", "indicator_follows_error"}
 _ONE_CASE = {"ratio", "value", *_INDICATED}  # checks of a single case
 _SPREAD = {"lower", "ratio", "value", *_INDICATED}  # checks that need more than one run
-_PLACES = {"localization", "drift", "ringing"}
-_PURSUED = {"found", "agreed", "ideal", "apart", "behind", "effort"}
+_PLACES = {"localization", "drift", "ringing", "place_error", "place_nees"}
+_PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"}
 
 
 def of_file(study: Study) -> Iterator[Wrong]:

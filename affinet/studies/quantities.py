@@ -20,17 +20,20 @@ NAMES: dict[str, tuple[str, str]] = {
     "localization": ("distance from the optimal places", "m"),
     "drift": ("drift of the weighted centroid", "m"),
     "ringing": ("share of steps that go back", ""),
+    "place_error": ("error of the places", "m"),
+    "place_nees": ("NEES of the places", ""),
     "found": ("error of the target by oneself", "m"),
     "agreed": ("error of the target steered for", "m"),
     "ideal": ("error of the target with all that is known", "m"),
     "apart": ("distance of agreement from all that is known", "m"),
+    "disagreed": ("disagreement about the target", "m"),
     "behind": ("distance from the places steered for", "m"),
     "effort": ("input", "m/s²"),
     "peak": ("longest input", "m/s²"),
 }
 
 # Root mean squares over the agents, and so over time as well.
-_ROOT_MEAN_SQUARES = frozenset({"found", "agreed", "ideal", "apart", "behind", "effort"})
+_ROOT_MEAN_SQUARES = frozenset({"place_error", "found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"})
 
 
 def _known(name: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import hint, one_line
-from affinet.verdicts import checkers
+from affinet.verdicts import checkers, pursued
 from affinet.verdicts.checking import Checker
 
 NAMED: dict[str, Callable[..., Checker]] = {
@@ -24,6 +24,8 @@ NAMED: dict[str, Callable[..., Checker]] = {
         checkers.energy,
         checkers.localized,
         checkers.smooth,
+        pursued.found,
+        pursued.agreed,
     )
 }
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from agents.algebra import starts
 from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
 from agents.brief import Brief, Own
@@ -53,10 +54,16 @@ class JacobiOverRelaxation(Estimator[Belief]):
         Step: below 1/2 nothing rings (lemma 5.1), below 1 it converges (theorem 4.1). `affinet check` says which are fastest.
     anchor
         Whether leaders stay at the origin of the common frame, as in anchor-based methods (definition 4.1).
+    covariance
+        Of the measurements: "full", or "diagonal", which dismisses what their axes have to do with each other.
+    start
+        x(0): where each agent believes it is before anything is measured, in metres; none, at the origin.
     """
 
     h: float = 0.49
     anchor: bool = False
+    covariance: Literal["full", "diagonal"] = "full"
+    start: Sequence[Sequence[float]] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.h < 1.0:
@@ -69,10 +76,11 @@ class JacobiOverRelaxation(Estimator[Belief]):
         return {PLACE: {"place": Field((dimension,)), **measured}}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Belief:
-        """At the origin; nothing measured, nobody heard."""
+        """Where it is given, or at the origin; nothing measured, nobody heard."""
         shape = (*batch, *brief.relative.shape[-2:])
         nothing, no = np.zeros(shape), np.zeros(shape[:-1], dtype=bool)
-        return Belief(np.zeros((*batch, shape[-1])), nothing, no, Side(nothing, no), Side(nothing, no))
+        place = np.broadcast_to(starts.own(self.start, brief.number, shape[-1:]), (*batch, shape[-1])).copy()
+        return Belief(place, nothing, no, Side(nothing, no), Side(nothing, no))
 
     def sense(
         self,
@@ -104,7 +112,7 @@ class JacobiOverRelaxation(Estimator[Belief]):
         )
         theirs = np.where(said.fresh[..., None], said.fields["place"], state.theirs)
         told = state.told | said.fresh
-        information, pull = _edges(brief, state.own, other)
+        information, pull = self._edges(brief, state.own, other)
         counts = told & (state.own.seen | other.seen)
         place = self._moved(
             brief, state.place, theirs, np.where(counts[..., None, None], information, 0.0), pull, counts
@@ -116,6 +124,8 @@ class JacobiOverRelaxation(Estimator[Belief]):
         if not swarm.sensor.says_positions:
             says = "agents find out where they are from positions of each other, and the sensor says directions alone"
             return [Finding("localization", "error", says)]
+        if unfit := starts.suits("start", self.start, swarm.agents, (swarm.dimension,)):
+            return unfit
         leaders = np.flatnonzero(swarm.leader)
         if self.anchor and len(leaders) != 1:
             says = f"with an anchor exactly one agent leads: formation.leaders has {len(leaders)}"
@@ -139,6 +149,19 @@ class JacobiOverRelaxation(Estimator[Belief]):
         stepped = (1.0 - self.h) * place + self.h * toward
         return np.where((anybody & ~fixed)[..., None], stepped, place)
 
+    def _edges(self, brief: Brief, own: Side, other: Side) -> tuple[Array, Array]:
+        """Inverse covariances of the edges, both sides together, (..., n, D, D), and these times what was measured."""
+        information, pull = np.zeros(1), np.zeros(1)
+        for side in (own, other):
+            known = side.seen[..., None, None]
+            spread = brief.sensor.spread(side.measured)
+            if self.covariance == "diagonal":
+                spread = spread * identity(brief.dimension)
+            precision = np.where(known, inverse(np.where(known, spread, identity(brief.dimension))), 0.0)
+            information = information + precision
+            pull = pull + product(precision, side.measured[..., None])[..., 0]
+        return information, pull
+
 
 def _noiseless(swarm: SwarmBrief) -> jacobi.EdgeInformation:
     own, slots = np.nonzero(swarm.present)
@@ -153,15 +176,3 @@ def _noiseless(swarm: SwarmBrief) -> jacobi.EdgeInformation:
 def _first(side: Side, measured: Array, seen: Mask) -> Side:
     new = seen & ~side.seen
     return Side(np.where(new[..., None], measured, side.measured), side.seen | seen)
-
-
-def _edges(brief: Brief, own: Side, other: Side) -> tuple[Array, Array]:
-    """Inverse covariances of the edges, both sides together, shape (..., n, D, D), and these times what was measured."""
-    information, pull = np.zeros(1), np.zeros(1)
-    for side in (own, other):
-        known = side.seen[..., None, None]
-        spread = np.where(known, brief.sensor.spread(side.measured), identity(brief.dimension))
-        precision = np.where(known, inverse(spread), 0.0)
-        information = information + precision
-        pull = pull + product(precision, side.measured[..., None])[..., 0]
-    return information, pull

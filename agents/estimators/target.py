@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from agents.algebra import starts
 from agents.algebra.prediction import Prediction, carried, predicted
 from agents.algebra.redcho import Consensus
 from agents.brief import Brief, Own
@@ -88,6 +89,13 @@ class TargetEstimator(Estimator[Track]):
         For how many ticks REDCHO counts a neighbour that it does not hear with what that said last.
     prior_position, prior_derivatives
         Standard deviations of the target's position and of each of its derivatives in tick 0, in SI units.
+    gate
+        By how many standard deviations a detection may be off what was expected and still be of the target; 0 counts all.
+    first
+        Where each agent takes the target to be in tick 0, in metres; none, at the origin.
+    internal
+        v(0), the variables of REDCHO (14) of each agent in tick 0: m + 1 rows of the different numbers of information matrix
+        and vectors; none, 0, which begin agreed on the mean.
     """
 
     output: Literal["smooth", "optimal"] = "smooth"
@@ -100,6 +108,9 @@ class TargetEstimator(Estimator[Track]):
     hold: int = 10
     prior_position: float = 1.0
     prior_derivatives: float = 1.0
+    gate: float = 0.0
+    first: Sequence[Sequence[float]] = ()
+    internal: Sequence[Sequence[Sequence[float]]] = ()
 
     def __post_init__(self) -> None:
         if self.fusion != "none" and self.output == "optimal":
@@ -110,6 +121,8 @@ class TargetEstimator(Estimator[Track]):
             raise ValueError(f"alpha must be above 0, not {self.alpha}")
         if min(self.theta, *self.k, *self.gamma) <= 0.0:
             raise ValueError(f"REDCHO's gains must be above 0: theta {self.theta}, k {self.k}, gamma {self.gamma}")
+        if self.gate < 0.0:
+            raise ValueError(f"gate is a number of standard deviations, or 0, not {self.gate:g}")
         if self.hold < 0:
             raise ValueError(f"hold is a number of ticks, not {self.hold}")
         for name in ("prior_position", "prior_derivatives"):
@@ -129,21 +142,25 @@ class TargetEstimator(Estimator[Track]):
                 return {}
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Track:
-        """In tick 0 the target was at the origin and at rest, as far as is known."""
+        """In tick 0 the target was at rest, as far as is known, where the agent takes it to be."""
         order = _target(brief).order
         if self.fusion == "redcho" and not len(self.k) == len(self.gamma) == order + 1:
             raise Unsuited(f"a target of order {order} needs {order + 1} gains k and gamma")
         deviations = np.array([self.prior_position] + [self.prior_derivatives] * (order - 1))
         prior = np.broadcast_to(np.diag(deviations * deviations), (*batch, order, order)).copy()
-        first = Prediction(np.zeros((*batch, order, brief.dimension)), prior, np.zeros(batch, dtype=np.int64))
+        mean = np.zeros((*batch, order, brief.dimension))
+        mean[..., 0, :] = starts.own(self.first, brief.number, (brief.dimension,))
+        first = Prediction(mean, prior, np.zeros(batch, dtype=np.int64))
         slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
+        internal = np.zeros((*batch, order + 1, different))
+        internal += starts.own(self.internal, brief.number, internal.shape[-2:])
         return Track(
             now=np.full(batch, -1, dtype=np.int64),
             last=first,
             before=first,
             settled=np.zeros(batch, dtype=bool),
             method=np.zeros(batch, dtype=np.int64),
-            internal=np.zeros((*batch, order + 1, different)),
+            internal=internal,
             theirs=np.zeros((*batch, slots, different)),
             silent=np.full((*batch, slots), self.hold, dtype=np.int64),
         )
@@ -191,7 +208,9 @@ class TargetEstimator(Estimator[Track]):
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether information is heard in time, and how REDCHO comes along with the tick."""
-        found = []
+        different = numbers(len(self.k) - 1, swarm.dimension)
+        found = starts.suits("first", self.first, swarm.agents, (swarm.dimension,))
+        found += starts.suits("internal", self.internal, swarm.agents, (len(self.k), different))
         if swarm.late and self.fusion != "none":
             says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
             found.append(Finding("information", "note", says))
@@ -245,8 +264,14 @@ class TargetEstimator(Estimator[Track]):
         lag = np.maximum(state.now - state.last.made - latency, 0)
         mean, P = carried(target, state.last, lag * brief.dt)
         A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        L = product(A, P[..., :, :1]) / (P[..., :1, :1] + R[..., None, None])
-        corrected = product(A, mean) + product(L, sighting.position[..., None, :] - mean[..., :1, :])
+        innovation, doubt = sighting.position - mean[..., 0, :], P[..., 0, 0] + R
+        counts = np.asarray(~np.isnan(innovation).any(axis=-1))
+        innovation = np.where(counts[..., None], innovation, 0.0)
+        if self.gate > 0.0:
+            counts = counts & (sum_over(innovation * innovation, -1) <= self.gate * self.gate * doubt)
+        # A detection of nothing, or of something else, leaves the prediction.
+        L = np.where(counts[..., None, None], product(A, P[..., :, :1]) / doubt[..., None, None], 0.0)
+        corrected = product(A, mean) + product(L, innovation[..., None, :])
         closed = A - product(L, np.eye(1, target.order))
         covariance = (
             product(closed, P, np.swapaxes(closed, -1, -2))

@@ -66,6 +66,65 @@ def distance(place: Array, edges: EdgeInformation) -> Array:
     return root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
 
 
+def anchored(edges: EdgeInformation, anchor: int) -> tuple[Array, Array]:
+    """The optimal estimates with one agent at the origin, and their covariance (3), (4).
+
+    Parameters
+    ----------
+    edges
+        What is known; it has to join all agents.
+    anchor
+        The row of that agent.
+
+    Returns
+    -------
+    Positions (..., N, D), in metres, and their covariance (..., N D, N D), in square metres; 0 of the anchor.
+    """
+    matrix, eta = system(edges)
+    agents, dimension = edges.pull.shape[-2:]
+    fixed = np.repeat(np.arange(agents) == anchor, dimension)
+    # One of the anchor's own, and 0 between it and the others: the inverse is that of the others by themselves.
+    inner = np.where(fixed[:, None] | fixed[None, :], np.diag(fixed.astype(np.float64)), matrix)
+    inverse = np.linalg.inv(inner)
+    covariance = np.where(fixed[:, None] | fixed[None, :], 0.0, inverse)
+    place = product(covariance, eta[..., None])[..., 0]
+    return place.reshape(*place.shape[:-1], agents, dimension), covariance
+
+
+def spread(edges: EdgeInformation) -> Array:
+    """The covariance of the optimal estimates relative to their weighted centroid (8), shape (..., N D, N D), in m2.
+
+    It is that of (4) with any agent as the anchor, seen from the weighted centroid.
+    """
+    own = weights(edges)
+    agents, dimension = own.shape[-3], own.shape[-1]
+    to_centroid = np.linalg.solve(sum_over(own, -3), np.moveaxis(own, -3, -2).reshape(*own.shape[:-3], dimension, -1))
+    seen_from = np.eye(agents * dimension) - np.tile(to_centroid, (agents, 1))
+    covariance: Array = product(seen_from, anchored(edges, 0)[1], np.swapaxes(seen_from, -1, -2))
+    return covariance
+
+
+def place_error(place: Array, true: Array) -> Array:
+    """How far estimated positions (..., N, D) are from the true ones, root mean square, shape (...), in metres.
+
+    Both from their plain centroid, whatever weights an estimate was made with. NaN where any agent says nothing.
+    """
+    off = place - true
+    apart = off - sum_over(off, -2)[..., None, :] / off.shape[-2]
+    return root_mean_square(apart, np.ones(apart.shape[:-1], dtype=bool))
+
+
+def place_nees(place: Array, true: Array, edges: EdgeInformation) -> Array:
+    """Squared errors (..., N, D) normalised by the covariance that (4) makes of the edges, per agent, shape (...).
+
+    For the optimal estimates of truthful covariances it is D in the mean: N - 1 agents are uncertain relative to the last,
+    whichever that is, and where the origin lies does not matter.
+    """
+    off = (place - true).reshape(*place.shape[:-2], -1)
+    squared = sum_over(off * product(system(edges)[0], off[..., None])[..., 0], -1)
+    return np.asarray(squared / (place.shape[-2] - 1), dtype=np.float64)
+
+
 def ringing(place: Array) -> Array:
     """The share of steps that go back on the step before, over agents and axes, of positions (..., T, N, D), shape (..., T).
 

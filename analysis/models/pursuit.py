@@ -18,7 +18,8 @@ class Sighting(NamedTuple):
     Parameters
     ----------
     position
-        Of the target, when the detection began, shape (..., D), in metres; of no meaning where none is done.
+        Of the target, when the detection began, shape (..., D), in metres; NaN of one that found nothing, of no meaning where
+        none is done.
     done
         Whether a detection is done in this tick, shape (...).
     by
@@ -42,7 +43,7 @@ class Target:
     order
         m: how often what drives it is integrated to a position.
     intensity
-        W of the Wiener process that drives it, per axis, in m2/s^(2m - 1).
+        W of the Wiener process that drives it, as far as is known, per axis, in m2/s^(2m - 1).
     latencies
         How long each method of detection takes, shape (M,), in ticks.
     variances

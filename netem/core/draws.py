@@ -55,6 +55,9 @@ class Purpose(IntEnum):
     LATENCY = 22
     DETECTION = 23
     NAMED = 24
+    MISS = 25
+    FALSE_POSITIVE = 26
+    CLUTTER = 27
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:

@@ -17,6 +17,7 @@ OCTAHEDRON = 2 * np.concatenate([np.eye(3), -np.eye(3)])  # seen from (1, 1, 1)
 # An agent at (1, 1) with neighbours at (0, 0) and (1, 0), and one slot of padding.
 BRIEF = Brief(
     dt=0.1,
+    number=np.array(1),
     nominal=np.array([1.0, 1.0]),
     relative=np.array([[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),
@@ -44,6 +45,7 @@ def brief(relative, covariance=None, process=None):
     size = relative.shape[-2] * relative.shape[-1]
     return Brief(
         dt=0.1,
+        number=np.arange(1, 1 + int(np.prod(relative.shape[:-2]))).reshape(relative.shape[:-2]),
         nominal=np.zeros((*relative.shape[:-2], relative.shape[-1])),
         relative=relative,
         present=(relative != 0).any(axis=-1),

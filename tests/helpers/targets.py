@@ -17,9 +17,15 @@ from agents.exchange import Heard
 from analysis.models.information import unpacked
 from analysis.models.pursuit import Sighting, Target
 from netem.core.channels import TARGET
+from world.physics.detectors import Detectors
 from world.physics.target import MovingTarget
 
 ORDERS = pytest.mark.parametrize("order", [1, 2, 3, 4])
+
+
+def at_random(methods):
+    """Detectors that choose one of so many methods, all alike, and see their target."""
+    return Detectors(np.full(methods, 1.0 / methods), None, 0.0, 0.0, 0.0)
 
 
 def target_of(order=2, latencies=(20, 10), variances=(0.01, 0.1), intensity=1.0):
@@ -55,7 +61,9 @@ class Tick(NamedTuple):
 def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2, prior=(1.0, 1.0)):
     """Agents, each after a target of its own, whose start is drawn as the prior says."""
     rng = np.random.default_rng(seed)
-    chase_of = MovingTarget(target, dt, np.zeros((target.order, dimension)))
+    chase_of = MovingTarget(
+        target, dt, np.zeros((target.order, dimension)), target.intensity, None, at_random(len(target.latencies))
+    )
     seeds, first = np.arange(1, runs + 1, dtype=np.uint64) + np.uint64(1000 * seed), np.ones(runs, dtype=np.int64)
     deviations = np.array([prior[0]] + [prior[1]] * (target.order - 1))[:, None]
     start = deviations * rng.normal(size=(runs, target.order, dimension))
@@ -133,7 +141,10 @@ def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
     """Three agents in a triangle whose detections are theirs: what each says, tick by tick."""
     target = target_of(order, latencies)
     estimator = TargetEstimator(theta=10.0, **parameters)
-    chase_of, who = MovingTarget(target, dt, np.zeros((order, 2))), np.array([1, 2, 3])
+    chase_of, who = (
+        MovingTarget(target, dt, np.zeros((order, 2)), target.intensity, None, at_random(len(target.latencies))),
+        np.array([1, 2, 3]),
+    )
     chase, neighbours = chase_of.begin(1, 3), np.array([[1, 2], [0, 2], [0, 1]])
     agents = replace(brief(np.ones((3, 2, 2))), dt=dt, target=target)
     state, flown, nothing = estimator.init(agents, (3,)), [], np.zeros((3, 2))

@@ -48,6 +48,16 @@ def test_two_runs_over_processes_agree_and_two_seeds_do_not(tmp_path):
     assert first == second != other
 
 
+def test_agents_that_begin_apart_and_miss_their_target_agree(out):
+    three = "formation={nodes=[[5,0],[-3,4],[-3,-4]],edges=['1-2','2-3'],leaders=[],spread=3.0}"
+    begun = '{fusion="mean",gate=3.0,first=[[1.0,0.0],[0.0,2.0],[-1.0,1.0]]}'
+    detectors = ("target.misses=0.3", "target.false_positives=0.3", "target.schedule=[2,1]", "target.true_intensity=2")
+    overrides = ("time.dt=0.05", "time.duration=4", three, *detectors, f"agents.parameters.target={begun}")
+    outcome = processes(out, "target", *overrides)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert outcome.digest == digest_of("target", *overrides)
+
+
 AIRS = (
     ("network.delay_ticks=2",),
     ('time.exchange="next-tick"', "agents.parameters.varying-velocity.relaxation=0.3"),

@@ -118,6 +118,26 @@ def keyframes(
     return Manoeuvre(shape, _smooth(times, offset)(within))
 
 
+def course(seconds: Array, times: Sequence[float], points: Array, order: int) -> Array:
+    """A way through points by monotone cubics, at rest before and after, and its derivatives, shape (T, order, D).
+
+    Parameters
+    ----------
+    seconds
+        Times of the ticks, shape (T,).
+    times
+        When it is at the points, increasing, at least two, in seconds.
+    points
+        Shape (F, D), in metres.
+    order
+        How many of position, velocity and so on.
+    """
+    within, on_the_way = np.clip(seconds, times[0], times[-1]), (times[0] <= seconds) & (seconds < times[-1])
+    way = _smooth(times, points)
+    derivatives = [np.where(on_the_way[:, None], way(within, nu), 0.0) for nu in range(1, order)]
+    return np.stack([way(within), *derivatives], axis=1)
+
+
 def narrowest(times: Sequence[float], theta: Array) -> Array:
     """How narrow a formation gets from each keyframe to the next, shape (F - 1,), as a share of its width at the narrower end.
 

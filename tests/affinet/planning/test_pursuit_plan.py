@@ -6,6 +6,8 @@ from pursuits import ALONE, NAME, SINGLE, TRIPLE, bodies, refusal
 
 from agents.laws.pursuit import Pursuit
 
+POINT = "{time=%s,position=[%s]}"
+
 
 @pytest.mark.parametrize(
     ("overrides", "says"),
@@ -29,9 +31,26 @@ from agents.laws.pursuit import Pursuit
         (bodies(2, 1, -1), "agents.parameters.pursuit: with kappa [1.0, -1.0] agents leave the reference"),
         ((*TRIPLE, ALONE, "formation.leaders=[1,2,3]"), "formation.leaders: who leads is steered by velocities or acc"),
         (("agents.parameters.target.alpha=0.0",), "alpha must be above 0"),
+        (
+            ("agents.parameters.target.first=[[1.0,2.0]]",),
+            "first has 2 numbers for each of the 10 agents, in their order",
+        ),
+        (("agents.parameters.target.internal=[[[1.0]]]",), "internal has 3 x 7 numbers for each of the 10 agents"),
+        (("agents.parameters.target.first=[[1.0,2.0],[1.0]]",), "first has 2 numbers for each of the 10 agents"),
         (("target.latencies=[0.5,0.0031]",), "target.latencies"),
         (("target.latencies=[0.5]",), "a variance for each latency"),
         (("target.position=[1,2,3]",), "target.position"),
+        ((f"target.path=[{POINT % (0, '0,0')}]",), "target.path"),
+        ((f"target.path=[{POINT % (0, '0,0')},{POINT % (1, '0,0,0')}]",), "target.path.2.position: must be 2 numbers"),
+        ((f"target.path=[{POINT % (1, '0,0')},{POINT % (1, '0,1')}]",), "times of the path must increase"),
+        (
+            (f"target.path=[{POINT % (1, '0,0')},{POINT % (1.001, '0,1')}]",),
+            "target.path.2.time: 1.001 s is less than a tick (0.002 s) after the one before",
+        ),
+        (
+            (f"target.path=[{POINT % (0, '0,0')},{POINT % (1, '0,1')}]", "target.true_intensity=1"),
+            "a target on a path has no true_intensity",
+        ),
     ],
 )
 def test_what_cannot_pursue_is_refused_in_one_line(overrides, says):
@@ -59,3 +78,8 @@ def test_gains_of_the_laws_are_read_from_the_scenario():
 def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
     for overrides in (SINGLE, ()):
         assert plan_of(NAME, *overrides, "formation.leaders=[1,2,3]").world.formation.is_leader.sum() == 3
+
+
+def test_a_swarm_at_rest_begins_where_all_of_it_is_told():
+    said = refusal("agents.parameters.jor.start=[[1.0,2.0]]", name="localization")
+    assert "start has 2 numbers for each of the 10 agents, in their order" in said

@@ -267,7 +267,7 @@ def made_up(labels, **values_of):
     return study.Result(labels, at_rest(), runs)
 
 
-LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "behind", "effort"}
+LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "disagreed", "place_error", "behind", "effort"}
 
 
 @pytest.mark.parametrize("span", [(0.0, None), (1.0, None), (0.0, 2.0), (1.5, 3.0)], ids=str)

@@ -6,7 +6,7 @@ import pytest
 from judged import evidence
 
 from affinet.scenario.sections import ScenarioError
-from affinet.verdicts import checkers, invariants
+from affinet.verdicts import checkers, invariants, pursued
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,8 @@ def test_every_word_makes_its_checker(text, checker):
 def test_there_is_a_word_for_every_checker_that_numbers_describe():
     made = {
         name
-        for name, function in inspect.getmembers(checkers, inspect.isfunction)
+        for module in (checkers, pursued)
+        for name, function in inspect.getmembers(module, inspect.isfunction)
         if not name.startswith("_") and inspect.signature(function).return_annotation == "Checker"
     }
     assert set(invariants.NAMED) == made - {"always", "eventually", "below"}  # which take signals, or a name
@@ -95,6 +96,8 @@ REFUSED = {
     "a time after all runs": "converged(1, by=1e400)",
     "an infinite level of an agreement": "agreement(1e400)",
     "a time before the run for an agreement": "agreement(1, by=-1)",
+    "a target within nothing": "found(0)",
+    "an agreement before the run": "agreed(1, by=-1)",
     "an infinite level of places": "localized(1e400)",
     "a time before the run for places": "localized(1, by=-1)",
     "a recovery in less than no time": "recovers(1, within=-1)",

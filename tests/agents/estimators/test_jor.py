@@ -15,7 +15,6 @@ from measured_graphs import (
     pairs,
 )
 
-from agents.estimators import jor
 from agents.estimators.jor import JacobiOverRelaxation, Side
 from agents.exchange import Heard
 from analysis.metrics import localization
@@ -23,6 +22,8 @@ from analysis.metrics.localization import centred, optimal
 from analysis.models.jacobi import weights
 from netem.core.channels import PLACE
 from netem.core.links import Links
+
+ESTIMATOR = JacobiOverRelaxation()
 
 
 @cache
@@ -81,6 +82,38 @@ def test_it_begins_at_the_origin_and_stays_there_while_nobody_is_heard():
         assert np.isfinite(estimate.covariance).all()
 
 
+def test_agents_begin_where_they_are_told_each_by_its_number():
+    agents, links, measured = team(1)
+    start = np.random.default_rng(0).normal(size=(links.agents, 2))
+    estimator = JacobiOverRelaxation(0.3, start=start.tolist())
+    np.testing.assert_array_equal(estimator.init(agents, (links.agents,)).place, start)
+    for row in range(links.agents):
+        np.testing.assert_array_equal(estimator.init(agents.of(row), ()).place, start[row])
+    # Theorem 4.1: they come to the optimum about the weighted centroid of where they began (20).
+    state = estimator.init(agents, (links.agents,))
+    for _ in range(3000):
+        state, _ = one_tick(estimator, agents, links, state, measured, links.present)
+    edges = known_from(links, measured, links.present, agents.sensor)
+    began = localization.centroid(start, weights(edges))
+    assert np.abs(began).max() > 0.01
+    np.testing.assert_allclose(state.place, optimal(edges) + began, atol=1e-9)
+
+
+def test_diagonals_dismiss_what_axes_have_to_do_with_each_other():
+    agents, links, measured = team(3)
+    estimator = JacobiOverRelaxation(0.4, covariance="diagonal")
+    state = estimator.init(agents, (links.agents,))
+    for _ in range(2000):
+        state, _ = one_tick(estimator, agents, links, state, measured, links.present)
+    made = [
+        Measurement(i, int(links.neighbours[i, slot]), y, np.diag(np.diag(agents.sensor.spread(y))))
+        for (i, slot), y in ((at, measured[tuple(at)]) for at in np.argwhere(links.present).tolist())
+    ]
+    assert localization.distance(state.place, edges_of(links.agents, made)) < 1e-9
+    full = known_from(links, measured, links.present, agents.sensor)
+    assert localization.distance(state.place, full) > 1e-3
+
+
 def test_only_the_first_measurement_of_an_edge_counts():
     agents, links, measured = team(2)
     estimator = JacobiOverRelaxation(0.4)
@@ -132,7 +165,7 @@ def test_what_a_neighbour_measured_of_an_edge_counts_as_much_as_ones_own():
         edges = known_from(links, measured, seen, agents.sensor)
         assert localization.distance(state.place, edges) < 1e-9
         # Both ends count the edge alike, with all that was measured of it.
-        known, _ = jor._edges(agents, state.own, state.other)
+        known, _ = ESTIMATOR._edges(agents, state.own, state.other)
         for i, slot in np.argwhere(links.present).tolist():
             j = links.neighbours[i, slot]
             np.testing.assert_allclose(known[i, slot], edges.information[i, j], rtol=1e-12)
@@ -184,7 +217,7 @@ def test_a_measurement_that_its_agent_no_longer_has_is_forgotten_at_the_other_en
     state = state._replace(own=own, other=Side(np.where(others[..., None], state.other.measured, 0.0), own.seen))
     fresh = links.present if heard else links.present & (links.neighbours != restarted)
     state, _ = one_tick(estimator, agents, links, state, measured, links.present & others, fresh)
-    information, _ = jor._edges(agents, state.own, state.other)
+    information, _ = ESTIMATOR._edges(agents, state.own, state.other)
     edges = known_from(links, measured, links.present & (others if heard else True), agents.sensor)
     for i, slot in np.argwhere(links.present & others).tolist():
         np.testing.assert_allclose(information[i, slot], edges.information[i, links.neighbours[i, slot]], rtol=1e-12)

@@ -149,3 +149,40 @@ def test_all_that_hear_everybody_find_the_same_with_the_mean():
                 np.testing.assert_allclose(other, first, rtol=1e-12, atol=1e-12 * np.abs(first).max())
         Q = unpacked(estimate.reports["information"][:, 0].mean(axis=0), 2, 2)[0]
         np.testing.assert_allclose(estimate.reports["variance"], np.linalg.inv(Q)[0, 0], rtol=1e-9)
+
+
+def apart(consensus):
+    """How far what three agents agree on is apart, and from the mean of what they know, tick by tick."""
+    fused, known = (
+        np.stack([flown[1].reports[name][:, 0] for flown in consensus]) for name in ("fused", "information")
+    )
+    mean = known.mean(axis=1, keepdims=True)
+    return np.abs(fused - fused[:, :1]).max(axis=(1, 2)), np.abs(fused - mean).max(axis=(1, 2))
+
+
+def test_theorem_2_agents_that_begin_apart_agree_in_finite_time_and_then_come_to_the_mean():
+    internal = np.zeros((3, 3, 7))
+    internal[:, 0] = np.random.default_rng(3).normal(scale=0.05, size=(3, 7))
+    first = ((1.0, -1.0), (-2.0, 0.5), (0.5, 1.5))
+    begun = tuple(tuple(map(tuple, one)) for one in internal.tolist())
+    consensus = agreed(1.6, latencies=(4000, 3000), first=first, internal=begun)
+    np.testing.assert_allclose(consensus[0][1].reports["found"], first)
+    from_each_other, from_the_mean = apart(consensus)
+    assert from_each_other[0] > 1.0
+    assert from_each_other[200:].max() < 1e-3 * from_each_other[0]
+    # What they agree on is off by the mean of what they began with, and forgets it at the rate gamma, 1 1/s.
+    assert from_the_mean[200] > 10.0 * from_each_other[200]
+    assert from_the_mean[-1] == pytest.approx(np.exp(-1.4) * from_the_mean[200], rel=0.1)
+
+
+def test_each_agent_begins_with_its_own_by_its_number():
+    placed = replace(brief(np.ones((2, 2, 2))), target=target_of(), number=np.array([2, 1]))
+    internal = np.arange(42.0).reshape(2, 3, 7)
+    estimator = TargetEstimator(first=[[1.0, 2.0], [3.0, 4.0]], internal=internal.tolist())
+    state = estimator.init(placed, (2,))
+    np.testing.assert_array_equal(state.last.mean, [[[3, 4], [0, 0]], [[1, 2], [0, 0]]])
+    np.testing.assert_array_equal(state.internal, internal[::-1])
+    np.testing.assert_array_equal(estimator.init(placed.of(0), ()).internal, internal[1])
+    nothing = TargetEstimator().init(placed, (2,))
+    assert not nothing.internal.any()
+    assert not nothing.last.mean.any()

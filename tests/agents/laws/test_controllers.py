@@ -131,6 +131,7 @@ def zhao7():
     relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
     return Brief(
         dt=0.01,
+        number=np.arange(1, 8),
         nominal=formation.nominal,
         relative=np.where(links.present[..., None], relative, 0.0),
         present=links.present,

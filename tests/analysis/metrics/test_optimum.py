@@ -110,3 +110,65 @@ def test_a_chain_rings_with_a_step_near_one_and_not_below_one_half():
     # The first to move are the ends, and it takes ticks for the middle to move at all.
     assert (rough[20:] > 0.9).all()
     np.testing.assert_array_equal(calm, np.zeros(101))
+
+
+def truthful(seed, dimension, runs=400):
+    """A random graph whose edges are measured as surely as they say: true places, and the edges of many campaigns."""
+    agents, made, rng = campaign(seed, dimension)
+    true = 3.0 * rng.normal(size=(agents, dimension))
+
+    def measured():
+        return [
+            one._replace(y=true[one.i] - true[one.j] + np.linalg.cholesky(one.covariance) @ rng.normal(size=dimension))
+            for one in made
+        ]
+
+    edges = [edges_of(agents, measured(), dimension) for _ in range(runs)]
+    return true, EdgeInformation(*(np.stack(each) for each in zip(*edges, strict=True)))
+
+
+@SPACES
+def test_covariances_are_those_of_many_campaigns_with_an_anchor_and_about_the_centroid(dimension):
+    true, edges = truthful(4, dimension, runs=4000)
+    agents = len(true)
+    place, covariance = localization.anchored(edges, 1)
+    assert not place[:, 1].any()
+    off = (place - (true - true[1])).reshape(len(place), -1)
+    scale = np.abs(covariance[0]).max()
+    np.testing.assert_allclose(off.T @ off / len(off) / scale, covariance[0] / scale, atol=0.1)
+    about = (optimal(edges) - centred(true, weights(edges))).reshape(len(place), -1)
+    spread = localization.spread(edges)
+    np.testing.assert_allclose(about.T @ about / len(off) / scale, spread[0] / scale, atol=0.1)
+    assert spread.shape == (4000, agents * dimension, agents * dimension)
+
+
+def test_the_covariance_about_the_centroid_does_not_depend_on_the_anchor():
+    agents, made, _ = campaign(7)
+    edges = edges_of(agents, made)
+    own = weights(edges)
+    total = own.sum(axis=0)
+    seen = np.eye(2 * agents) - np.tile(np.linalg.solve(total, np.hstack(own)), (agents, 1))
+    for anchor in range(agents):
+        _, covariance = localization.anchored(edges, anchor)
+        np.testing.assert_allclose(seen @ covariance @ seen.T, localization.spread(edges), atol=1e-9)
+
+
+@SPACES
+def test_nees_of_places_is_the_dimension_wherever_the_origin_lies(dimension):
+    true, edges = truthful(5, dimension)
+    nees = localization.place_nees(optimal(edges) + 7.0, true, edges)
+    agents = len(true)
+    expected = np.sqrt(2.0 * dimension / (agents - 1) / len(nees))
+    assert nees.mean() == pytest.approx(dimension, abs=4.5 * expected)
+    # Half the covariance is twice the error.
+    overconfident = EdgeInformation(2.0 * edges.information, 2.0 * edges.pull)
+    np.testing.assert_allclose(localization.place_nees(optimal(edges), true, overconfident), 2.0 * nees)
+
+
+def test_the_error_of_places_is_about_their_plain_centroid():
+    rng = np.random.default_rng(1)
+    true, off = rng.normal(size=(6, 2)), rng.normal(size=(6, 2))
+    apart = off - off.mean(axis=0)
+    expected = np.sqrt((apart**2).sum(axis=1).mean())
+    assert localization.place_error(true + off + [5.0, -1.0], true) == pytest.approx(expected)
+    assert localization.place_error(true + 4.0, true) == pytest.approx(0.0, abs=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 from briefs import BRIEF, of_all
 
 from agents import agent, estimate
-from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small
+from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small, starts
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
 from agents.centre.checked import CheckedCentre
@@ -36,6 +36,7 @@ MAPS = {
 TARGET = Target(3, 0.7, np.array([3, 5]), np.array([0.1, 0.2]))
 CONSENSUS = redcho.Consensus(3, 14.0, (6.0, 11.0, 6.0, 1.0), (1.0, 2.0, 1.5, 1.0))
 MANOEUVRE = Manoeuvre(*(np.random.default_rng(6).normal(size=(20, *size)) for size in ((2, 2), (2,))))
+OFFSETS = np.random.default_rng(5).normal(size=(9, 2)).tolist()
 NOISE = np.array([[0.02, 0.01], [0.01, 0.03]])
 FIVE = Formation(np.random.default_rng(8).normal(size=(5, 2)), tuple(combinations(range(1, 6), 2)), ())
 CENTRE = SwarmFilter(
@@ -182,6 +183,9 @@ CASES = {
         *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
     ),
     "agents.algebra.redcho.Consensus.outputs": of(CONSENSUS.outputs, real(4, 9, axis=1), real(4, 9), out=1),
+    "agents.algebra.starts.own": of(
+        lambda number: starts.own(OFFSETS, 1 + (number * 8).astype(int), (2,)), share(), rows=100
+    ),
     "agents.algebra.redcho.Consensus.step": of(
         lambda internal, own, theirs: CONSENSUS.step(internal, own, theirs, 0.013),
         *(real(4, 9), real(9), real(NEIGHBOURS, 9)),

@@ -127,6 +127,13 @@ CASES = {
         )
         for function in (localization.beside, localization.distance)
     },
+    "analysis.metrics.localization.anchored": _of_edges(lambda edges: localization.anchored(edges, 1)),
+    "analysis.metrics.localization.spread": _of_edges(localization.spread),
+    "analysis.metrics.localization.place_error": of(localization.place_error, real(9, 2), real(9, 2)),
+    "analysis.metrics.localization.place_nees": of(
+        lambda place, true, information, relative: localization.place_nees(place, true, _edges(information, relative)),
+        *(real(5, 2), real(5, 2), covariance(5, 5, 2, 2), real(5, 5, 2)),
+    ),
     "analysis.metrics.localization.ringing": of(localization.ringing, real(6, 9, 2)),
     "analysis.metrics.errors.tracking_error": of(
         errors.tracking_error, real(AGENTS, 2), real(AGENTS, 2), truth(AGENTS)

@@ -47,6 +47,7 @@ EXEMPT = {
         analysis.models.sensor.Sensor.common
     """,
     ONE_WORLD: """
+        world.physics.detectors.Detectors.chosen world.physics.detectors.Detectors.found
         world.physics.target.MovingTarget.begin world.physics.target.MovingTarget.sighting
         world.physics.target.MovingTarget.step world.physics.sensors.astray world.physics.world.World.begin
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting

@@ -160,6 +160,7 @@ CASES = {
     "world.formation.manoeuvre.corridor": _moments(lambda seconds: manoeuvre.corridor(100.0 * seconds)),
     "world.formation.manoeuvre.ravine": _moments(lambda seconds: manoeuvre.ravine(60.0 * seconds)),
     "world.formation.manoeuvre.hover": _moments(lambda seconds: manoeuvre.hover(seconds, 3)),
+    "world.formation.manoeuvre.course": _moments(lambda seconds: manoeuvre.course(seconds, TIMES, OFFSET, 4)),
     "world.formation.manoeuvre.keyframes": _moments(lambda seconds: manoeuvre.keyframes(seconds, TIMES, THETA, OFFSET)),
     "world.physics.noise.normal": of(
         lambda tick, src: noise.normal(3, Purpose.SENSOR_NOISE, tick=tick, src=src, axes=3),

@@ -328,6 +328,7 @@ def test_an_exchange_inbox_equals_one_packed_at_once():
 
 BRIEF = Brief(
     dt=0.01,
+    number=np.array(2),
     nominal=np.array([1.0, 0.0]),
     relative=np.array([[1.0, -1.0], [0.5, 0.0], [0.0, 0.0]]),
     present=np.array([True, True, False]),

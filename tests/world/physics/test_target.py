@@ -7,16 +7,19 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from flying import plan_of
-from pursuits import COARSE, NAME
-from targets import target_of, van_loan
+from pursuits import ALONE, COARSE, NAME
+from targets import at_random, target_of, van_loan
 
 from affinet.runtimes.run import rehearse
+from world.formation.manoeuvre import course
 from world.physics.target import MovingTarget
 
 
-def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3):
+def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3, intensity=None):
     start = np.zeros((target.order, 2)) if start is None else start
-    chase_of = MovingTarget(target, dt, start)
+    chase_of = MovingTarget(
+        target, dt, start, target.intensity if intensity is None else intensity, None, at_random(len(target.latencies))
+    )
     seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
     return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
 
@@ -54,6 +57,40 @@ def test_without_noise_a_target_keeps_its_velocity():
     np.testing.assert_allclose(centre, np.broadcast_to(expected[:, None], centre.shape), atol=1e-12)
 
 
+def test_what_drives_a_target_need_not_be_what_agents_take_it_for():
+    driven = step_of(target_of(2, intensity=1.0), intensity=4.0, swarms=50)
+    np.testing.assert_array_equal(driven, step_of(target_of(2, intensity=4.0), swarms=50))
+    np.testing.assert_array_equal(step_of(target_of(2, intensity=1.0), intensity=0.0, swarms=50), np.zeros((50, 2, 2)))
+    short = (NAME, *COARSE, "time.duration=0.3", ALONE)
+    assumed, as_assumed, driven = (
+        rehearse(plan_of(*short, *overrides)).arrays
+        for overrides in ((), ("target.true_intensity=1",), ("target.true_intensity=4",))
+    )
+    np.testing.assert_array_equal(assumed["target"], as_assumed["target"])
+    nominal = plan_of(*short).world.formation.nominal
+    np.testing.assert_allclose(driven["target"] - nominal, 2 * (assumed["target"] - nominal), atol=1e-12)
+    # Before a detection is done, agents are as sure of either.
+    np.testing.assert_array_equal(driven["variance"][:9], assumed["variance"][:9])
+
+
+def test_a_target_takes_the_path_it_is_given():
+    points = "[{time=0.1,position=[1,2]},{time=0.3,position=[2,2]},{time=0.4,position=[2,5]}]"
+    run = rehearse(plan_of(NAME, *COARSE, "time.duration=0.5", f"target.path={points}", ALONE))
+    centre = (run.arrays["target"] - run.plan.world.formation.nominal)[:, 0]
+    np.testing.assert_allclose(centre[[0, 10, 30, 40, 49]], [[1, 2], [1, 2], [2, 2], [2, 5], [2, 5]], atol=1e-12)
+    assert ((centre[11:30, 0] > 1) & (centre[11:30, 0] < 2) & (centre[11:30, 1] == 2)).all()
+
+
+def test_the_derivatives_along_a_course_are_those_of_its_position():
+    seconds, points = np.arange(0.0, 1.0, 1e-4), np.array([[0.0, 1.0], [3.0, 1.0], [4.0, -1.0]])
+    way = course(seconds, [0.2, 0.5, 0.9], points, 3)
+    for order in (0, 1):
+        slope = (way[2:, order] - way[:-2, order]) / 2e-4
+        inside = np.all([np.abs(seconds[1:-1] - at) > 3e-4 for at in (0.2, 0.5, 0.9)], axis=0)
+        np.testing.assert_allclose(slope[inside], way[1:-1, order + 1][inside], atol=1e-3)
+    assert not way[seconds > 0.9][:, 1:].any()
+
+
 class Detection(NamedTuple):
     """Which agent's detector, when it began and was done, by which method, and how far off it was."""
 
@@ -67,7 +104,10 @@ class Detection(NamedTuple):
 @cache
 def detections(agents=60, ticks=400):
     target = target_of(2, (7, 3), (0.04, 0.25))
-    chase_of, who = MovingTarget(target, 0.05, np.zeros((2, 2))), np.arange(1, agents + 1)
+    chase_of, who = (
+        MovingTarget(target, 0.05, np.zeros((2, 2)), target.intensity, None, at_random(len(target.latencies))),
+        np.arange(1, agents + 1),
+    )
     chase, made = chase_of.begin(1, agents), []
     began, method, where = np.zeros(agents, dtype=int), None, []
     for tick in range(ticks):
