@@ -67,7 +67,7 @@ def _of_class(one: LinkClass, given: Scenario) -> Late:
         where.append("network.delay_ticks")
     waits = {
         "delay": _longest(one),
-        "loss": sum(float(part.extra_delay.max()) for part, _ in one.chains),
+        "loss": sum(float(part.extra_delay[part.loss < 1.0].max(initial=0.0)) for part, _ in one.chains),
         "rate": 8.0 * one.profile.rate.queue / one.profile.rate.rate if one.profile.rate else 0.0,
     }
     stale = any(corruption.kind == "stale" for corruption in one.profile.corrupt or [])

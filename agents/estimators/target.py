@@ -193,7 +193,10 @@ class TargetEstimator(Estimator[Track]):
         """Whether information is heard in time, and how REDCHO comes along with the tick."""
         found = []
         if swarm.late and self.fusion != "none":
-            says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
+            says = (
+                f"information is heard late ({', '.join(map(str, swarm.late))}), and taken for that of this tick: the target "
+                "is put where it was"
+            )
             found.append(Finding("information", "note", says))
         if self.fusion == "redcho":
             found += [self._chatter(swarm.dt), *self._forgetting(swarm.dt)]
