@@ -1,8 +1,8 @@
 """What filters of edges do not know: the edges, the neighbours' inputs that are not heard, and disturbances that last.
 
-All are in one state, so that a doubt that lasts stays correlated from tick to tick: an input that is guessed wrong displaces an
-edge in every tick until it is heard, and a disturbance that persists pushes it the same way again. Paper 004, sections 4.2.2 and
-6.1, takes both for white.
+All are in one state, so that a doubt that lasts stays correlated from tick to tick: an input that is guessed wrong displaces
+an edge in every tick until it is heard, and a disturbance that persists pushes it the same way again. Paper 004, sections 4.2.2
+and 6.1, takes both for white.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class EdgeModel:
         return Belief(product(self._turn, belief.mean), covariance)
 
     def hear(self, belief: Belief, inputs: Array, known: Mask) -> Belief:
-        """The belief that knows the newest inputs, shape (..., m), where they are `known`, (..., m), and what they say of the rest."""
+        """The belief that knows the newest inputs (..., m), where they are `known` (..., m), and what they say of the rest."""
         size, row = belief.mean.shape[-1], self._newest
         mean, covariance = belief.mean.copy(), belief.covariance
         if self._guesses:

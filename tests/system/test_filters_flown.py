@@ -27,10 +27,10 @@ class Wandering:
     order: ClassVar[int] = 1
     by_stress: ClassVar[bool] = False
 
-    def init(self, brief, batch):
+    def init(self, _brief, _batch):
         return Nothing()
 
-    def command(self, brief, state, tick, own, estimate, inputs):
+    def command(self, _brief, state, _tick, own, estimate, _inputs):
         digits = 1e7 * estimate.relative[..., 0, :]
         uniform = digits - np.floor(digits)
         return state, A * own.input + SIGMA * np.sqrt(12.0) * (uniform - 0.5)
