@@ -151,7 +151,7 @@ def gather(said, neighbours, fresh):
     heard = {}
     for channel, fields in said.items():
         spread = {name: np.take(field, neighbours, axis=agents) for name, field in fields.items()}
-        heard[channel] = Heard(spread, fresh, np.where(fresh, np.indices(fresh.shape).sum(axis=0) % LATE, 0))
+        heard[channel] = Heard(spread, fresh, np.where(fresh, np.indices(fresh.shape)[-2:].sum(axis=0) % LATE, 0))
     return heard
 
 
