@@ -82,6 +82,7 @@ def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int
 def turned(tape: Tape[T], before: T, own: Array, measured: Array, seen: Mask) -> Tape[T]:
     """The tape of a tick later: what is believed before it, and what is taken in in it; of inputs nothing is known yet."""
     axis = seen.ndim - 1
+    own = np.broadcast_to(own, (*measured.shape[:-2], measured.shape[-1]))
     newest = TakenIn(own, measured, seen, np.zeros_like(measured), np.zeros_like(seen))
 
     def pushed(new: Array, past: Array) -> Array:
