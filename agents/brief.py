@@ -71,6 +71,10 @@ class Brief:
         What measures the edges.
     process
         B_i^T Q B_i, of what displaces the edges in a tick, all together, shape (..., n D, n D), in square metres; 0 in padding.
+    persistence
+        Correlation of such a displacement with that of the tick before, in [0, 1).
+    lateness
+        How many ticks late what neighbours say may be heard, at the most; those of the run where the network sets no bound.
     leader
         Whether it follows the mission rather than its neighbours, shape (...).
     target
@@ -89,6 +93,8 @@ class Brief:
     leads: Mask
     sensor: Sensor
     process: Array
+    persistence: float
+    lateness: int
     leader: Mask
     target: Target | None
     mission: Manoeuvre | None

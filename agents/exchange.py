@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from analysis.models.arrays import Mask
+import numpy as np
+
+from analysis.models.arrays import Integers, Mask
 
 Fields = Mapping[str, Any]
 
@@ -19,6 +21,8 @@ class Field(NamedTuple):
 
 Channels = Mapping[str, Mapping[str, Field]]
 
+_IN_TIME = np.zeros((), dtype=np.int64)
+
 
 class Heard(NamedTuple):
     """What arrived on one channel.
@@ -29,7 +33,10 @@ class Heard(NamedTuple):
         Each broadcast field, gathered over the neighbours: shape (..., n, *field); anything where nothing arrived.
     fresh
         From which neighbours a message arrived in this tick, shape (..., n).
+    age
+        How many ticks ago it was said, shape (..., n), 0 where nothing arrived; () where all is said in the tick.
     """
 
     fields: Fields
     fresh: Mask
+    age: Integers = _IN_TIME

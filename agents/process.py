@@ -150,7 +150,7 @@ class AgentNode:
 
     def _exchange(self, inbox: messages.ExchangeInbox, sensed: messages.SenseInbox) -> None:
         self._heard += len(inbox.messages)
-        heard = {**self._gather(inbox.messages), **self._from_the_centre(inbox.k)}
+        heard = {**self._gather(inbox.k, inbox.messages), **self._from_the_centre(inbox.k)}
         sighting = _sighting(sensed.sighting)
         self._state, action = self._agent.act(
             self._state, sensed.clock, heard, sensed.position, sensed.motion, sighting
@@ -185,17 +185,21 @@ class AgentNode:
         fields = {"relative": told.relative, "covariance": told.covariance, "nis": told.nis}
         return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
 
-    def _gather(self, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
+    def _gather(self, tick: int, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.
-        said: dict[str, dict[int, Any]] = {name: {} for name in self._channels}
+        said: dict[str, dict[int, messages.Broadcast]] = {name: {} for name in self._channels}
         for message in arrived:
             if message.channel in said:
-                said[message.channel][self._slot[message.src]] = message.payload
-        return {name: self._heard_on(name, said[name]) for name in self._channels}
+                said[message.channel][self._slot[message.src]] = message
+        return {name: self._heard_on(tick, name, said[name]) for name in self._channels}
 
-    def _heard_on(self, channel: str, said: dict[int, Any]) -> Heard:
-        fields = {name: self._rows(channel, name, said) for name in self._channels[channel]}
-        return Heard(fields, np.array([slot in said for slot in range(self._width)]))
+    def _heard_on(self, tick: int, channel: str, said: dict[int, messages.Broadcast]) -> Heard:
+        payloads = {slot: message.payload for slot, message in said.items()}
+        fields = {name: self._rows(channel, name, payloads) for name in self._channels[channel]}
+        age = np.zeros(self._width, dtype=np.int64)
+        for slot, message in said.items():
+            age[slot] = tick - message.k
+        return Heard(fields, np.array([slot in said for slot in range(self._width)]), age)
 
     def _rows(self, channel: str, name: str, said: dict[int, Any]) -> Array:
         field, silence = self._channels[channel][name], self._silence[channel][name]

@@ -4,11 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.sensor import Sensor
+
+
+class Late(NamedTuple):
+    """What makes messages late: where the scenario says it, and by how many ticks at the most, infinite without a bound."""
+
+    where: str
+    ticks: float
+
+    def __str__(self) -> str:
+        by = f"up to {self.ticks:g} ticks" if isfinite(self.ticks) else "without a bound"
+        return f"{self.where}: {by}"
 
 
 @dataclass(frozen=True)
@@ -22,7 +35,9 @@ class SwarmBrief:
     order
         Of the bodies: how many times they integrate their input.
     late
-        Whether all that agents say is heard ticks late: by next-tick exchange, or a delay of whole ticks for all messages.
+        What makes what agents say heard late, if anything does: the exchange, delays, profiles, and faults that are scripted.
+    lateness
+        By how many ticks at the most; those of the run where there is no bound.
     nominal
         Nominal positions, shape (N, D), in metres.
     neighbours, present
@@ -37,12 +52,15 @@ class SwarmBrief:
         Q_A, of disturbances between agents, shape (N, N).
     displacement
         Q_D, what a disturbance displaces one agent by in a tick, shape (D, D), in square metres.
+    persistence
+        Correlation of such a displacement with that of the tick before, in [0, 1).
     """
 
     dt: float
     ticks: int
     order: int
-    late: bool
+    late: tuple[Late, ...]
+    lateness: int
     nominal: Array
     neighbours: Integers
     present: Mask
@@ -51,6 +69,7 @@ class SwarmBrief:
     sensor: Sensor
     correlation: Array
     displacement: Array
+    persistence: float
 
     @property
     def agents(self) -> int:

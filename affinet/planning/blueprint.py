@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from affinet.planning.lateness import Lateness
 from affinet.scenario import sections, selectors
 from affinet.scenario.sections import Scenario, ScenarioError, TargetSection, TimeSection, Waypoint
 from agents.brief import Brief
@@ -199,8 +200,8 @@ def keyframes_of(given: Scenario, dimension: int) -> Keyframes:
     return Keyframes(times, np.array(theta), np.array(offset), np.array(angles) if angles else None)
 
 
-def brief_of(world: World, L: Array) -> Brief:
-    """The places of all agents, with the stress matrix L, shape (N, N)."""
+def brief_of(world: World, L: Array, late: int) -> Brief:
+    """The places of all agents, with the stress matrix L, shape (N, N), where messages come so many ticks late at the most."""
     formation, links = world.formation, world.links
     relative = formation.nominal[:, None] - formation.nominal[links.neighbours]
     weights = -np.take_along_axis(L, links.neighbours, axis=1)
@@ -215,20 +216,23 @@ def brief_of(world: World, L: Array) -> Brief:
         leads=links.present & formation.is_leader[links.neighbours],
         sensor=world.sensor,
         process=_process(world),
+        persistence=world.disturbance.persistence,
+        lateness=late,
         leader=formation.is_leader,
         target=None if world.pursuit is None else world.pursuit.target,
         mission=world.manoeuvre,
     )
 
 
-def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
-    """The swarm as a whole, from the world of its first tick and the stress matrix L, shape (N, N)."""
+def swarm_of(given: Scenario, first: World, L: Array, late: Lateness) -> SwarmBrief:
+    """The swarm as a whole, from the world of its first tick, the stress matrix L, shape (N, N), and how late messages come."""
     formation, links, disturbance = first.formation, first.links, first.disturbance
     swarm = SwarmBrief(
         dt=first.dt,
         ticks=given.time.ticks,
         order=given.dynamics.order,
-        late=given.time.exchange == "next-tick" or given.network.delay_ticks > 0,
+        late=late.causes,
+        lateness=late.ticks,
         nominal=formation.nominal,
         neighbours=links.neighbours,
         present=links.present,
@@ -237,6 +241,7 @@ def swarm_of(given: Scenario, first: World, L: Array) -> SwarmBrief:
         sensor=first.sensor,
         correlation=disturbance.between(formation.nominal),
         displacement=disturbance.covariance,
+        persistence=disturbance.persistence,
     )
     protect(swarm)
     return swarm

@@ -12,7 +12,18 @@ from typing import Any
 import numpy as np
 import psutil
 
-from affinet.planning import algorithms, checks, limits, network, own_losses, recordings, registry, script, tryout
+from affinet.planning import (
+    algorithms,
+    checks,
+    lateness,
+    limits,
+    network,
+    own_losses,
+    recordings,
+    registry,
+    script,
+    tryout,
+)
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swarm_of, world_of
 from affinet.planning.plan import Plan, PlanError, agents_of
 from affinet.scenario import inputs, loading
@@ -105,14 +116,14 @@ def _make(given: Scenario) -> Plan:
     memory = psutil.virtual_memory().total
     fits = limits.swarm(formation, first.links, memory)
     _refuse_fatal([*findings, fits])
-    swarm = swarm_of(given, first, L)
+    played = script.write(given, formation, first.links)
+    swarm = swarm_of(given, first, L, lateness.of(given, formation, first.links, played.faults))
     with registry.refusing("agents", Unsuited):
         findings += algorithms.findings(estimator.build(), law.build(), swarm)
         centre = centre_of(estimator.build(), swarm)
     _refuse_fatal(findings)
     findings.append(fits)
-    brief = brief_of(first, L)
-    played = script.write(given, formation, first.links)
+    brief = brief_of(first, L, swarm.lateness)
     for name, algorithm in ((given.agents.estimator, estimator), (given.agents.law, law)):
         wants = capabilities.wants(algorithm.build())
         algorithms.refuse_late(given, name, wants)

@@ -90,7 +90,11 @@ def _tick(agents: Agent, batch: tuple[int, ...], told: Heard | None, *, position
     motion = np.repeat(nowhere[..., None, :], agents.law.order - 1, axis=-2) if agents.law.order > 1 else None
     state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, motion)
     silence = {
-        channel: Heard({name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()}, nobody)
+        channel: Heard(
+            {name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()},
+            nobody,
+            np.zeros(nobody.shape, dtype=np.int64),
+        )
         for channel, fields in agents.channels().items()
     }
     sighting = None

@@ -133,7 +133,8 @@ class ArrayCarrier:
         spoken = np.unique(content[fresh]).tolist() or [tick]
         gathered = {name: self._gather(channel, name, content, spoken) for name in self._fields[channel]}
         mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
-        return Heard(self._changed(gathered, row, content, mark) if mark.any() else gathered, fresh)
+        fields = self._changed(gathered, row, content, mark) if mark.any() else gathered
+        return Heard(fields, fresh, np.where(fresh, tick - content, 0))
 
     def _gather(self, channel: str, field: str, content: Integers, spoken: list[int]) -> Any:
         gathered = np.zeros(0)

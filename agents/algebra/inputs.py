@@ -1,83 +1,17 @@
-"""What the neighbours flew from the tick before: as heard, or predicted from what was heard before (paper 004, section 6.1)."""
+"""What filters say of the neighbours' inputs: of the model of those that are not heard, and of how late others are."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from agents.exchange import Heard
 from agents.swarm import SwarmBrief
-from analysis.models.algebra import product
-from analysis.models.arrays import Array
 from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
 _ROUNDING = 1e-9  # of the root of a random walk
-
-
-class NeighbourInputs(NamedTuple):
-    """Inputs of the neighbours in the last p ticks, newest first, (..., n, p, D), and their covariance (..., n, p, p).
-
-    It is that of one axis: all have the same model, and are driven apart.
-    """
-
-    inputs: Array
-    covariance: Array
-
-    @property
-    def last(self) -> tuple[Array, Array]:
-        """The newest, shape (..., n, D), and its covariance, shape (..., n, D, D)."""
-        return self.inputs[..., 0, :], self.covariance[..., 0, :1, None] * np.eye(self.inputs.shape[-1])
-
-
-def at_rest(shape: tuple[int, ...], dimension: int, order: int) -> NeighbourInputs:
-    """Everybody at rest so far, surely; `shape` is (..., n)."""
-    past = max(order, 1)
-    return NeighbourInputs(np.zeros((*shape, past, dimension)), np.zeros((*shape, past, past)))
-
-
-def hear(flown: NeighbourInputs, said: Heard, coefficients: Sequence[float], sigma: float) -> NeighbourInputs:
-    """The inputs a tick later: those said are known, the others follow an autoregressive model (6.5).
-
-    Parameters
-    ----------
-    flown
-        As of the tick before.
-    said
-        What arrived on the channel of inputs, and is taken for what flew from the tick before.
-    coefficients
-        a_1 .. a_p of the model, the same for all axes; none leaves who is not heard at rest.
-    sigma
-        Standard deviation of what drives the model, per axis, in metres per second.
-
-    Raises
-    ------
-    ValueError
-        When the neighbours' inputs are accelerations.
-    """
-    refuse_accelerations(said)
-    A = _companion(coefficients)
-    expected = product(A, flown.inputs)
-    spread = product(A, flown.covariance, A.T)
-    spread[..., 0, 0] += sigma * sigma if len(coefficients) else 0.0
-    fresh = said.fresh[..., None, None]
-    newest = np.where(fresh, said.fields["velocity"][..., None, :], expected[..., :1, :])
-    # What is said is known, and says nothing here of what was said before and lost.
-    doubted = np.ones(A.shape, dtype=bool)
-    doubted[0, :] = doubted[:, 0] = False
-    return NeighbourInputs(
-        np.concatenate([newest, expected[..., 1:, :]], axis=-2), np.where(~fresh | doubted, spread, 0.0)
-    )
-
-
-def _companion(coefficients: Sequence[float]) -> Array:
-    """What takes the last p inputs a tick on: the newest by the model, the others a place further back."""
-    order = max(len(coefficients), 1)
-    A = np.eye(order, k=-1)
-    A[0, : len(coefficients)] = coefficients
-    return A
 
 
 def refuse_growing(coefficients: Sequence[float]) -> None:
@@ -93,12 +27,30 @@ def refuse_growing(coefficients: Sequence[float]) -> None:
         raise ValueError(f"inputs with the coefficients {list(coefficients)} grow without end; give smaller ones")
 
 
-def in_time(swarm: SwarmBrief) -> list[Finding]:
-    """What there is to say of inputs that are heard late, and taken for those of the tick."""
+def late(swarm: SwarmBrief, sigma_n: float, memory: int) -> list[Finding]:
+    """What there is to say of inputs that are heard late, and of those until then.
+
+    Parameters
+    ----------
+    swarm
+        With what makes messages late.
+    sigma_n
+        Standard deviation of what drives the model of inputs, per axis, in metres per second.
+    memory
+        For how many ticks the filter finds use for an input.
+    """
     if not swarm.late:
         return []
-    says = "inputs are heard ticks late, and taken for those of this tick: the filters will be too sure of themselves"
-    return [Finding("inputs", "note", says)]
+    says = [f"inputs are heard late ({', '.join(map(str, swarm.late))}), and enter in the tick they were flown in"]
+    if swarm.lateness > memory:
+        enough = f", and with memory = {swarm.lateness} none do" if swarm.lateness < swarm.ticks else ""
+        says.append(f"those more than {memory} ticks late (memory) count as lost{enough}")
+    if sigma_n == 0.0:
+        says.append(
+            "until then they are guessed, and with sigma_n 0 not doubted, which makes the filter too sure of itself: "
+            "'affinet fit RUN' finds coefficients and sigma_n"
+        )
+    return [Finding("inputs", "note", "; ".join(says))]
 
 
 def refuse_accelerations(said: Heard) -> None:

@@ -31,9 +31,13 @@ class Stateless(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """What it believes of all agents: positions (..., N, D), and their covariance (..., N D, N D)."""
+    """What it believes of all agents: positions (..., N, D), and what displaced them last, if disturbances persist.
+
+    `covariance` is that of both, shape (..., N D, N D) or (..., 2 N D, 2 N D).
+    """
 
     position: Array
+    displaced: Array
     covariance: Array
 
 
@@ -107,28 +111,45 @@ class SwarmFilter(Centre[Whole]):
 
     def begin(self, batch: tuple[int, ...]) -> Whole:
         """Everybody at the same place, as far as is known (9a)-(9b)."""
-        agents, dimension = self.swarm.agents, self.swarm.dimension
+        agents, dimension, Q = self.swarm.agents, self.swarm.dimension, self.swarm.process
         prior = self.prior_position * self.prior_position * np.eye(agents * dimension)
-        return Whole(np.zeros((*batch, agents, dimension)), np.broadcast_to(prior, (*batch, *prior.shape)).copy())
+        if self.swarm.persistence:
+            prior = np.block([[prior, np.zeros_like(Q)], [np.zeros_like(Q), Q]])
+        still = np.zeros((*batch, agents, dimension))
+        return Whole(still, still, np.broadcast_to(prior, (*batch, *prior.shape)).copy())
 
     def step(self, state: Whole, measured: Array, seen: Mask, inputs: Array) -> tuple[Whole, CentreEstimate]:
         """Predict all agents by their inputs (9c)-(9d), and correct them by every measurement (9e)-(9g)."""
         agents, dimension = state.position.shape[-2:]
-        position = state.position + self.swarm.dt * inputs
-        covariance = state.covariance + self.swarm.process
-        expected, doubt = self._edges(position), self._spread(covariance, agents, dimension)
+        size = agents * dimension
+        position, displaced, covariance = self._predicted(state, inputs)
+        expected, doubt = self._edges(position), self._spread(covariance[..., :size, :size], agents, dimension)
         innovation = measured - expected
         R = np.where(seen[..., None, None], self.swarm.sensor.weight(measured, expected, doubt), np.eye(dimension))
         nis = normalised(innovation, np.asarray(np.linalg.inv(doubt + R)), seen)
         precision = np.where(seen[..., None, None], np.linalg.inv(R), 0.0)
         surprise = product(precision, innovation[..., None])
         pulled = product(self._incidence, surprise.reshape(*seen.shape[:-2], -1, dimension))
-        information = self._information(precision)
-        solved = np.linalg.solve(np.eye(agents * dimension) + product(covariance, information), covariance)
+        # Of what displaced them, measurements say something through the positions alone.
+        weighed = product(covariance[..., :size], self._information(precision))
+        weighed = np.concatenate([weighed, np.zeros_like(covariance[..., size:])], axis=-1)
+        solved = np.linalg.solve(np.eye(covariance.shape[-1]) + weighed, covariance)
         corrected = np.asarray(0.5 * (solved + np.swapaxes(solved, -1, -2)), dtype=np.float64)
-        moved = product(corrected, pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
-        whole = Whole(position + moved.reshape(position.shape), corrected)
-        return whole, CentreEstimate(self._edges(whole.position), self._spread(corrected, agents, dimension), nis)
+        moved = product(corrected[..., :size], pulled.reshape(*pulled.shape[:-2], -1)[..., None])[..., 0]
+        position = position + moved[..., :size].reshape(position.shape)
+        if self.swarm.persistence:
+            displaced = displaced + moved[..., size:].reshape(position.shape)
+        spread = self._spread(corrected[..., :size, :size], agents, dimension)
+        return Whole(position, displaced, corrected), CentreEstimate(self._edges(position), spread, nis)
+
+    def _predicted(self, state: Whole, inputs: Array) -> Whole:
+        """Positions a tick later, and what displaced them, which goes on if disturbances persist."""
+        position, a, Q = state.position + self.swarm.dt * inputs, self.swarm.persistence, self.swarm.process
+        if not a:
+            return Whole(position, state.displaced, state.covariance + Q)
+        carried = np.kron(np.array([[1.0, a], [0.0, a]]), np.eye(len(Q)))
+        covariance = product(carried, state.covariance, carried.T) + np.kron(np.ones((2, 2)), (1.0 - a * a) * Q)
+        return Whole(position + a * state.displaced, a * state.displaced, covariance)
 
     def _information(self, precision: Array) -> Array:
         """B (I (x) R^-1) B^T, shape (..., N D, N D), of edges with inverse covariances (..., N, n, D, D)."""

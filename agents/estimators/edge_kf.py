@@ -1,7 +1,9 @@
 """The edge Kalman filter (paper 001, (5a)-(5g); paper 004, Algorithms 5 and 8): an edge moves as the inputs of its ends say.
 
-A neighbour says what it flew from the tick before. Where that is lost, an autoregressive model predicts it from what was heard
-earlier, and (6.3) widens the covariance, with the dt^2 that the printed algorithms leave out.
+A neighbour says what it flew from the tick before. What is not heard is guessed by an autoregressive model, and stays in doubt
+until it is heard: the state has the neighbour's inputs beside the edge, and what displaces the edge where disturbances persist.
+The printed algorithms take both doubts for white, which makes them too sure (docs/decisions/0017); where all inputs are heard
+and disturbances are white, this is the printed filter.
 
 Of a sensor that says directions alone, the first one puts an edge at its nominal distance; from then on how far it is follows
 from how its direction changes while both ends fly.
@@ -11,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman
+from agents.algebra import inputs, kalman, tape
 from agents.algebra.blocks import diagonal_blocks
 from agents.algebra.geometry import identity
+from agents.algebra.unknowns import Belief, EdgeModel
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
@@ -29,15 +33,20 @@ from analysis.models.reports import NIS
 from netem.core.channels import INPUT
 
 
-class EdgeStates(NamedTuple):
-    """The filters: mean (..., n, D), covariance (..., n, D, D), the neighbours' inputs, what is measured, and was ever."""
+class Edges(NamedTuple):
+    """What is believed of each edge by itself, with axes (..., n), and which were ever measured, shape (..., n)."""
 
-    mean: Array
-    covariance: Array
-    flown: inputs.NeighbourInputs
+    belief: Belief
+    met: Mask
+
+
+class EdgeStates(NamedTuple):
+    """The filters, what they remember of the last ticks, and what is measured in this one: (..., n, D) and (..., n)."""
+
+    edges: Edges
+    past: tape.Tape[Edges]
     measured: Array
     seen: Mask
-    met: Mask
 
 
 @dataclass(frozen=True)
@@ -52,16 +61,21 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
         Of the autoregressive model for inputs that are not heard (6.5), the latest first: 1 holds the last, none takes
         the neighbour for at rest.
     sigma_n
-        Standard deviation of what drives that model, per axis, in metres per second.
+        Standard deviation of what drives that model, per axis, in metres per second; 0 takes what is guessed for known.
+    memory
+        How many ticks late an input may be heard, and be of use: later ones count as lost. No more are remembered than the
+        network can make messages late.
     """
 
     prior_position: float = 1.0
     coefficients: Sequence[float] = (1.0,)
     sigma_n: float = 0.0
+    memory: int = 32
 
     def __post_init__(self) -> None:
         refuse_negative(prior_position=self.prior_position, sigma_n=self.sigma_n)
         inputs.refuse_growing(self.coefficients)
+        tape.refuse_forgetful(self.memory)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""
@@ -69,16 +83,12 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
 
     def init(self, brief: Brief, batch: tuple[int, ...]) -> EdgeStates:
         """Everybody at the same place, as far as is known (5a)."""
-        shape = (*batch, brief.relative.shape[-2])
-        prior = 2.0 * self.prior_position * self.prior_position * identity(brief.dimension)
-        return EdgeStates(
-            mean=np.zeros((*shape, brief.dimension)),
-            covariance=np.broadcast_to(prior, (*shape, *prior.shape)).copy(),
-            flown=inputs.at_rest(shape, brief.dimension, len(self.coefficients)),
-            measured=np.zeros((*shape, brief.dimension)),
-            seen=np.zeros(shape, dtype=bool),
-            met=np.zeros(shape, dtype=bool),
-        )
+        slots, dimension = brief.relative.shape[-2:]
+        shape = (*batch, slots)
+        prior = 2.0 * self.prior_position * self.prior_position * identity(dimension)
+        edges = Edges(self._model(brief).begin(prior, of_edges(brief), shape), np.zeros(shape, dtype=bool))
+        past = tape.blank(edges, batch, (slots, dimension), min(self.memory, brief.lateness))
+        return EdgeStates(edges, past, np.zeros((*shape, dimension)), np.zeros(shape, dtype=bool))
 
     def sense(
         self,
@@ -93,24 +103,35 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
     def fuse(
         self, brief: Brief, state: EdgeStates, heard: Mapping[str, Heard], own: Own
     ) -> tuple[EdgeStates, Estimate]:
-        """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g)."""
-        flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
-        theirs, doubt = flown.last
-        mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
-        covariance = state.covariance + of_edges(brief) + brief.dt * brief.dt * doubt
-        if not brief.sensor.says_positions:
-            nominal = np.linalg.norm(brief.relative, axis=-1, keepdims=True) * state.measured
-            mean = np.where((state.seen & ~state.met)[..., None], nominal, mean)
-        observed = brief.sensor.observed(state.measured, mean, covariance)
-        mean, covariance, nis = kalman.correct(mean, covariance, *observed, state.seen)
+        """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g), from the oldest news on."""
+        inputs.refuse_accelerations(heard[INPUT])
+        past = tape.turned(state.past, state.edges, own.velocity, state.measured, state.seen)
+        past, oldest = tape.written(past, heard[INPUT])
+        edges, past, nis = tape.flown(past, oldest, partial(self._step, brief))
+        mean, covariance = edges.belief.edges
         known = np.broadcast_to(brief.present, state.seen.shape)
-        estimate = Estimate(mean, known, covariance, no_indicator(state.seen), reports={NIS: nis})
-        met = state.met | state.seen
-        return state._replace(mean=mean, covariance=covariance, flown=flown, met=met), estimate
+        estimate = Estimate(mean, known, covariance, no_indicator(known), reports={NIS: nis})
+        return state._replace(edges=edges, past=past), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether inputs are heard in the tick they are of."""
-        return inputs.in_time(swarm)
+        return inputs.late(swarm, self.sigma_n, self.memory)
+
+    def _model(self, brief: Brief) -> EdgeModel:
+        return EdgeModel(brief.dt, tuple(self.coefficients), self.sigma_n, brief.persistence)
+
+    def _step(self, brief: Brief, edges: Edges, tick: tape.TakenIn) -> tuple[Edges, Array]:
+        model, sure = self._model(brief), np.broadcast_to(tick.known[..., None], tick.inputs.shape)
+        belief = model.hear(model.ahead(edges.belief, of_edges(brief)), tick.inputs, sure)
+        belief = model.move(belief, tick.own[..., None, :])
+        mean, covariance = belief.edges
+        if not brief.sensor.says_positions:
+            nominal = np.linalg.norm(brief.relative, axis=-1, keepdims=True) * tick.measured
+            mean = np.where((tick.seen & ~edges.met)[..., None], nominal, mean)
+            belief = belief.placed(mean)
+        observed = brief.sensor.observed(tick.measured, mean, covariance)
+        mean, covariance, nis = kalman.correct(belief.doubted, belief.covariance, *observed, tick.seen)
+        return Edges(belief.corrected(mean, covariance), edges.met | tick.seen), nis
 
 
 def of_edges(brief: Brief) -> Array:

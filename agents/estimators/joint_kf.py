@@ -1,21 +1,23 @@
 """The joint filter (paper 001, (14a)-(14g); paper 004, Algorithm 7): one Kalman filter for all edges of an agent.
 
 Its edges share the agent's own position and disturbance, and disturbances are correlated between agents: what one edge
-shows says something of the others.
+shows says something of the others. Inputs that are guessed and disturbances that last are in its state, as in the edge filter.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman
+from agents.algebra import inputs, kalman, tape
 from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
+from agents.algebra.unknowns import Belief, EdgeModel
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
@@ -29,11 +31,10 @@ from netem.core.channels import INPUT
 
 
 class Joint(NamedTuple):
-    """Mean (..., n, D) and covariance (..., n D, n D) of all edges, the neighbours' inputs, and this tick's measurements."""
+    """What is believed of all edges, of the last ticks, and what is measured in this one: (..., n, D) and (..., n)."""
 
-    mean: Array
-    covariance: Array
-    flown: inputs.NeighbourInputs
+    edges: Belief
+    past: tape.Tape[Belief]
     measured: Array
     seen: Mask
 
@@ -46,17 +47,19 @@ class JointEdgeFilter(Estimator[Joint]):
     ----------
     prior_position
         Standard deviation of an agent's initial position, per axis, in metres.
-    coefficients, sigma_n
-        The model of inputs that are not heard, as in the edge filter.
+    coefficients, sigma_n, memory
+        The model of inputs that are not heard, and how late one may be heard, as in the edge filter.
     """
 
     prior_position: float = 1.0
     coefficients: Sequence[float] = (1.0,)
     sigma_n: float = 0.0
+    memory: int = 32
 
     def __post_init__(self) -> None:
         refuse_negative(prior_position=self.prior_position, sigma_n=self.sigma_n)
         inputs.refuse_growing(self.coefficients)
+        tape.refuse_forgetful(self.memory)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""
@@ -65,16 +68,11 @@ class JointEdgeFilter(Estimator[Joint]):
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Joint:
         """Everybody at the same place, as far as is known: B_i^T B_i (x) P (14b)."""
         slots, dimension = brief.relative.shape[-2:]
-        shape = (*batch, slots)
         edges = np.ones((slots, slots)) + np.eye(slots)
-        prior = self.prior_position * self.prior_position * np.kron(edges, identity(dimension))
-        return Joint(
-            mean=np.zeros((*shape, dimension)),
-            covariance=np.broadcast_to(prior, (*batch, *prior.shape)).copy(),
-            flown=inputs.at_rest(shape, dimension, len(self.coefficients)),
-            measured=np.zeros((*shape, dimension)),
-            seen=np.zeros(shape, dtype=bool),
-        )
+        prior = self.prior_position * self.prior_position * np.kron(edges, identity(dimension)).astype(np.float64)
+        belief = self._model(brief).begin(prior, brief.process, batch)
+        past = tape.blank(belief, batch, (slots, dimension), min(self.memory, brief.lateness))
+        return Joint(belief, past, np.zeros((*batch, slots, dimension)), np.zeros((*batch, slots), dtype=bool))
 
     def sense(
         self,
@@ -87,43 +85,55 @@ class JointEdgeFilter(Estimator[Joint]):
         return state._replace(measured=measured, seen=seen), {}
 
     def fuse(self, brief: Brief, state: Joint, heard: Mapping[str, Heard], own: Own) -> tuple[Joint, Estimate]:
-        """Predict all edges by the inputs (14c)-(14d), and correct them by those measured (14e)-(14g)."""
-        flown = inputs.hear(state.flown, heard[INPUT], self.coefficients, self.sigma_n)
-        theirs, doubt = flown.last
-        mean = state.mean + brief.dt * (own.velocity[..., None, :] - theirs)
-        covariance = state.covariance + brief.process + brief.dt * brief.dt * block_diagonal(doubt)
-        doubts = diagonal_blocks(covariance, brief.dimension)
-        R = brief.sensor.weight(state.measured, mean, doubts)
-        nis = kalman.normalised(state.measured - mean, inverse(doubts + R), state.seen)
-        mean, covariance = corrected(mean, covariance, state.measured, block_diagonal(R), state.seen)
+        """Predict all edges by the inputs (14c)-(14d), and correct those measured (14e)-(14g), from the oldest news on."""
+        inputs.refuse_accelerations(heard[INPUT])
+        past = tape.turned(state.past, state.edges, own.velocity, state.measured, state.seen)
+        past, oldest = tape.written(past, heard[INPUT])
+        belief, past, nis = tape.flown(past, oldest, partial(self._step, brief))
+        mean, covariance = belief.edges
         known, edges = np.broadcast_to(brief.present, state.seen.shape), diagonal_blocks(covariance, brief.dimension)
-        estimate = Estimate(mean, known, edges, no_indicator(state.seen), reports={NIS: nis})
-        return state._replace(mean=mean, covariance=covariance, flown=flown), estimate
+        estimate = Estimate(mean.reshape(state.measured.shape), known, edges, no_indicator(known), reports={NIS: nis})
+        return state._replace(edges=belief, past=past), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether inputs are heard in the tick they are of."""
-        return inputs.in_time(swarm)
+        return inputs.late(swarm, self.sigma_n, self.memory)
+
+    def _model(self, brief: Brief) -> EdgeModel:
+        return EdgeModel(brief.dt, tuple(self.coefficients), self.sigma_n, brief.persistence)
+
+    def _step(self, brief: Brief, belief: Belief, tick: tape.TakenIn) -> tuple[Belief, Array]:
+        model, all_edges = self._model(brief), (*tick.seen.shape[:-1], -1)
+        sure = np.repeat(tick.known, brief.dimension, axis=-1)
+        belief = model.hear(model.ahead(belief, brief.process), tick.inputs.reshape(all_edges), sure)
+        own = np.broadcast_to(tick.own[..., None, :], tick.measured.shape)
+        belief = model.move(belief, own.reshape(all_edges))
+        mean, covariance = belief.edges
+        expected, doubts = mean.reshape(tick.measured.shape), diagonal_blocks(covariance, brief.dimension)
+        R = brief.sensor.weight(tick.measured, expected, doubts)
+        nis = kalman.normalised(tick.measured - expected, inverse(doubts + R), tick.seen)
+        return corrected(belief, tick.measured.reshape(all_edges), block_diagonal(R), tick.seen), nis
 
 
-def corrected(mean: Array, covariance: Array, measured: Array, R: Array, seen: Mask) -> tuple[Array, Array]:
-    """The joint estimate after the measurements of some of its edges.
+def corrected(belief: Belief, measured: Array, R: Array, seen: Mask) -> Belief:
+    """What is believed after the measurements of some of the edges.
 
     Parameters
     ----------
-    mean, covariance
-        Predicted, shapes (..., n, D) and (..., n D, n D).
+    belief
+        Predicted, of n edges together.
     measured, seen
-        Shapes (..., n, D) and (..., n).
+        Shapes (..., n D) and (..., n).
     R
         Covariance of all measurements together, shape (..., n D, n D).
     """
-    shape, dimension = mean.shape, mean.shape[-1]
-    rows = np.repeat(seen, dimension, axis=-1)
+    mean, covariance = belief.edges
+    rows = np.repeat(seen, measured.shape[-1] // seen.shape[-1], axis=-1)
     both = rows[..., :, None] & rows[..., None, :]
     # An edge that is not measured stands apart, with an innovation of zero.
     S = np.where(both, covariance + R, np.eye(rows.shape[-1]))
-    observed = np.where(rows[..., :, None], covariance, 0.0)
+    observed = np.where(rows[..., :, None], belief.covariance[..., : rows.shape[-1], :], 0.0)
     gain = np.swapaxes(np.linalg.solve(S, observed), -1, -2)
-    innovation = np.where(rows, (measured - mean).reshape(rows.shape), 0.0)
-    moved = mean.reshape(rows.shape) + product(gain, innovation[..., None])[..., 0]
-    return moved.reshape(shape), covariance - product(gain, observed)
+    innovation = np.where(rows, measured - mean, 0.0)
+    moved = belief.doubted + product(gain, innovation[..., None])[..., 0]
+    return belief.corrected(moved, belief.covariance - product(gain, observed))

@@ -212,7 +212,10 @@ class TargetEstimator(Estimator[Track]):
         found = starts.suits("first", self.first, swarm.agents, (swarm.dimension,))
         found += starts.suits("internal", self.internal, swarm.agents, (len(self.k), different))
         if swarm.late and self.fusion != "none":
-            says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
+            says = (
+                f"information is heard late ({', '.join(map(str, swarm.late))}), and taken for that of this tick: the target "
+                "is put where it was"
+            )
             found.append(Finding("information", "note", says))
         if self.fusion == "redcho":
             found += [self._chatter(swarm.dt), *self._forgetting(swarm.dt)]

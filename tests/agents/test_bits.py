@@ -25,7 +25,7 @@ from agents.exchange import Heard
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.single import ConstantVelocity, Rest, Static, VaryingVelocity
 
-TICKS, RUNS = 10, 3
+TICKS, RUNS, LATE = 10, 3, 3
 
 ESTIMATORS = {
     "none": NoEstimator(),
@@ -117,7 +117,8 @@ def plans(tmp_path_factory):
 
 def agent_of(plan, estimator, law):
     limit = LIMIT if LAWS[law].order == 2 else None
-    return Agent(plan.brief, ESTIMATORS[estimator], LAWS[law], leaders="pilot", leader_gain=1.0, limit=limit)
+    brief = replace(plan.brief, lateness=LATE, persistence=0.6)
+    return Agent(brief, ESTIMATORS[estimator], LAWS[law], leaders="pilot", leader_gain=1.0, limit=limit)
 
 
 def draw(agent, links, seed, lead):
@@ -150,12 +151,14 @@ def gather(said, neighbours, fresh):
     heard = {}
     for channel, fields in said.items():
         spread = {name: np.take(field, neighbours, axis=agents) for name, field in fields.items()}
-        heard[channel] = Heard(spread, fresh)
+        heard[channel] = Heard(spread, fresh, np.where(fresh, np.indices(fresh.shape)[-2:].sum(axis=0) % LATE, 0))
     return heard
 
 
 def row_of(heard, index):
-    return {c: Heard({n: f[index] for n, f in h.fields.items()}, h.fresh[index]) for c, h in heard.items()}
+    return {
+        c: Heard({n: f[index] for n, f in h.fields.items()}, h.fresh[index], h.age[index]) for c, h in heard.items()
+    }
 
 
 def fly_together(agent, links, measured, seen, fresh, position, velocity):

@@ -1,5 +1,8 @@
 """Filters of edges as they are flown: as wrong as they say, and the better the more they are told."""
 
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
 import numpy as np
 import pytest
 from flying import plan_of
@@ -9,6 +12,29 @@ from affinet.runtimes.side_by_side import side_by_side
 from affinet.studies.batch import fly_all
 from analysis.metrics.consistency import nees
 from world.books.history import History
+
+A, SIGMA = 0.98, 0.1  # m/s, in a tick
+
+
+class Nothing(NamedTuple):
+    """It remembers nothing."""
+
+
+@dataclass(frozen=True)
+class Wandering:
+    """Flies inputs that follow the model of filters: what drives them are the last digits of an estimate, as good as noise."""
+
+    order: ClassVar[int] = 1
+    by_stress: ClassVar[bool] = False
+
+    def init(self, _brief, _batch):
+        return Nothing()
+
+    def command(self, _brief, state, _tick, own, estimate, _inputs):
+        digits = 1e7 * estimate.relative[..., 0, :]
+        uniform = digits - np.floor(digits)
+        return state, A * own.input + SIGMA * np.sqrt(12.0) * (uniform - 0.5)
+
 
 MUTE = ("network.coupled=false", 'network.links=[{links="all",channels="comms",availability=0.000001}]')
 HALF_BLIND = 'network.links=[{links="all",channels="sensing",availability=0.5}]'
@@ -44,3 +70,47 @@ def test_without_communication_it_beats_taking_neighbours_for_at_rest_and_not_th
         for case in cases
     ]
     assert errors[0] < 0.5 * errors[1] < 0.5 * errors[2]
+
+
+COARSE = ("time.dt=0.05", "time.duration=2.5", "record.enabled=false", "network.coupled=false")
+WANDERING = (
+    *COARSE,
+    "formation.leaders=[]",
+    'agents.leaders="pilot"',
+    f'agents.law="{__name__}:Wandering"',
+    "sensing={sigma=0.3}",
+)
+FILTERS = pytest.mark.parametrize("estimator", ["edge-kf", "joint-kf"])
+
+
+def consistent(estimator, *over, runs=50):
+    """Whether NEES is that of a filter that tells the truth, after a second and over all ticks, in the mean over the runs."""
+    found = fly_all(plan_of("rigid", *over, f'agents.estimator="{estimator}"'), range(1, 1 + runs), 1).quantities
+    of_runs = found["nees"][:, 20:].mean(axis=1)
+    error = of_runs.std() / np.sqrt(runs)
+    assert error < 0.05
+    assert abs(of_runs.mean() - 2.0) < 4 * error, of_runs.mean()
+    assert abs(np.nanmean(found["nis"][:, 20:]) - 2.0) < 0.05
+
+
+def guessing(estimator):
+    return f"agents.parameters.{estimator}={{ coefficients = [{A}], sigma_n = {SIGMA} }}"
+
+
+@FILTERS
+def test_what_is_guessed_of_inputs_lasts(estimator):
+    """Before, each guess counted as wrong by itself."""
+    lost = 'network.links=[{links="all",channels="comms",availability=0.1}]'
+    consistent(estimator, *WANDERING, lost, guessing(estimator))
+
+
+@FILTERS
+def test_inputs_that_are_heard_late_count_for_the_tick_they_were_flown_in(estimator):
+    """Before, each was taken for that of now."""
+    consistent(estimator, *WANDERING, "network.delay_ticks=10", guessing(estimator))
+
+
+@pytest.mark.parametrize("estimator", ["edge-kf", "joint-kf", "crkf"])
+def test_disturbances_that_persist_push_again(estimator):
+    """Before, each counted as a new one."""
+    consistent(estimator, *COARSE, "dynamics={disturbance=0.02, persistence=0.9}")

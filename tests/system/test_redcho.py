@@ -104,11 +104,18 @@ def test_what_redcho_switches_is_of_the_order_of_the_target_and_of_no_other_fusi
         assert noted("REDCHO", f'agents.parameters.target={{fusion="{fusion}"}}') == []
 
 
-@pytest.mark.parametrize("late", ["network.delay_ticks=1", 'time.exchange="next-tick"'])
+@pytest.mark.parametrize(
+    ("late", "where"),
+    [
+        ("network.delay_ticks=1", "network.delay_ticks: up to 1 ticks"),
+        ('time.exchange="next-tick"', "time.exchange: up to 1 ticks"),
+        ('network.profile="acoustic"', "profile 'acoustic' (delay): without a bound"),
+    ],
+)
 @pytest.mark.parametrize("fusion", ["redcho", "mean", "none"])
-def test_information_that_is_heard_late_is_told_of(fusion, late):
+def test_information_that_is_heard_late_is_told_of(fusion, late, where):
     chosen = f'agents.parameters.target={{fusion="{fusion}"}}'
-    says = "information is heard ticks late, and taken for that of this tick: the target is put where it was"
+    says = f"information is heard late ({where}), and taken for that of this tick: the target is put where it was"
     assert noted("information", chosen, late) == ([] if fusion == "none" else [("note", says)])
     assert noted("information", chosen) == []
 

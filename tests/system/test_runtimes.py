@@ -107,13 +107,20 @@ def test_every_kind_of_estimator_agrees(agents, out):
 BY_INPUTS = ("joint-kf", "edge-kf")
 
 
+LATE = (
+    'network.profiles.late={delay={model="uniform",mean=0.04,jitter=0.04},duplicate=0.2,corrupt=[{kind="stale",p=0.1}]}',
+    'network.profile="late"',
+)
+
+
+@pytest.mark.parametrize("air", [(), LATE], ids=["lost", "late"])
 @pytest.mark.parametrize("estimator", BY_INPUTS)
-def test_filters_that_predict_by_lost_inputs_agree_too(estimator, out):
+def test_filters_that_predict_by_lost_or_late_inputs_agree_too(estimator, air, out):
     overrides = (
         *("time.duration=0.4", "time.dt=0.02", f"agents.estimator={estimator}", "agents.parameters.static.alpha=2"),
-        *("network.coupled=false", "network.availability=0.7", "dynamics.persistence=0.5"),
+        *("network.coupled=false", "network.availability=0.7", "dynamics.persistence=0.5", *air),
     )
-    model = f"agents.parameters.{estimator}={{coefficients=[0.81],sigma_n=0.1}}"
+    model = f"agents.parameters.{estimator}={{coefficients=[0.81],sigma_n=0.1,memory=3}}"
     outcome = processes(out, "rigid", *overrides, model)
     assert outcome.verdict == "pass", outcome.reasons
     assert outcome.digest == digest_of("rigid", *overrides, model)

@@ -11,7 +11,7 @@ from offered import by_affinet
 from affinet.planning.making import make
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from agents.algebra import inputs
+from agents.algebra.unknowns import Belief, EdgeModel
 from agents.brief import Own
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.joint_kf import JointEdgeFilter, corrected
@@ -91,15 +91,17 @@ def test_edge_kf_is_filterpys_filter_on_the_same_measurements_losses_and_inputs(
 def test_at_first_an_edge_is_nowhere_twice_as_uncertain_as_an_agent():
     agent = agent_of(2)
     state = EdgeKalmanFilter(prior_position=1.5).init(agent, (3,))
-    np.testing.assert_array_equal(state.mean, np.zeros((3, 4, 2)))
-    np.testing.assert_allclose(state.covariance, np.broadcast_to(4.5 * np.eye(2), (3, 4, 2, 2)))
+    mean, covariance = state.edges.belief.edges
+    np.testing.assert_array_equal(mean, np.zeros((3, 4, 2)))
+    np.testing.assert_allclose(covariance, np.broadcast_to(4.5 * np.eye(2), (3, 4, 2, 2)))
 
 
 def test_at_first_joint_edges_share_the_uncertainty_of_the_agent_itself():
     state = JointEdgeFilter(prior_position=1.5).init(agent_of(2, edges=2), ())
-    np.testing.assert_array_equal(state.mean, np.zeros((2, 2)))
+    mean, covariance = state.edges.edges
+    np.testing.assert_array_equal(mean, np.zeros(4))
     own = 2.25 * np.eye(2)
-    np.testing.assert_allclose(state.covariance, np.block([[2 * own, own], [own, 2 * own]]))
+    np.testing.assert_allclose(covariance, np.block([[2 * own, own], [own, 2 * own]]))
 
 
 @SPACES
@@ -107,7 +109,8 @@ def test_at_first_joint_edges_share_the_uncertainty_of_the_agent_itself():
 def test_an_edge_that_is_not_measured_moves_as_its_ends_fly_and_becomes_less_certain(kind, dimension):
     agent, filters = agent_of(dimension, positive(4 * dimension, 3)), kind()
     state, *_ = tick(filters, agent, filters.init(agent, ()), *next(flight(dimension, availability=1.0)))
-    before, spread, nothing = state.mean, state.covariance, np.zeros(4, dtype=bool)
+    before, spread = state.edges.belief.edges if kind is EdgeKalmanFilter else state.edges.edges
+    before, nothing = before.reshape(4, dimension), np.zeros(4, dtype=bool)
     own, theirs = np.arange(1.0, dimension + 1), np.random.default_rng(1).normal(size=(4, dimension))
     state, estimate = tick(filters, agent, state, np.zeros((4, dimension)), nothing, own, theirs)
     np.testing.assert_allclose(estimate.relative, before + DT * (own - theirs), atol=1e-15)
@@ -125,7 +128,8 @@ def test_joint_kf_is_edge_kf_when_its_edges_say_nothing_of_each_other(dimension)
     agent = agent_of(dimension)
     single, joint = EdgeKalmanFilter(), JointEdgeFilter()
     one, all_edges = single.init(agent, ()), joint.init(agent, ())
-    all_edges = all_edges._replace(covariance=apart(all_edges.covariance, dimension))
+    belief = all_edges.edges
+    all_edges = all_edges._replace(edges=belief._replace(covariance=apart(belief.covariance, dimension)))
     for now in flight(dimension):
         one, expected = tick(single, agent, one, *now)
         all_edges, estimate = tick(joint, agent, all_edges, *now)
@@ -180,7 +184,7 @@ def test_joint_kf_is_the_textbook_filter_with_the_rows_of_unseen_edges_taken_out
     size = 4 * dimension
     agent, joint = agent_of(dimension, positive(size, 3)), JointEdgeFilter(prior_position=1.5)
     state = joint.init(agent, ())
-    x, P = np.zeros(size), state.covariance
+    x, P = np.zeros(size), state.edges.covariance
     for y, seen, own, theirs in flight(dimension):
         state, estimate = tick(joint, agent, state, y, seen, own, theirs)
         x, P = x + DT * (own - theirs).ravel(), P + agent.process
@@ -190,10 +194,10 @@ def test_joint_kf_is_the_textbook_filter_with_the_rows_of_unseen_edges_taken_out
             K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
             x, P = x + K @ (y[seen].ravel() - H @ x), (np.eye(size) - K @ H) @ P
         np.testing.assert_allclose(estimate.relative.ravel(), x, atol=1e-10)
-        np.testing.assert_allclose(state.covariance, P, atol=1e-10)
+        np.testing.assert_allclose(state.edges.covariance, P, atol=1e-10)
     for edge in range(4):
         np.testing.assert_array_equal(
-            estimate.covariance[edge], state.covariance[block(dimension, edge)][:, block(dimension, edge)]
+            estimate.covariance[edge], state.edges.covariance[block(dimension, edge)][:, block(dimension, edge)]
         )
 
 
@@ -223,9 +227,9 @@ def test_the_gains_of_joint_kf_are_the_best_block_diagonal_gain_of_all_agents_to
         each = np.kron(np.eye(edges), R)
         # From the estimate of zero, what unit measurements move are the columns of the gain.
         for column, y in zip(rows, np.eye(2 * edges), strict=True):
-            moved, after = corrected(np.zeros((edges, 2)), local, y.reshape(edges, 2), each, seen)
-            best[rows, column] = moved.ravel()
-        own_posteriors += np.trace(after)
+            after = corrected(Belief(np.zeros((1, 2 * edges)), local), y, each, seen)
+            best[rows, column] = after.mean[0]
+        own_posteriors += np.trace(after.covariance)
     least = joseph(best)
     assert own_posteriors == pytest.approx(least, rel=1e-9)
     free = np.zeros((size, size), dtype=bool)
@@ -245,62 +249,75 @@ def test_the_gains_of_joint_kf_are_the_best_block_diagonal_gain_of_all_agents_to
 # What neighbours flew
 
 
-def said(velocity, *fresh):
-    return Heard({"velocity": np.asarray(velocity, dtype=float)}, np.array(fresh))
-
-
 U = np.array([[2.0, -1.0], [3.0, 5.0]])
-LOST = said([[99.0, 99.0], [99.0, 99.0]], False, False)
+NOBODY = np.zeros(2, dtype=bool)
+
+
+class Inputs:
+    """What two neighbours of an agent that sees nothing are believed to fly, of whom some are heard in every tick."""
+
+    def __init__(self, coefficients, sigma):
+        self.model, self.nothing = EdgeModel(DT, tuple(coefficients), sigma, 0.0), np.zeros((2, 2))
+        self.belief = self.model.begin(self.nothing, self.nothing, (2,))
+
+    def after(self, inputs=0 * U, heard=NOBODY):
+        belief = self.model.ahead(self.belief, self.nothing)
+        known = np.broadcast_to(np.array(heard)[:, None], (2, 2))
+        self.belief = self.model.hear(belief, np.where(known, inputs, 99.0), known)
+        return self
+
+    @property
+    def last(self):
+        mean, covariance = self.belief
+        doubt = covariance[:, 2:4, 2:4] if covariance.shape[-1] > 2 else np.zeros((2, 2, 2))
+        return mean[:, 1], doubt
+
+
+ALL = np.ones(2, dtype=bool)
 
 
 @pytest.mark.parametrize("coefficients", [(), (1.0,), (0.8, -0.1)])
 def test_inputs_that_are_heard_are_known(coefficients):
-    flown = inputs.hear(inputs.at_rest((2,), 2, len(coefficients)), LOST, coefficients, 0.5)
-    last, doubt = inputs.hear(flown, said(U, True, True), coefficients, 0.5).last
+    last, doubt = Inputs(coefficients, 0.5).after().after(U, ALL).last
     np.testing.assert_array_equal(last, U)
     np.testing.assert_array_equal(doubt, np.zeros((2, 2, 2)))
 
 
 def test_who_is_heard_does_not_matter_to_another():
-    flown = inputs.hear(inputs.at_rest((2,), 2, 1), said(U, True, True), (0.5,), 0.1)
-    last, doubt = inputs.hear(flown, said(U + 1, True, False), (0.5,), 0.1).last
+    last, doubt = Inputs((0.5,), 0.1).after(U, ALL).after(U + 1, [True, False]).last
     np.testing.assert_array_equal(last, [U[0] + 1, U[1] / 2])
     np.testing.assert_allclose(doubt, [np.zeros((2, 2)), 0.01 * np.eye(2)], atol=1e-16)
 
 
 def test_losses_in_a_row_draw_the_input_to_rest_and_add_up_their_doubt():
     a, sigma = 0.9, 0.2
-    flown = inputs.hear(inputs.at_rest((2,), 2, 1), said(U, True, True), (a,), sigma)
+    flown = Inputs((a,), sigma).after(U, ALL)
     for losses, variance in ((1, 0.04), (2, 0.04 * (1 + 0.81)), (3, 0.04 * (1 + 0.81 + 0.6561))):
-        flown = inputs.hear(flown, LOST, (a,), sigma)
-        last, doubt = flown.last
+        last, doubt = flown.after().last
         np.testing.assert_allclose(last, a**losses * U)
         np.testing.assert_allclose(doubt, np.broadcast_to(variance * np.eye(2), (2, 2, 2)), atol=1e-16)
-    np.testing.assert_array_equal(inputs.hear(flown, said(U, True, True), (a,), sigma).last[1], np.zeros((2, 2, 2)))
+    np.testing.assert_array_equal(flown.after(U, ALL).last[1], np.zeros((2, 2, 2)))
 
 
-def test_the_last_input_is_held_by_a_coefficient_of_one():
-    flown = inputs.hear(inputs.at_rest((2,), 2, 1), said(U, True, True), (1.0,), 0.0)
+@pytest.mark.parametrize("sigma", [0.0, 0.3])
+def test_the_last_input_is_held_by_a_coefficient_of_one(sigma):
+    flown = Inputs((1.0,), sigma).after(U, ALL)
     for _ in range(5):
-        flown = inputs.hear(flown, LOST, (1.0,), 0.0)
+        flown.after()
     np.testing.assert_array_equal(flown.last[0], U)
 
 
 def test_without_coefficients_who_is_not_heard_is_surely_at_rest():
-    flown = inputs.hear(inputs.at_rest((2,), 2, 0), said(U, True, True), (), 0.5)
-    last, doubt = inputs.hear(flown, LOST, (), 0.5).last
+    last, doubt = Inputs((), 0.5).after(U, ALL).after().last
     np.testing.assert_array_equal(last, np.zeros((2, 2)))
     np.testing.assert_array_equal(doubt, np.zeros((2, 2, 2)))
 
 
 def test_a_model_of_order_two_remembers_two_ticks():
-    a, sigma = (0.5, 0.25), 0.2
-    flown = inputs.hear(inputs.at_rest((2,), 2, 2), said(U, True, True), a, sigma)
-    flown = inputs.hear(flown, said(4 * U, True, True), a, sigma)
-    flown = inputs.hear(flown, LOST, a, sigma)
+    flown = Inputs((0.5, 0.25), 0.2).after(U, ALL).after(4 * U, ALL).after()
     np.testing.assert_allclose(flown.last[0], (0.5 * 4 + 0.25) * U)
     np.testing.assert_allclose(flown.last[1], np.broadcast_to(0.04 * np.eye(2), (2, 2, 2)))
-    flown = inputs.hear(flown, LOST, a, sigma)
+    flown.after()
     np.testing.assert_allclose(flown.last[0], (0.5 * 2.25 + 0.25 * 4) * U)
     np.testing.assert_allclose(flown.last[1], np.broadcast_to(0.04 * 1.25 * np.eye(2), (2, 2, 2)))
 
@@ -308,23 +325,20 @@ def test_a_model_of_order_two_remembers_two_ticks():
 @pytest.mark.parametrize("a", [(0.9,), (1.9, -0.9), (0.5, 0.25), (1.2, -0.5, 0.25)])
 def test_after_losses_in_a_row_inputs_are_as_wrong_as_they_say(a):
     """The doubt is that of the process driven so many times, whose inputs are correlated."""
-    sigma, flown = 0.5, inputs.hear(inputs.at_rest((2,), 2, len(a)), said(U, True, True), a, 0.5)
+    sigma, flown = 0.5, Inputs(a, 0.5).after(U, ALL)
     answers = [1.0]  # the input k ticks after a unit impulse
     for losses in range(1, 21):
-        flown = inputs.hear(flown, LOST, a, sigma)
         variance = sigma**2 * sum(answer**2 for answer in answers)
-        np.testing.assert_allclose(flown.last[1], np.broadcast_to(variance * np.eye(2), (2, 2, 2)), rtol=1e-9)
+        np.testing.assert_allclose(flown.after().last[1], np.broadcast_to(variance * np.eye(2), (2, 2, 2)), rtol=1e-9)
         assert losses == len(answers)
         answers.append(sum(weight * answer for weight, answer in zip(a, answers[::-1], strict=False)))
 
 
-def test_what_is_heard_leaves_the_doubt_of_what_was_lost_before():
-    a, sigma = (0.5, 0.25), 0.2
-    flown = inputs.hear(inputs.at_rest((2,), 2, 2), LOST, a, sigma)
-    flown = inputs.hear(flown, said(U, True, True), a, sigma)
-    last, doubt = inputs.hear(flown, LOST, a, sigma).last
-    np.testing.assert_allclose(last, 0.5 * U)
-    np.testing.assert_allclose(doubt, np.broadcast_to(0.04 * (1 + 0.25**2) * np.eye(2), (2, 2, 2)))
+def test_what_is_heard_says_something_of_what_was_lost_before():
+    """The input lost was N(0, .04), the next .5 of it + N(0, .04): given that, .4 of it is expected, with .032 left."""
+    last, doubt = Inputs((0.5, 0.25), 0.2).after().after(U, ALL).after().last
+    np.testing.assert_allclose(last, (0.5 + 0.25 * 0.4) * U)
+    np.testing.assert_allclose(doubt, np.broadcast_to((0.04 + 0.25**2 * 0.032) * np.eye(2), (2, 2, 2)))
 
 
 @BOTH
@@ -349,11 +363,8 @@ def test_an_input_that_is_lost_widens_the_edge_by_its_doubt_over_a_tick(kind):
     np.testing.assert_allclose(widened, [0 * lost, lost, 0 * lost, lost], atol=1e-14)
     if kind is JointEdgeFilter:
         # Neighbours are driven each by itself: nothing is added between edges.
-        np.testing.assert_allclose(
-            apart(some_lost.covariance - all_heard.covariance, 2),
-            some_lost.covariance - all_heard.covariance,
-            atol=1e-14,
-        )
+        widened = some_lost.edges.edges[1] - all_heard.edges.edges[1]
+        np.testing.assert_allclose(apart(widened, 2), widened, atol=1e-14)
 
 
 # Filters without a model of motion

@@ -140,6 +140,8 @@ def zhao7():
         leads=links.present & formation.is_leader[links.neighbours],
         sensor=Sensor("coordinates", 0.01 * np.eye(2)),
         process=np.zeros((7, 8, 8)),
+        persistence=0.0,
+        lateness=0,
         leader=formation.is_leader,
         target=None,
         mission=corridor(np.arange(0, 125, 0.01)),

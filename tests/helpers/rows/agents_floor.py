@@ -8,9 +8,10 @@ import numpy as np
 from briefs import BRIEF, of_all
 
 from agents import agent, estimate
-from agents.algebra import blocks, constraints, geometry, inputs, kalman, prediction, redcho, small, starts
+from agents.algebra import blocks, constraints, geometry, kalman, prediction, redcho, small, starts, tape
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
+from agents.algebra.unknowns import Belief, EdgeModel
 from agents.centre.checked import CheckedCentre
 from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
@@ -40,14 +41,32 @@ OFFSETS = np.random.default_rng(5).normal(size=(9, 2)).tolist()
 NOISE = np.array([[0.02, 0.01], [0.01, 0.03]])
 FIVE = Formation(np.random.default_rng(8).normal(size=(5, 2)), tuple(combinations(range(1, 6), 2)), ())
 CENTRE = SwarmFilter(
-    of_all(FIVE, dt=0.013, sensor=Sensor("coordinates", NOISE), displacement=0.1 * np.eye(2)), prior_position=1.0
+    of_all(FIVE, dt=0.013, sensor=Sensor("coordinates", NOISE), displacement=0.1 * np.eye(2), persistence=0.6),
+    prior_position=1.0,
 )
 FILTERS = EdgeFilters()
+MODEL = EdgeModel(0.013, (0.5, -0.3), 0.2, 0.6)
+TAPED = (
+    real(3, 2),
+    real(3, 2),
+    real(3, NEIGHBOURS, 2),
+    truth(3, NEIGHBOURS),
+    real(3, NEIGHBOURS, 2),
+    truth(3, NEIGHBOURS),
+)
 F, Q = kalman.motion("constant-velocity", 2, 0.013, 0.7)
 
 
 def _brief(**held):
     return SimpleNamespace(dt=0.013, **held)
+
+
+def _tape(before, *taken_in):
+    return tape.Tape(Belief(before, 2.0 * before), tape.TakenIn(*taken_in))
+
+
+def _step(before, tick):
+    return Belief(before.mean + tick.own, before.covariance * tick.own), tick.known
 
 
 def _estimate(relative, known, spread=None):
@@ -79,8 +98,10 @@ CASES = {
     "agents.brief.Brief.degree": of(lambda stress: replace(BRIEF, stress=stress).degree, real(NEIGHBOURS)),
     **{
         name: of(
-            lambda position, spread, *heard, centre=centre: centre.step(Whole(position, spread), *heard),
-            *(real(5, 2), covariance(10, 10), real(5, 4, 2), truth(5, 4), real(5, 2)),
+            lambda position, pushed, spread, *heard, centre=centre: centre.step(
+                Whole(position, pushed, spread), *heard
+            ),
+            *(real(5, 2), real(5, 2), covariance(20, 20), real(5, 4, 2), truth(5, 4), real(5, 2)),
         )
         for name, centre in (
             ("agents.estimators.centralized.SwarmFilter.step", CENTRE),
@@ -128,20 +149,43 @@ CASES = {
         lambda theta, gram, theirs, counts: geometry.indicator(_fit(theta, gram), theirs, counts),
         *(real(2, 2), covariance(2, 2), real(NEIGHBOURS, 2, 2), truth(NEIGHBOURS)),
     ),
-    "agents.algebra.inputs.NeighbourInputs.last": of(
-        lambda flown, spread: inputs.NeighbourInputs(flown, spread).last,
-        real(NEIGHBOURS, 3, 2),
-        covariance(NEIGHBOURS, 3, 3),
+    "agents.algebra.unknowns.EdgeModel.ahead": of(
+        lambda mean, spread, pushed: MODEL.ahead(Belief(mean, spread), pushed),
+        *(real(4, 2), covariance(8, 8), covariance(2, 2)),
     ),
-    "agents.algebra.inputs.hear": of(
-        lambda flown, spread, velocity, fresh: inputs.hear(
-            inputs.NeighbourInputs(flown, spread), Heard({"velocity": velocity}, fresh), np.linspace(0.5, -0.3, 9), 0.2
-        ),
-        *(real(NEIGHBOURS, 9, 2), covariance(NEIGHBOURS, 9, 9), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.algebra.unknowns.EdgeModel.hear": of(
+        lambda mean, spread, flown, known: MODEL.hear(Belief(mean, spread), flown, known),
+        *(real(4, 2), covariance(8, 8), real(2), truth(2)),
     ),
+    "agents.algebra.unknowns.EdgeModel.move": of(
+        lambda mean, spread, own: MODEL.move(Belief(mean, spread), own),
+        *(real(4, 2), covariance(8, 8), real(2)),
+    ),
+    "agents.algebra.unknowns.Belief.edges": of(
+        lambda mean, spread: Belief(mean, spread).edges, real(5, 2), covariance(10, 10)
+    ),
+    "agents.algebra.unknowns.Belief.doubted": of(
+        lambda mean, spread: Belief(mean, spread).doubted, real(5, 2), covariance(4, 4)
+    ),
+    "agents.algebra.unknowns.Belief.corrected": of(
+        lambda mean, spread, doubted, left: Belief(mean, spread).corrected(doubted, left),
+        *(real(5, 2), covariance(4, 4), real(4), covariance(4, 4)),
+    ),
+    "agents.algebra.unknowns.Belief.placed": of(
+        lambda mean, spread, edges: Belief(mean, spread).placed(edges), real(5, 2), covariance(4, 4), real(2)
+    ),
+    "agents.algebra.tape.turned": of(
+        lambda *given: tape.turned(_tape(*given[:6]), Belief(given[6], given[6]), *given[7:]),
+        *(*TAPED, real(2), real(2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    ),
+    "agents.algebra.tape.written": of(
+        lambda *given: tape.written(_tape(*given[:6]), Heard({"velocity": given[6]}, *given[7:]))[0],
+        *(*TAPED, real(NEIGHBOURS, 2), truth(NEIGHBOURS), whole(4, NEIGHBOURS)),
+    ),
+    "agents.algebra.tape.flown": of(lambda *given: tape.flown(_tape(*given), 2, _step), *TAPED),
     "agents.estimators.joint_kf.corrected": of(
-        joint_kf.corrected,
-        *(real(NEIGHBOURS, 2), covariance(18, 18), real(NEIGHBOURS, 2), covariance(18, 18), truth(NEIGHBOURS)),
+        lambda mean, spread, *measured: joint_kf.corrected(Belief(mean, spread), *measured),
+        *(real(3, 18), covariance(36, 36), real(18), covariance(18, 18), truth(NEIGHBOURS)),
     ),
     "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)

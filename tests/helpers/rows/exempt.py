@@ -88,7 +88,7 @@ EXEMPT = {
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
     """,
     SHAPES: """
-        agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.inputs.at_rest
+        agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.unknowns.EdgeModel.begin
         agents.algebra.kalman.motion agents.algebra.kalman.embedded agents.algebra.kalman.unknown
         agents.estimators.rkf.EdgeFilters.unknown
     """,

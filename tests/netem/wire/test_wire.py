@@ -337,6 +337,8 @@ BRIEF = Brief(
     leads=np.array([True, False, False]),
     sensor=Sensor("coordinates", 0.01 * np.eye(2)),
     process=1e-6 * np.arange(36.0).reshape(6, 6),
+    persistence=0.0,
+    lateness=0,
     leader=np.array(False),
     target=Target(2, 1.0, np.array([100, 50]), np.array([0.01, 0.1])),
     mission=Manoeuvre(theta=np.eye(2)[None] * np.ones((4, 1, 1)), offset=np.zeros((4, 2))),

@@ -1,0 +1,153 @@
+"""What a filter remembers of the last ticks, so that it can fly them again when an input of one of them is heard late.
+
+An input that comes late belongs to the tick in which it was flown. Whoever takes it for that of now, or carries each on by a
+model and counts it as news, is too sure: inputs heard a hundred ticks late, one after the other, share nearly all that drove
+them since. So the filter goes back to that tick, and takes in everything again. It then believes what it would have believed
+had that input been heard in time, and the later ones not yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from agents.exchange import Heard
+from analysis.models.arrays import Array, Mask
+
+T = TypeVar("T", bound=tuple[Any, ...])
+
+
+class TakenIn(NamedTuple):
+    """What an agent took in in a tick, or in each of many, with an axis for them after the batch's.
+
+    Parameters
+    ----------
+    own
+        Its own input from the tick before, shape (..., D), in metres per second.
+    measured, seen
+        The edges, shape (..., n, D), and which were measured, shape (..., n).
+    inputs, known
+        The neighbours' inputs from the tick before, shape (..., n, D), in metres per second, and which it knows, (..., n).
+    """
+
+    own: Array
+    measured: Array
+    seen: Mask
+    inputs: Array
+    known: Mask
+
+
+class Tape(NamedTuple, Generic[T]):
+    """The last ticks, newest first, along an axis after the batch's: what was believed before each, and what was taken in."""
+
+    before: T
+    ticks: TakenIn
+
+
+def refuse_forgetful(memory: int) -> None:
+    """Refuse a memory of less than nothing.
+
+    Raises
+    ------
+    ValueError
+        When it is negative.
+    """
+    if memory < 0:
+        raise ValueError(f"memory counts ticks, from 0; got {memory}")
+
+
+def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int) -> Tape[T]:
+    """A tape of nothing, for the newest tick and so many before it.
+
+    Parameters
+    ----------
+    before
+        What is believed at the beginning, with axes `batch`.
+    batch
+        Leading axes.
+    edges
+        How many edges an agent has, and in how many dimensions.
+    memory
+        In ticks.
+    """
+    kept, axis = (*batch, memory + 1), len(batch)
+    nothing, no = np.zeros((*kept, *edges)), np.zeros((*kept, edges[0]), dtype=bool)
+    own = np.zeros((*kept, edges[1]))
+    repeated = _each(lambda array: np.repeat(np.expand_dims(array, axis), memory + 1, axis), before)
+    return Tape(repeated, TakenIn(own, nothing, no, nothing, no))
+
+
+def turned(tape: Tape[T], before: T, own: Array, measured: Array, seen: Mask) -> Tape[T]:
+    """The tape of a tick later: what is believed before it, and what is taken in in it; of inputs nothing is known yet."""
+    axis = seen.ndim - 1
+    own = np.broadcast_to(own, (*measured.shape[:-2], measured.shape[-1]))
+    newest = TakenIn(own, measured, seen, np.zeros_like(measured), np.zeros_like(seen))
+
+    def pushed(new: Array, past: Array) -> Array:
+        kept = past[(slice(None),) * axis + (slice(0, past.shape[axis] - 1),)]
+        return np.concatenate([np.expand_dims(new, axis), kept], axis=axis)
+
+    return Tape(_each(pushed, before, tape.before), _each(pushed, newest, tape.ticks))
+
+
+def written(tape: Tape[T], said: Heard) -> tuple[Tape[T], int]:
+    """The tape with the inputs that were heard, each in the tick that it belongs to, and how many ticks ago news of it begins.
+
+    What is older than the tape is lost, and what is known stays as it was heard first.
+
+    Parameters
+    ----------
+    tape
+        Of this tick.
+    said
+        What arrived on the channel of inputs.
+    """
+    ticks = tape.ticks
+    ago = np.arange(ticks.known.shape[-2])[:, None]
+    arrived = said.fresh[..., None, :] & (np.broadcast_to(said.age, said.fresh.shape)[..., None, :] == ago)
+    news = arrived & ~ticks.known
+    inputs = np.where(news[..., None], said.fields["velocity"][..., None, :, :], ticks.inputs)
+    oldest = int((ago * news).max(initial=0))
+    return tape._replace(ticks=ticks._replace(inputs=inputs, known=ticks.known | arrived)), oldest
+
+
+def flown(tape: Tape[T], oldest: int, step: Callable[[T, TakenIn], tuple[T, Array]]) -> tuple[T, Tape[T], Array]:
+    """What is believed now, the tape with what was believed before, and the innovations of this tick.
+
+    Parameters
+    ----------
+    tape
+        With all that was heard.
+    oldest
+        How many ticks ago there is news. Where there is none, the same ticks give the same bits again.
+    step
+        What a tick makes of a belief, and its innovations.
+    """
+    axis = tape.ticks.seen.ndim - 2
+    believed = _at(tape.before, oldest, axis)
+    after: list[T] = []
+    innovation = np.zeros(0)
+    for ago in range(oldest, -1, -1):
+        believed, innovation = step(believed, _at(tape.ticks, ago, axis))
+        after.insert(0, believed)
+    if not oldest:
+        return believed, tape, innovation
+
+    def renewed(old: Array, *new: Array) -> Array:
+        untouched = old[(slice(None),) * axis + (slice(oldest, None),)]
+        return np.concatenate([np.stack(new, axis=axis), untouched], axis=axis)
+
+    return believed, tape._replace(before=_each(renewed, tape.before, *after[1:])), innovation
+
+
+def _at(many: T, ago: int, axis: int) -> T:
+    return _each(lambda array: array[(slice(None),) * axis + (ago,)], many)
+
+
+def _each(make: Callable[..., Array], first: Any, *others: Any) -> Any:
+    """Nested tuples of what is made of the arrays that stand in the same place in all of them."""
+    if isinstance(first, tuple):
+        return type(first)(*(_each(make, *same) for same in zip(first, *others, strict=True)))
+    return make(first, *others)
