@@ -12,7 +12,18 @@ from typing import Any
 import numpy as np
 import psutil
 
-from affinet.planning import algorithms, checks, limits, network, own_losses, recordings, registry, script, tryout
+from affinet.planning import (
+    algorithms,
+    checks,
+    limits,
+    network,
+    own_losses,
+    phases,
+    recordings,
+    registry,
+    script,
+    tryout,
+)
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swarm_of, world_of
 from affinet.planning.plan import Plan, PlanError, agents_of
 from affinet.scenario import inputs, loading
@@ -133,6 +144,8 @@ def _make(given: Scenario) -> Plan:
     ]
     found = [*findings, *aired, *(note for _, said in degraded for note in said)]
     found += checks.timeline(played.faults, given.time.ticks, given.time.dt)
+    if law.build().by_stress:
+        found += phases.of_timeline(swarm, world.links, played.faults)
     plan = Plan(
         scenario=given,
         world=world,
