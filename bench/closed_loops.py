@@ -4,9 +4,8 @@
 
 Of every case of a study whose estimator is `ral` or `conral`: these are linear where the graph stays as it is, and so the
 formation is, axis by axis, a linear system of the followers' positions, of what the law sums up and of the consensus maps.
-Laws that hear
-velocities are left out. Prints its slowest rate (1/s) in each phase, where nothing changes for ever: below 0 it settles, 0 is a mode without control,
-above it grows. One tick of estimator and law, as they fly, gives the system, without noise.
+One tick of estimator and law, as they fly, gives it, without noise. Prints its slowest rate (1/s) in each phase, as if that
+went on for ever: below 0 it settles, 0 is a mode without control, above it grows. Laws that hear velocities are left out.
 """
 
 from __future__ import annotations
