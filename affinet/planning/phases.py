@@ -56,13 +56,16 @@ def completed_stress(swarm: SwarmBrief, links: Links, graph: Graph) -> tuple[Arr
 
 
 def of_timeline(swarm: SwarmBrief, links: Links, faults: Sequence[Fault]) -> list[Finding]:
-    """For each phase in which followers miss edges: the eigenvalues of their completed stress, and what they leave open."""
+    """For each graph in which followers miss edges: the eigenvalues of their completed stress, and what they leave open."""
     whole = _graph(swarm, links, Timeline(links, ()).at(0))
-    found = [
-        _finding(swarm, links, one, whole)
-        for one in phases(swarm, links, faults)
-        if not _same(swarm, links, one.graph, whole)
-    ]
+    alike: list[list[Phase]] = []
+    for phase in phases(swarm, links, faults):
+        kept = next((others for others in alike if _same(swarm, links, others[0].graph, phase.graph)), None)
+        if kept is not None:
+            kept.append(phase)
+        elif not _same(swarm, links, phase.graph, whole):
+            alike.append([phase])
+    found = [_finding(swarm, links, first, len(again), whole) for first, *again in alike]
     if waiting := sum(fault.trigger is not None for fault in faults):
         says = f"of {waiting} that wait for a condition, nobody knows the time: these faults are in no phase"
         found.append(Finding("phases", "ok", says))
@@ -95,12 +98,10 @@ def _same(swarm: SwarmBrief, links: Links, one: Graph, other: Graph) -> bool:
     return bool((one.measured == other.measured)[followed].all() and (one.steered == other.steered).all())
 
 
-def _finding(swarm: SwarmBrief, links: Links, phase: Phase, whole: Graph) -> Finding:
-    graph, dt = phase.graph, swarm.dt
-    check, when = (
-        f"phase {phase.start * dt:g} s",
-        f"from {phase.start * dt:g} to {phase.end * dt:g} s {_without(links, graph, whole)}",
-    )
+def _finding(swarm: SwarmBrief, links: Links, phase: Phase, again: int, whole: Graph) -> Finding:
+    graph, begin, end = phase.graph, phase.start * swarm.dt, phase.end * swarm.dt
+    more = f", and {again} times more," if again else ""
+    check, when = f"phase {begin:g} s", f"from {begin:g} to {end:g} s{more} {_without(links, graph, whole)}"
     if not graph.steered.any():
         return Finding(check, "note", f"{when}: no follower takes part")
     matrix, fits = completed_stress(swarm, links, graph)

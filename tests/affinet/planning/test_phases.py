@@ -82,6 +82,13 @@ def test_phases_begin_and_end_where_the_graph_changes_and_nowhere_else():
     assert found[1][2].endswith("eigenvalues 0.0000, 0.3421, 0.7738; 1 mode uncontrolled under RAL")
 
 
+def test_a_graph_that_comes_back_is_told_once():
+    cut = '{ verb = "cut", at = 1, lasts = 0.1, every = 0.5, links = ["6-7"] }'
+    ((check, _, says),) = said(plan(cut))
+    assert check == "phase 1 s"
+    assert says.startswith("from 1 to 1.1 s, and 5 times more, without 7->6, 6->7: ")
+
+
 @pytest.mark.parametrize(
     "fault",
     [
