@@ -25,7 +25,7 @@ _INDEPENDENT, _HALF_A_SECOND = "0.0143", "0.5"
 _SHOWN = {"none": ("no estimator", "C7"), "rkf": ("RKF", "C1"), "ga-rkf": ("GA-RKF", "C0")}
 _OTHERS = {"ral": ("RAL", "C4"), "conral": ("conRAL", "C2")}
 _LOST = 1.0  # m²
-_HIGHEST, _LOWEST = 1e4, 3e-3  # m², of what is drawn
+_HIGHEST, _LOWEST = 1e4, 1e-3  # m², of what is drawn
 
 
 def main(given: Sequence[str]) -> None:
