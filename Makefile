@@ -6,8 +6,9 @@ READY := .venv/.ready
 
 .PHONY: demo help test test-room test-all test-pythons test-wheel coverage lint types imports picture bench clean
 
-demo: $(READY) ## fly the corridor over processes
-	$(BIN)/affinet run corridor
+demo: $(READY) ## fly through bursts of losses over processes, and the same losses again with a filter alone
+	$(BIN)/affinet run bursts
+	$(BIN)/affinet run bursts --estimator rkf --runtime inprocess
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk -F '  ' '{ printf "  make %-13s %s\n", $$1, $$2 }'

@@ -19,6 +19,7 @@ from affinet.planning import (
     limits,
     network,
     own_losses,
+    phases,
     recordings,
     registry,
     script,
@@ -144,6 +145,8 @@ def _make(given: Scenario) -> Plan:
     ]
     found = [*findings, *aired, *(note for _, said in degraded for note in said)]
     found += checks.timeline(played.faults, given.time.ticks, given.time.dt)
+    if law.build().by_stress:
+        found += phases.of_timeline(swarm, world.links, played.faults)
     plan = Plan(
         scenario=given,
         world=world,

@@ -26,7 +26,8 @@ def test_a_killed_agent_that_forgot_everything_finds_its_place_again(swarm):
 
 def test_an_agent_that_kept_its_state_is_back_sooner_than_one_that_did_not(swarm):
     """Whoever learns the swarm's velocity by integrating pays for amnesia long after the reboot."""
-    killed = swarm("switching", COARSE, "time.duration=32", "timeline=[]").fault("kill", agents=[6], at=26)
+    gains = "agents.parameters.constant-velocity={ alpha = 10.0, eta = 0.1 }"
+    killed = swarm("switching", COARSE, gains, "time.duration=32", "timeline=[]").fault("kill", agents=[6], at=26)
     cold = killed.fault("restart", agents=[6], at=27, state="cold").fly()
     warm = killed.fault("restart", agents=[6], at=27, state="warm").fly()
     afterwards = slice(cold.tick(28), None)

@@ -10,6 +10,11 @@ from paths import BENCH, ROOT
 pytestmark = PROCESSES
 
 SMALLEST = {
+    "closed_loops": (
+        ("paper-000-fig12cd", "--cases", "6"),
+        "| zhao7, constant velocity, ral | ral | 0: -0.591, 12: -2.17, 28: 0, 44: 0 |\n"
+        "| zhao7, constant velocity, conral | conral | 0: -0.591, 12: -2.16, 28: -0.707, 44: -0.999 |\n",
+    ),
     "lockstep": (("--ticks", "5", "--rounds", "1", "--swarms", "corridor"), "| corridor, 7 agents | "),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }

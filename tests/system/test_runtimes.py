@@ -18,8 +18,8 @@ pytestmark = PROCESSES
 COARSE = ("time.dt=0.05", "agents.parameters.constant-velocity.eta=0.5")
 # There is no fault in these, and they are flown below, or are the same all along; the last two need other ticks, or gains.
 SHORTENED = {
-    **dict.fromkeys(("ravine", "corridor", "hexa", "rigid"), ("time.duration=6",)),
-    "switching": ("time.dt=0.1",),
+    **dict.fromkeys(("ravine", "corridor", "bursts", "hexa", "rigid"), ("time.duration=6",)),
+    "switching": ("time.dt=0.1", "agents.parameters.constant-velocity.alpha=10"),
     "target": (
         "time.dt=0.01",
         "time.duration=1.7",

@@ -34,3 +34,14 @@ def test_where_losses_last_it_holds_the_formation_that_the_filter_alone_loses():
     alone, aware = (flown("corridor", estimator, *BURSTS) for estimator in ("rkf", "ga-rkf"))
     assert aware.mean_error.mean() < 1.0
     assert alone.mean_error.mean() > 10.0
+
+
+def test_the_demo_shows_it():
+    """In the very scenario of `make demo`, with a tick five times as long: bursts of half a second."""
+    bursts = 'network.profiles.bursts.loss=[{ model = "gilbert", loss = 0.3, burst = 10.0 }]'
+    air = (bursts, "time.dt=0.05", "time.duration=40")
+    none, alone, aware = (flown("bursts", estimator, *air) for estimator in ("none", "rkf", "ga-rkf"))
+    since = aware.quantities["error"][:, aware.seconds >= 20]
+    assert (since < 1.0).all()
+    for lost in (none, alone):
+        assert lost.mean_error.mean() > 10 * aware.mean_error.max()

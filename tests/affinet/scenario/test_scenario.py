@@ -542,7 +542,7 @@ def test_a_file_that_is_no_text_is_named(file):
 def test_a_scenario_that_does_not_exist_is_refused_with_those_that_are_shipped(name):
     with pytest.raises(
         ScenarioError,
-        match=rf"^{name}: no such file, and no such scenario; (did you mean 'corridor'\? )?shipped are corridor, hexa, ",
+        match=rf"^{name}: no such file, and no such scenario; (did you mean 'corridor'\? )?shipped are bursts, corridor, ",
     ):
         loading.load(name)
 

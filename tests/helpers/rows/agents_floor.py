@@ -8,7 +8,7 @@ import numpy as np
 from briefs import BRIEF, of_all
 
 from agents import agent, estimate
-from agents.algebra import blocks, constraints, geometry, kalman, prediction, redcho, small, starts, tape
+from agents.algebra import blocks, completion, constraints, geometry, kalman, prediction, redcho, small, starts, tape
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
 from agents.algebra.unknowns import Belief, EdgeModel
@@ -140,6 +140,9 @@ CASES = {
     "agents.algebra.blocks.diagonal_blocks": of(lambda matrix: blocks.diagonal_blocks(matrix, 2), real(18, 18)),
     "agents.estimators.edge_kf.of_edges": of(
         lambda process: edge_kf.of_edges(_brief(process=process, dimension=2)), real(18, 18)
+    ),
+    "agents.algebra.completion.completed": of(
+        completion.completed, real(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS, p=0.5)
     ),
     "agents.algebra.geometry.gram": of(geometry.gram, real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     "agents.algebra.geometry.inverse_gram": of(geometry.inverse_gram, covariance(2, 2), truth()),

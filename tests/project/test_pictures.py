@@ -1,0 +1,52 @@
+"""The README's first picture is drawn from the data of the study that it names."""
+
+import draw_bursts
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from PIL import Image
+
+from affinet.studies import study
+
+AXES = {axis.name: list(axis.values) for axis in study.load("bursts").axes}
+
+
+@pytest.fixture
+def left(tmp_path):
+    """What the study would leave: errors that grow with the burst, and by estimator."""
+
+    def write(factor):
+        folder = tmp_path / f"{factor:g}"
+        folder.mkdir()
+        moments, runs = [], []
+        for graph in AXES["graph"]:
+            for number, estimator in enumerate(AXES["estimator"]):
+                for burst in AXES["mean burst (s)"]:
+                    labels = {"graph": graph, "estimator": estimator, "mean burst (s)": burst}
+                    error = factor * (1 + number) * float(burst)
+                    moments += [{**labels, "seconds": second, "mean_error": error} for second in (0.0, 1.0)]
+                    runs.append({**labels, "mean_error": np.nan if burst == "2" else error})
+        pq.write_table(pa.Table.from_pylist(moments), folder / "curves.parquet")
+        pq.write_table(pa.Table.from_pylist(runs), folder / "runs.parquet")
+        return folder
+
+    return write
+
+
+def drawn(folder):
+    draw_bursts.draw(folder, folder / "picture.png")
+    with Image.open(folder / "picture.png") as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+def test_the_picture_shows_the_data(left):
+    one, other = drawn(left(1.0)), drawn(left(3.0))
+    assert min(one.shape[:2]) > 300
+    assert one.shape == other.shape
+    assert (one != other).any()
+
+
+def test_who_names_no_study_is_told():
+    with pytest.raises(SystemExit, match="give the directory that `affinet study bursts` has left"):
+        draw_bursts.main([])
