@@ -150,17 +150,18 @@ class JacobiOverRelaxation(Estimator[Belief]):
         return np.where((anybody & ~fixed)[..., None], stepped, place)
 
     def _edges(self, brief: Brief, own: Side, other: Side) -> tuple[Array, Array]:
-        """Inverse covariances of the edges, both sides together, (..., n, D, D), and these times what was measured."""
-        information, pull = np.zeros(1), np.zeros(1)
-        for side in (own, other):
-            known = side.seen[..., None, None]
-            spread = brief.sensor.spread(side.measured)
-            if self.covariance == "diagonal":
-                spread = spread * identity(brief.dimension)
-            precision = np.where(known, inverse(np.where(known, spread, identity(brief.dimension))), 0.0)
-            information = information + precision
-            pull = pull + product(precision, side.measured[..., None])[..., 0]
-        return information, pull
+        """Inverse covariances of the edges, both sides together, (..., n, D, D), and these times what was measured.
+
+        Both sides weigh as where their mean puts the neighbour: a weight by one's own noise prefers what fell short.
+        """
+        number = own.seen.astype(np.float64) + other.seen
+        total = np.where(own.seen[..., None], own.measured, 0.0) + np.where(other.seen[..., None], other.measured, 0.0)
+        known = number[..., None, None] > 0.0
+        spread = brief.sensor.spread(total / np.maximum(number, 1.0)[..., None])
+        if self.covariance == "diagonal":
+            spread = spread * identity(brief.dimension)
+        precision = np.where(known, inverse(np.where(known, spread, identity(brief.dimension))), 0.0)
+        return number[..., None, None] * precision, product(precision, total[..., None])[..., 0]
 
 
 def _noiseless(swarm: SwarmBrief) -> jacobi.EdgeInformation:

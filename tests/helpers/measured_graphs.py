@@ -22,6 +22,13 @@ class Measurement(NamedTuple):
     covariance: np.ndarray
 
 
+def weighed(ends, sensor):
+    """Measurements (i, j, y), each as sure as the sensor is where the mean of those from both ends puts the other."""
+    said = {(i, j): y for i, j, y in ends}
+    both = {(i, j): np.mean([y, -said[j, i]] if (j, i) in said else [y], axis=0) for (i, j), y in said.items()}
+    return [Measurement(i, j, y, sensor.spread(both[i, j])) for (i, j), y in said.items()]
+
+
 def iteration(edges, step):
     """M_JOR = I - h D^-1 Upsilon (12), shape (..., N D, N D), with the step h."""
     matrix, _ = system(edges)

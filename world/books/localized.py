@@ -65,12 +65,14 @@ class FirstMeasurements:
         self.seen = self.seen | delivered
 
     def edges(self) -> jacobi.EdgeInformation:
-        """Each edge, as both its ends know it."""
+        """Each edge, as both its ends know it: with the covariance where the mean of both measurements puts them."""
         agents, (rows, columns) = self.links.agents, (self.links.dst - 1, self.links.src - 1)
         dimension = self.measured.shape[-1]
-        relative = np.zeros((*self.batch, agents, agents, dimension))
-        relative[..., rows, columns, :] = self.measured
-        spread = np.where(self.seen[..., None, None], self.sensor.spread(self.measured), np.eye(dimension))
-        information = np.zeros((*self.batch, agents, agents, dimension, dimension))
-        information[..., rows, columns, :, :] = np.where(self.seen[..., None, None], np.linalg.inv(spread), 0.0)
+        relative, seen = np.zeros((*self.batch, agents, agents, dimension)), np.zeros((*self.batch, agents, agents))
+        relative[..., rows, columns, :] = np.where(self.seen[..., None], self.measured, 0.0)
+        seen[..., rows, columns] = self.seen
+        both = seen + np.swapaxes(seen, -1, -2)
+        middle = (relative - np.swapaxes(relative, -2, -3)) / np.maximum(both, 1.0)[..., None]
+        spread = np.where(seen[..., None, None] > 0.0, self.sensor.spread(middle), np.eye(dimension))
+        information = np.where(seen[..., None, None] > 0.0, np.linalg.inv(spread), 0.0)
         return jacobi.together(relative, information)

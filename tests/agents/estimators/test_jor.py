@@ -9,10 +9,10 @@ from briefs import REST, brief, only
 from measured_graphs import (
     LINE_OF_SIGHT,
     SPACES,
-    Measurement,
     edges_of,
     iterates,
     pairs,
+    weighed,
 )
 
 from agents.estimators.jor import JacobiOverRelaxation, Side
@@ -48,11 +48,12 @@ def one_tick(estimator, agents, links, state, measured, seen, fresh=None):
 
 def known_from(links, measured, seen, sensor):
     """The edges of measurements in slots (N, n, D)."""
-    made = []
-    for i, slot in np.argwhere(seen & links.present).tolist():
-        y = measured[i, slot]
-        made.append(Measurement(i, int(links.neighbours[i, slot]), y, sensor.spread(y)))
-    return edges_of(links.agents, made, measured.shape[-1])
+    return edges_of(links.agents, made_of(links, measured, seen, sensor), measured.shape[-1])
+
+
+def made_of(links, measured, seen, sensor):
+    slots = np.argwhere(seen & links.present).tolist()
+    return weighed([(i, int(links.neighbours[i, slot]), measured[i, slot]) for i, slot in slots], sensor)
 
 
 @SPACES
@@ -105,11 +106,9 @@ def test_diagonals_dismiss_what_axes_have_to_do_with_each_other():
     state = estimator.init(agents, (links.agents,))
     for _ in range(2000):
         state, _ = one_tick(estimator, agents, links, state, measured, links.present)
-    made = [
-        Measurement(i, int(links.neighbours[i, slot]), y, np.diag(np.diag(agents.sensor.spread(y))))
-        for (i, slot), y in ((at, measured[tuple(at)]) for at in np.argwhere(links.present).tolist())
-    ]
-    assert localization.distance(state.place, edges_of(links.agents, made)) < 1e-9
+    made = made_of(links, measured, links.present, agents.sensor)
+    diagonal = [one._replace(covariance=np.diag(np.diag(one.covariance))) for one in made]
+    assert localization.distance(state.place, edges_of(links.agents, diagonal)) < 1e-9
     full = known_from(links, measured, links.present, agents.sensor)
     assert localization.distance(state.place, full) > 1e-3
 
