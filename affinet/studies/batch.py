@@ -57,9 +57,14 @@ class Runs:
         Root mean squares over the agents, in metres, and metres per second or per second squared. NaN where nobody pursues.
 
         `peak`: the longest input of any agent since the moment before, in metres per second or per second squared.
+
+        `roughness`: how much a step of the agents differs from the one before, root mean square over agents and ticks since
+        the moment before, in metres; before the first tick they rest.
+
+        `fall`: by which rate the Procrustes error has fallen since the moment before, per second; NaN in the first.
     first
-        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position`, and
-        the `target` where there is one, (T, D), in metres.
+        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position` and
+        `input`, and the `target` where there is one, (T, D), in metres.
     """
 
     seconds: Array
@@ -108,6 +113,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     psi: list[Array] = []
     first: list[dict[str, Array]] = []
     peak = np.zeros(len(seeds))
+    paths = _Paths()
     places = _Places(plan, len(seeds))
 
     def of_runs(array: Any) -> Any:
@@ -120,30 +126,54 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             lost = (present & ~np.isfinite(flown).all(axis=-1)).any(axis=-1)
             tracking.append(np.where(lost, np.inf, errors.tracking_error(flown, target, present)))
             places.measure(instant, plan.timeline)
+            paths.step(flown, present)
             peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
                 looked_at = _looked_at(together, present, moment)
                 awake = of_runs(~swarm.timeline.at(instant.tick).idle)
                 pursued = _pursued(together, awake, moment, of_runs)
-                kept.append({"peak": peak, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
+                moved = {"peak": peak, "roughness": paths.roughness()}
+                kept.append({**moved, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
                 psi.append(of_runs(moment.psi))
                 first.append(_shown(plan, moment))
                 places.keep(moment)
                 peak = np.zeros(len(seeds))
         error = np.stack(tracking, axis=1)
         mean_error = error.mean(axis=1)
+        seconds = np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt
+        over_moments = {name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]}
     return Runs(
-        seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
+        seconds=seconds,
         mean_error=mean_error,
         psi=np.stack(psi, axis=1),
         quantities={
             "error": error[:, ::every],
-            **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+            **over_moments,
+            "fall": errors.rate_of_fall(seconds, over_moments["procrustes"]),
             **places.found(len(kept)),
         },
         first={name: np.stack([one[name] for one in first]) for name in first[0]},
     )
+
+
+class _Paths:
+    """How rough the paths of many runs are."""
+
+    def __init__(self) -> None:
+        self._recent: list[Array] = []
+        self._squares: list[Array] = []
+
+    def step(self, position: Array, present: Mask) -> None:
+        """Take in where agents are in a tick, shape (R, N, D), and who takes part, (R, N)."""
+        self._recent = [*(self._recent[-2:] or [position, position]), position]
+        self._squares.append(errors.change_of_step(np.stack(self._recent, axis=1), present) ** 2)
+
+    def roughness(self) -> Array:
+        """Since this was asked last, shape (R,), in metres."""
+        found: Array = np.sqrt(np.mean(self._squares, axis=0))
+        self._squares = []
+        return found
 
 
 class _Places:
@@ -215,7 +245,7 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
 def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
     """Of the first run."""
     size, nominal = plan.world.formation.agents, plan.world.formation.nominal
-    said = {"position": moment.position, **moment.reports}
+    said = {"position": moment.position, "input": moment.input, **moment.reports}
     shown = {name: each[:size] for name, each in said.items() if name != NIS}
     return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
 
