@@ -75,6 +75,6 @@ def _plane(panel: Axes, flight: Flight) -> None:
     panel.plot(*flown.transpose(2, 0, 1), lw=0.5)
     panel.plot(*last.T, "o", ms=2.5, color="0.2")
     panel.set_xlabel("x (m)")
-    panel.set_aspect("equal", "datalim")
+    panel.set_aspect("equal", "box")
     panel.tick_params(labelsize=6)
     panel.margins(0.05)
