@@ -66,9 +66,14 @@ class Runs:
         second or per second squared. NaN where nobody pursues.
 
         `peak`: the longest input of any agent since the moment before, in metres per second or per second squared.
+
+        `roughness`: how much a step of the agents differs from the one before, root mean square over agents and ticks since
+        the moment before, in metres; before the first tick they rest.
+
+        `fall`: by which rate the Procrustes error has fallen since the moment before, per second; NaN in the first.
     first
-        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position`, and
-        the `target` where there is one, (T, D), in metres.
+        Of the first run in those ticks: what its estimator reports, by name, shapes (T, N, ...), the agents' `position` and
+        `input`, and the `target` where there is one, (T, D), in metres.
     """
 
     seconds: Array
@@ -128,6 +133,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
     limits: list[Bounds] = []
     first: list[dict[str, Array]] = []
     peak = np.zeros(len(seeds))
+    paths = _Paths()
     places = _Places(plan, len(seeds))
 
     def of_runs(array: Any) -> Any:
@@ -143,13 +149,15 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
             lost = (present & ~np.isfinite(flown).all(axis=-1)).any(axis=-1)
             tracking.append(np.where(lost, np.inf, errors.tracking_error(flown, target, present)))
             places.measure(instant, plan.timeline)
+            paths.step(flown, present)
             peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
                 looked_at = _looked_at(together, present, moment)
                 awake = of_runs(~swarm.timeline.at(instant.tick).idle)
                 pursued = _pursued(together, awake, moment, of_runs)
-                kept.append({"peak": peak, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
+                moved = {"peak": peak, "roughness": paths.roughness()}
+                kept.append({**moved, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
                 psi.append(of_runs(moment.psi))
                 limits.append(_bounds(plan, present, of_links(moment.entry.verdicts)))
                 first.append(_shown(plan, moment))
@@ -157,14 +165,17 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
                 peak = np.zeros(len(seeds))
         error = np.stack(tracking, axis=1)
         mean_error = error.mean(axis=1)
+        seconds = np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt
+        over_moments = {name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]}
     return Runs(
-        seconds=np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt,
+        seconds=seconds,
         mean_error=mean_error,
         psi=np.stack(psi, axis=1),
         bounds=Bounds(*(np.stack(each, axis=1) for each in zip(*limits, strict=True))),
         quantities={
             "error": error[:, ::every],
-            **{name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]},
+            **over_moments,
+            "fall": errors.rate_of_fall(seconds, over_moments["procrustes"]),
             **places.found(len(kept)),
         },
         first={name: np.stack([one[name] for one in first]) for name in first[0]},
@@ -182,6 +193,25 @@ def _bounds(plan: Plan, present: Mask, verdicts: VerdictCodes) -> Bounds:
         for channel in (0, plan.channels.index(lie.CHANNEL))
     )
     return bounds(world.formation.nominal, heard, world.sensor.common, seen, present)
+
+
+class _Paths:
+    """How rough the paths of many runs are."""
+
+    def __init__(self) -> None:
+        self._recent: list[Array] = []
+        self._squares: list[Array] = []
+
+    def step(self, position: Array, present: Mask) -> None:
+        """Take in where agents are in a tick, shape (R, N, D), and who takes part, (R, N)."""
+        self._recent = [*(self._recent[-2:] or [position, position]), position]
+        self._squares.append(errors.change_of_step(np.stack(self._recent, axis=1), present) ** 2)
+
+    def roughness(self) -> Array:
+        """Since this was asked last, shape (R,), in metres."""
+        found: Array = np.sqrt(np.mean(self._squares, axis=0))
+        self._squares = []
+        return found
 
 
 class _Places:
@@ -257,7 +287,7 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
 def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
     """Of the first run."""
     size, nominal = plan.world.formation.agents, plan.world.formation.nominal
-    said = {"position": moment.position, **moment.reports}
+    said = {"position": moment.position, "input": moment.input, **moment.reports}
     shown = {name: each[:size] for name, each in said.items() if name != NIS}
     return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
 

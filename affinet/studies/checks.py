@@ -32,6 +32,7 @@ _PANELS = {
 _INDICATED = {"indicator_below_error", "indicator_follows_error"}
 _ONE_CASE = {"ratio", "value", *_INDICATED}  # checks of a single case
 _SPREAD = {"lower", "ratio", "value", *_INDICATED}  # checks that need more than one run
+_MOST_PATHS = 8  # side by side in a picture
 _PLACES = {"localization", "drift", "ringing", "place_error", "place_nees"}
 _PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"}
 
@@ -49,6 +50,11 @@ def of_cases(study: Study, cases: Sequence[Case], runs: int) -> Iterator[Wrong]:
         return
     if study.figure == "indicator" and len(cases) != 1:
         yield "figure", f"'indicator' is drawn of one case, and there are {len(cases)}: give every axis one label"
+    if study.figure == "paths" and len(cases) > _MOST_PATHS:
+        yield (
+            "figure",
+            f"'paths' are drawn of at most {_MOST_PATHS} cases, and there are {len(cases)}: give axes fewer labels",
+        )
     for number, claim in enumerate(study.claims, start=1):
         key = f"claims.{number}"
         if runs < 2 and claim.check in _SPREAD:
@@ -74,6 +80,8 @@ def of_plans(study: Study, planned: Sequence[Planned], every: Sequence[int]) -> 
             yield "scenario", f"case {named(case.labels)}: {error}"
     moments = {id(plan): range(0, plan.world.ticks, step) for (_, plan), step in zip(planned, every, strict=True)}
     yield from _quantity("quantity", study.quantity, planned)
+    for number, quantity in enumerate(study.also, start=1):
+        yield from _quantity(f"also.{number}", quantity, planned)
     yield from _span("since", (study.since, None), planned, moments)
     if study.figure == "curves" and len({plan.world.formation.dimension for _, plan in planned}) > 1:
         yield (

@@ -30,10 +30,14 @@ NAMES: dict[str, tuple[str, str]] = {
     "behind": ("distance from the places steered for", "m"),
     "effort": ("input", "m/s²"),
     "peak": ("longest input", "m/s²"),
+    "roughness": ("change of a step from the one before", "m"),
+    "fall": ("rate by which the Procrustes error falls", "1/s"),
 }
 
 # Root mean squares over the agents, and so over time as well.
-_ROOT_MEAN_SQUARES = frozenset({"place_error", "found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"})
+_ROOT_MEAN_SQUARES = frozenset(
+    {"place_error", "found", "agreed", "ideal", "apart", "disagreed", "behind", "effort", "roughness"}
+)
 
 
 def _known(name: str) -> str:

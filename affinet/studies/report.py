@@ -15,10 +15,11 @@ import pyarrow.parquet as pq
 
 from affinet.runtimes import directories
 from affinet.studies import record
+from affinet.studies.batch import REPORT
 from affinet.studies.judging import graph_rates
 from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Result, Study
-from analysis.figures import curves, target
+from analysis.figures import curves, paths, target
 from analysis.figures.curves import Curve
 from analysis.figures.target import TargetRun
 from analysis.models.arrays import Array
@@ -75,17 +76,19 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
             [(one.labels, one.runs.seconds, one.runs.first[PLACE]) for one in results],
         )
     axes = [axis.name for axis in study.axes]
-    drawn, quantity = _curves(results, study.quantity, study.since), curves.said(*said(study.quantity))
-    bound = None if study.bound is None else (study.bound.at, study.bound.says)
+    for quantity in study.also:
+        _draw_quantity(out / f"{quantity.removeprefix(REPORT)}.png", study, results, quantity)
     if study.figure == "curves":
-        curves.curves(out / "figure.png", study.title, drawn, axes, quantity, bound)
+        _draw_quantity(out / "figure.png", study, results, study.quantity)
         dimension = results[0].plan.world.formation.dimension
         normalised = {what.upper(): _curves(results, what, study.since) for what in ("nees", "nis")}
         curves.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
     elif study.figure == "sweep":
-        curves.sweep(out / "figure.png", study.title, drawn, axes, study.along or "", quantity, bound)
+        _draw_quantity(out / "figure.png", study, results, study.quantity)
     elif study.figure == "map":
-        curves.settings(out / "figure.png", study.title, drawn, axes)
+        curves.settings(out / "figure.png", study.title, _curves(results, study.quantity, study.since), axes)
+    elif study.figure == "paths":
+        paths.paths(out / "figure.png", study.title, [_path(one) for one in results])
     else:
         (one,) = results
         numbers = np.flatnonzero(one.followers)
@@ -93,6 +96,27 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
         curves.indicator(
             path, study.title, one.runs.seconds, one.runs.quantities["error"], seen, (numbers + 1).tolist()
         )
+
+
+def _draw_quantity(path: Path, study: Study, results: list[Result], quantity: Quantity) -> None:
+    axes, drawn = [axis.name for axis in study.axes], _curves(results, quantity, study.since)
+    bound = None if study.bound is None or quantity != study.quantity else (study.bound.at, study.bound.says)
+    if study.along is None:
+        curves.curves(path, study.title, drawn, axes, curves.said(*said(quantity)), bound)
+    else:
+        curves.sweep(path, study.title, drawn, axes, study.along, curves.said(*said(quantity)), bound)
+
+
+def _path(one: Result) -> paths.Flight:
+    links, first = one.plan.world.links, one.runs.first
+    return paths.Flight(
+        labels=one.labels,
+        seconds=one.runs.seconds,
+        position=first["position"],
+        input=first["input"],
+        edges=np.stack([links.src, links.dst], axis=-1) - 1,
+        shown=int(np.flatnonzero(one.followers)[0]),
+    )
 
 
 def _draw_pursuit(out: Path, study: Study, results: list[Result]) -> None:

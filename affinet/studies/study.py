@@ -130,13 +130,17 @@ class Size(Section):
 
 
 class Study(Section):
-    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis, `since` a second."""
+    """A study. Cases with all labels of an entry of `skip` are left out; a sweep runs `along` an axis, `since` a second.
+
+    Curves and sweeps are drawn of its quantity, and of those in `also`.
+    """
 
     title: str
     source: str
-    figure: Literal["curves", "sweep", "indicator", "map"]
+    figure: Literal["curves", "sweep", "indicator", "map", "paths"]
     scenario: str
     quantity: Quantity = "error"
+    also: list[Quantity] = Field(default_factory=list)
     bound: Bound | None = None
     set: list[str] = Field(default_factory=list)
     full: Size
@@ -158,6 +162,8 @@ class Study(Section):
     def _drawn(self) -> Study:
         if self.figure == "map" and self.quantity != "error":
             raise ValueError(f"a map shows the mean tracking error, and no {self.quantity}")
+        if self.also and self.figure not in ("curves", "sweep"):
+            raise ValueError(f"also is of curves and sweeps, and the figure is {self.figure!r}: leave it out")
         return self
 
     def size(self, *, quick: bool) -> Size:

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
-from analysis.models.elementary import whole_power
+from analysis.models.elementary import log, whole_power
 
 
 def tracking_error(position: Array, target: Array, present: Mask) -> Array:
@@ -59,6 +59,35 @@ def procrustes_error(position: Array, nominal: Array, present: Mask) -> Array:
     U, _, Vt = np.linalg.svd(spread)
     squared = sum_over(whole_power(product(Z, product(U, Vt)) - P, 2), (-2, -1))
     return np.where(finite, np.sqrt(squared) / number, np.nan)
+
+
+def change_of_step(position: Array, present: Mask) -> Array:
+    """How much the last step of agents differs from the one before, root mean square over those present, shape (...), in m.
+
+    It is what makes a path rough: along a smooth one it goes with the square of the tick.
+
+    Parameters
+    ----------
+    position
+        In three ticks in a row, shape (..., 3, N, D), in metres.
+    present
+        Agents that take part, shape (..., N).
+    """
+    steps = np.diff(position, axis=-3)
+    return root_mean_square(steps[..., 1, :, :] - steps[..., 0, :, :], present)
+
+
+def rate_of_fall(seconds: Array, error: Array) -> Array:
+    """By which rate errors (..., T) have fallen since the moment before, shape (..., T), per second: 1/s is to 1/e in a second.
+
+    Its mean over a span is that of the whole fall. NaN in the first moment, and where an error is 0 or no number.
+    """
+    finite = np.isfinite(error) & (error > 0.0)
+    fallen = -np.diff(log(np.where(finite, error, 1.0)), axis=-1) / np.diff(seconds)
+    both = finite[..., 1:] & finite[..., :-1]
+    first = np.full((*error.shape[:-1], 1), np.nan)
+    rates: Array = np.concatenate([first, np.where(both, fallen, np.nan)], axis=-1)[..., : error.shape[-1]]
+    return rates
 
 
 def estimation_error(estimate: Array, true: Array, known: Mask) -> Array:

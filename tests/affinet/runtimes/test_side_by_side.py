@@ -114,15 +114,34 @@ def test_the_longest_input_is_that_of_any_agent_in_any_tick_since_the_moment_kep
         assert (runs.quantities["peak"][row] == longest[::every]).all() == (every == 1)
 
 
+@pytest.mark.parametrize("every", [1, 4])
+def test_roughness_is_that_of_every_step_since_the_moment_kept_before(every):
+    runs = fly_all(plan_of("corridor", *SHORT), (3, 57), every=every)
+    for row, seed in enumerate((3, 57)):
+        position = rehearse(plan_of("corridor", *SHORT, f"seed={seed}")).arrays["position"]
+        steps = np.diff(position, axis=0, prepend=position[[0]])  # at rest before
+        changes = np.diff(steps, axis=0, prepend=steps[[0]])
+        squares = (changes**2).sum(axis=-1).mean(axis=-1)
+        expected = [np.sqrt(squares[max(0, tick - every + 1) : tick + 1].mean()) for tick in range(0, 60, every)]
+        np.testing.assert_allclose(runs.quantities["roughness"][row], expected, rtol=1e-12)
+
+
+def test_the_procrustes_error_falls_by_the_rates_told():
+    runs = fly_all(plan_of("rigid", "time.dt=0.01", "time.duration=1", 'agents.estimator="mle"'), (3, 57), every=10)
+    error, fall = runs.quantities["procrustes"], runs.quantities["fall"]
+    assert np.isnan(fall[:, 0]).all()
+    np.testing.assert_allclose(error[:, -1] / error[:, 0], np.exp(-0.1 * fall[:, 1:].sum(axis=1)))
+
+
 def test_of_the_first_run_of_a_study_everything_that_is_reported_is_kept():
     short = (*SHORT, "time.duration=0.5")
     runs = fly_all(plan_of("corridor", *short), range(3, 60), every=4)  # more than are flown at once
-    assert runs.first.keys() == {"position"}
+    assert runs.first.keys() == {"position", "input"}
     alone = rehearse(plan_of("corridor", *short, "seed=3")).arrays
     np.testing.assert_array_equal(runs.first["position"], alone["position"][:10:4])
     localized = ("localization", "time.duration=0.1")
     runs = fly_all(plan_of(*localized), (5, 6), every=3)
-    assert runs.first.keys() == {"position", "place"}
+    assert runs.first.keys() == {"position", "input", "place"}
     for name, kept in runs.first.items():
         alone = rehearse(plan_of(*localized, "seed=5")).arrays[name]
         np.testing.assert_array_equal(kept, alone[:10:3], name)

@@ -16,7 +16,7 @@ from affinet.studies import judging, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.quantities import NAMES, over_time
 from analysis.claims.intervals import Decision
-from analysis.figures import curves
+from analysis.figures import curves, paths
 from analysis.metrics.indicator import Bounds
 
 pytestmark = PROCESSES
@@ -267,7 +267,8 @@ def made_up(labels, **values_of):
     return study.Result(labels, at_rest(), runs)
 
 
-LARGEST, ROOTS = {"peak"}, {"found", "agreed", "ideal", "apart", "disagreed", "place_error", "behind", "effort"}
+LARGEST = {"peak"}
+ROOTS = {"found", "agreed", "ideal", "apart", "disagreed", "place_error", "behind", "effort", "roughness"}
 
 
 @pytest.mark.parametrize("span", [(0.0, None), (1.0, None), (0.0, 2.0), (1.5, 3.0)], ids=str)
@@ -497,7 +498,8 @@ def drawn(monkeypatch):
             super().__init__(**how)
             kept.append(self)
 
-    monkeypatch.setattr(curves, "Figure", Kept)
+    for module in (curves, paths):
+        monkeypatch.setattr(module, "Figure", Kept)
     return kept
 
 
@@ -539,6 +541,52 @@ def test_a_sweep_shows_what_stands_for_any_quantity_since_a_second(tmp_path, dra
         cases = [one for one in results if one.labels["estimator"] == estimator]
         np.testing.assert_array_equal(bars[0].get_xdata(), [0.5, 1.0])
         np.testing.assert_allclose(bars[0].get_ydata(), [longest(one) for one in cases])
+
+
+@pytest.mark.parametrize("figure", ["curves", "sweep"])
+def test_the_same_figure_is_drawn_of_every_quantity_in_also(figure, tmp_path, drawn):
+    text = SWEEP.replace("bound =", 'also = ["procrustes", "nees"]\nbound =')
+    if figure == "curves":
+        text = text.replace('figure = "sweep"', 'figure = "curves"').replace('along = "availability"\n', "")
+    path = tmp_path / "also.toml"
+    path.write_text(text)
+    both = study.load(str(path))
+    results = [
+        made_up(case.labels, peak=2.0, procrustes=3.0, nees=np.arange(1.0, 5.0))
+        for case in study.cases(both, quick=True)
+    ]
+    reported(tmp_path / "out", both, results)
+    assert {"figure.png", "procrustes.png", "nees.png"} <= {one.name for one in (tmp_path / "out").iterdir()}
+    of_procrustes, of_nees, of_peak, *_ = drawn
+    said = ("Procrustes error (m)", "normalised estimation error squared", "longest input (m/s²)")
+    for one, title in zip((of_procrustes, of_nees, of_peak), said, strict=True):
+        assert title in written_in(one)
+        assert ("the most" in written_in(one)) == (one is of_peak)  # it bounds the quantity of the study alone
+    line = of_nees.axes[0].lines[0].get_ydata()
+    np.testing.assert_allclose(line, np.arange(1.0, 5.0) if figure == "curves" else [3.0, 3.0])
+
+
+def test_paths_are_those_of_the_first_run_of_each_case_with_what_its_first_follower_flies(pair, tmp_path, drawn):
+    pair = pair.model_copy(update={"figure": "paths", "claims": []})
+    results = flown(pair)
+    reported(tmp_path / "out", pair, results)
+    (figure,) = drawn
+    planes, inputs = figure.axes[:2], figure.axes[2:]
+    assert [panel.get_title() for panel in planes] == ["hexa10, none, MLE", "hexa10, none, RKF"]
+    assert [panel.get_title() for panel in inputs] == ["agent 1", "agent 1"]  # its leaders are 4, 5 and 7
+    for plane, flown_by, one in zip(planes, inputs, results, strict=True):
+        position, steered = one.runs.first["position"], one.runs.first["input"]
+        lines = [np.stack(line.get_data(), axis=-1) for line in plane.lines]
+        edges, agents = lines[: len(one.plan.world.links)], lines[-11:-1]
+        for agent in range(10):
+            np.testing.assert_array_equal(agents[agent], position[:, agent])
+        np.testing.assert_array_equal(lines[-1], position[-1])
+        ends = {(round(x, 9), round(y, 9)) for line in edges for x, y in line}
+        assert ends == {(round(x, 9), round(y, 9)) for x, y in position[-1]}
+        for axis, line in enumerate(flown_by.lines):
+            np.testing.assert_array_equal(line.get_ydata(), steered[:, 0, axis])
+    with Image.open(tmp_path / "out" / "figure.png") as picture:
+        assert min(picture.size) > 300
 
 
 @pytest.mark.parametrize(

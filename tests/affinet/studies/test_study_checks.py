@@ -97,6 +97,22 @@ NOT_FLOWN = [
         "figure: 'indicator' is drawn of one case, and there are 4: give every axis one label",
         id="an indicator of four cases",
     ),
+    pytest.param(
+        [('figure = "curves"', 'figure = "paths"'), (", varying = []", ', varying = [], "3" = [], "4" = [], "5" = []')],
+        "figure: 'paths' are drawn of at most 8 cases, and there are 10: give axes fewer labels",
+        id="paths of ten cases",
+    ),
+    pytest.param(
+        [('figure = "curves"', 'figure = "paths"\nalso = ["peak"]')],
+        "also is of curves and sweeps, and the figure is 'paths': leave it out",
+        id="paths of a quantity",
+    ),
+    pytest.param(
+        [("set =", 'also = ["peak", "agreed"]\nset =')],
+        "also.2: 'agreed' is of agents that pursue a target; nobody does in the case graph=zhao7",
+        id="also of nobody",
+    ),
+    pytest.param([("set =", 'also = ["eror"]\nset =')], "got \"eror\"; did you mean 'error'?", id="also a quantity"),
     pytest.param([('name = "law"', 'name = "graph"')], "axes.2.name: two axes are called 'graph'", id="two of a name"),
     pytest.param([('name = "graph"', 'name = "run"')], "axes.1.name: 'run' is a column of the data already", id="a column"),
     pytest.param([("{ zhao7 = [] }", "{}")], "axes.1.values: has no label: give at least one", id="no label"),

@@ -5,7 +5,14 @@ import pytest
 from scipy.linalg import orthogonal_procrustes
 
 from agents.algebra.small import triangle
-from analysis.metrics.errors import covariance_trace, estimation_error, procrustes_error, tracking_error
+from analysis.metrics.errors import (
+    change_of_step,
+    covariance_trace,
+    estimation_error,
+    procrustes_error,
+    rate_of_fall,
+    tracking_error,
+)
 
 TARGET = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 POSITION = np.array([[3.0, 4.0], [1.0, 2.0], [1.0, 1.0]])  # 5 m, 2 m and 1 m off
@@ -93,6 +100,30 @@ def test_a_shape_with_a_position_that_is_no_number_has_no_error_and_the_other_ti
     with np.errstate(invalid="ignore"):
         errors = procrustes_error(positions, SQUARE, np.stack([ALL] * 3))
     np.testing.assert_allclose(errors, [np.nan, np.sqrt(2) / 4, 0.0], atol=1e-14)
+
+
+# Paths
+
+
+def test_steps_along_a_line_do_not_change_and_those_that_turn_do():
+    straight = np.array([[[0.0, 0.0]], [[1.0, 2.0]], [[2.0, 4.0]]])
+    back = np.array([[[0.0, 0.0]], [[3.0, 4.0]], [[0.0, 0.0]]])
+    both = np.concatenate([straight, back], axis=-2)
+    assert change_of_step(straight, np.array([True])) == 0.0
+    assert change_of_step(back, np.array([True])) == 10.0
+    assert change_of_step(both, np.array([True, True])) == pytest.approx(10.0 / np.sqrt(2.0))
+    assert change_of_step(both, np.array([True, False])) == 0.0
+
+
+def test_rate_of_fall_is_that_of_an_exponential_and_nowhere_else_a_number():
+    seconds = np.array([0.0, 1.0, 1.5, 3.0])
+    falls = 5.0 * np.exp(-0.3 * seconds)
+    error = np.stack([falls, 1.0 / falls, np.full(4, 2.0), [1.0, 0.0, np.e, 1.0], [1.0, np.inf, np.nan, 1.0]])
+    rates = rate_of_fall(seconds, error)
+    assert np.isnan(rates[:, 0]).all()
+    np.testing.assert_allclose(rates[:3, 1:], [[0.3] * 3, [-0.3] * 3, [0.0] * 3], atol=1e-12)
+    np.testing.assert_allclose(rates[3:, 1:], [[np.nan, np.nan, 1.0 / 1.5], [np.nan] * 3])
+    assert rate_of_fall(seconds[:1], error[:, :1]).shape == (5, 1)
 
 
 # Estimates
