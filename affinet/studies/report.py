@@ -13,6 +13,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from affinet.planning import phases
+from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.studies import record
 from affinet.studies.batch import REPORT
@@ -148,9 +150,20 @@ def _flight(one: Result) -> TargetRun:
 
 def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Curve]:
     return [
-        Curve(one.labels, one.runs.seconds, one.runs.quantities[quantity], over_time(one.runs, quantity, (since, None)))
+        Curve(
+            labels=one.labels,
+            seconds=one.runs.seconds,
+            error=one.runs.quantities[quantity],
+            overall=over_time(one.runs, quantity, (since, None)),
+            changes=_changes(one.plan),
+        )
         for one in results
     ]
+
+
+def _changes(plan: Plan) -> list[float]:
+    """When its graph changes, in seconds."""
+    return [phase.start * plan.world.dt for phase in phases.phases(plan.swarm, plan.world.links, plan.faults)[1:]]
 
 
 def _moments(one: Result) -> pa.Table:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from analysis.figures.axes import logarithmic
 from analysis.metrics.consistency import DRAWN, band
 from analysis.models.arrays import Array
 
@@ -26,12 +27,25 @@ _LOWEST = 0.05  # of the mean, for the lower end of a band
 
 @dataclass(frozen=True)
 class Curve:
-    """The error of many runs of one case: labels, moments (T,), error (R, T), and what stands for each run over time (R,)."""
+    """The error of many runs of one case.
+
+    Parameters
+    ----------
+    labels
+        Of the case, by axis.
+    seconds, error
+        Moments, shape (T,), and the error in each, shape (R, T).
+    overall
+        What stands for each run over time, shape (R,).
+    changes
+        When the graph changes for good or for a time, in seconds.
+    """
 
     labels: Mapping[str, str]
     seconds: Array
     error: Array
     overall: Array
+    changes: Sequence[float] = ()
 
 
 def curves(
@@ -179,7 +193,7 @@ def sweep(
     labels = [float(label) for label in _labels(cases, along)]
     for panel in panels[0]:
         if min(labels) > 0.0 and max(labels) > _DECADES * min(labels):
-            panel.set_xscale("log")
+            logarithmic(panel, "x")
         if bound is not None:
             panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
     _finish(figure, panels, title, along, quantity, each)
@@ -243,13 +257,15 @@ def _draw(panel: Axes, case: Curve, label: str, colour: str) -> None:
     panel.plot(case.seconds, mean, lw=1.0, label=label, color=colour)
     # A band that reaches zero has no lower end on a logarithmic axis.
     low = np.maximum(mean - deviation, _LOWEST * mean)
+    for second in case.changes:
+        panel.axvline(second, color="black", ls=":", lw=0.6)
     panel.fill_between(case.seconds, low, mean + deviation, color=colour, alpha=0.15, lw=0)
 
 
 def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
     figure.suptitle(title)
     for panel in panels.ravel():
-        panel.set_yscale("log")
+        logarithmic(panel, "y")
     for panel in panels[-1]:
         panel.set_xlabel(x)
     figure.supylabel(y, fontsize=8)

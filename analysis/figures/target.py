@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.figures.axes import logarithmic
 from analysis.models.arrays import Array
 
 _ALONE, _TOGETHER, _TRUE = "0.65", "tab:blue", "black"
@@ -57,7 +58,8 @@ def pursued(path: Path, title: str, flights: Sequence[TargetRun]) -> None:
         _error(error, flight)
         _plane(plane, flight)
         off = np.linalg.norm(flight.position - flight.reference - flight.places, axis=-1)
-        behind.semilogy(flight.seconds, off, lw=0.6)
+        behind.plot(flight.seconds, off, lw=0.6)
+        logarithmic(behind, "y")
         _named(behind, "time (s)", "distance from the place steered for (m)")
         coordinate.set_title(", ".join(flight.labels.values()), fontsize=8)
     figure.suptitle(title)
@@ -86,6 +88,8 @@ def agreement(path: Path, title: str, seconds: Array, fused: Array, known: Array
             panel.plot(seconds[shown], fused[shown, :, derivative], lw=0.5)
             panel.plot(seconds[shown], mean[shown, derivative], color="red", lw=1.2)
             low, high = mean[shown, derivative].min(), mean[shown, derivative].max()
+            if derivative == 0:  # agents may begin apart
+                low, high = min(low, fused[shown, :, 0].min()), max(high, fused[shown, :, 0].max())
             room = _ROOM * (high - low)
             if room > 0.0:
                 panel.set_ylim(low - room, high + room)

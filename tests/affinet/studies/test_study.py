@@ -647,3 +647,27 @@ def test_a_study_that_makes_no_sense_is_refused(old, new, match, tmp_path):
     path.write_text(MAP.replace(old, new))
     with pytest.raises(ScenarioError, match=match):
         study.load(str(path))
+
+
+CUT = '{ verb = "cut", at = 0.05, until = 0.1, links = ["1-4"] }'
+GUST = '{ verb = "gust", at = 0.02, until = 0.03, agents = [5], velocity = [1, 0] }'
+
+
+def test_where_the_graph_changes_a_line_stands_in_the_figure(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(curves, "curves", lambda *given: shown.append(given))
+    path = tmp_path / "cut.toml"
+    timeline = f"scenario = \"rigid\"\nset = ['timeline=[{CUT}, {GUST}]']"
+    path.write_text(PAIR.partition("[[claims]]")[0].replace('scenario = "rigid"', timeline))
+    changing = study.load(str(path))
+    reported(tmp_path / "out", changing, flown(changing))
+    np.testing.assert_allclose([case.changes for case in shown[0][2]], [[0.05, 0.1]] * 2)
+
+
+def test_labels_of_a_logarithmic_axis_are_plain_and_titles_may_hold_a_dollar(tmp_path, drawn):
+    seconds = np.linspace(0.0, 10.0, 20)
+    falls = curves.Curve({"a": "$5", "b": "y", "c": "z"}, seconds, np.exp(-seconds) * np.ones((5, 1)), np.ones(5))
+    curves.curves(tmp_path / "figure.png", "What $ costs", [falls], ["a", "b", "c"], "error (m)")
+    written = written_in(drawn[0])
+    assert "What $ costs" in written
+    assert not [text for text in written if "mathdefault" in text]
