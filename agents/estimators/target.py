@@ -27,7 +27,7 @@ from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import whole_power
 from analysis.models.finding import Finding
 from analysis.models.information import numbers, packed, position_jet, unpacked
-from analysis.models.pursuit import Target, diffusion, transition
+from analysis.models.pursuit import Sighting, Target, diffusion, transition
 from analysis.models.unsuited import Unsuited
 from netem.core.channels import TARGET
 
@@ -198,6 +198,7 @@ class TargetEstimator(Estimator[Track]):
             together = position_jet(shared, vectors)
         reference = together if self.derivatives == "agreed" else np.concatenate([together[:1], local[1:]])
         reports = {
+            "sighting": _sighted(own.sighting, local[0]),
             "reference": np.moveaxis(reference, 0, -2),
             "found": local[0],
             "variance": np.linalg.inv(shared[0])[..., 0, 0],
@@ -329,3 +330,10 @@ def _target(brief: Brief) -> Target:
 def _seconds(target: Target, state: Track, dt: float) -> Array:
     """How long the detection at work takes, shape (...)."""
     return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
+
+
+def _sighted(sighting: Sighting | None, like: Array) -> Array:
+    """Where a detection that is done in this tick puts the target, in the shape of another position; NaN otherwise."""
+    if sighting is None:
+        return np.full_like(like, np.nan)
+    return np.where(sighting.done[..., None], sighting.position, np.nan)

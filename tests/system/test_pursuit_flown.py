@@ -94,7 +94,8 @@ def test_the_runs_of_a_study_are_looked_at_as_each_alone(air):
             rms = np.sqrt(np.nanmean(np.where(awake, (off**2).sum(axis=-1), np.nan), axis=-1))
             np.testing.assert_allclose(runs.quantities[name][row], rms, rtol=1e-9, atol=1e-12, err_msg=name)
         if row == 0:
-            assert runs.first.keys() == {"reference", "found", "variance", "information", "fused", "position", "target"}
+            reports = {"sighting", "reference", "found", "variance", "information", "fused"}
+            assert runs.first.keys() == reports | {"position", "input", "target"}
             for name in runs.first.keys() - {"target"}:
                 np.testing.assert_array_equal(runs.first[name], arrays[name], name)
             np.testing.assert_allclose(runs.first["target"], target[:, 0], atol=1e-12)
@@ -120,6 +121,23 @@ def test_in_flight_agents_surround_the_target():
     assert run.error[-1] < 0.05
     off = run.position - run.arrays["target"]
     np.testing.assert_allclose((off**2).sum(axis=-1).mean(axis=-1), run.error, rtol=1e-9)
+
+
+def test_what_detectors_saw_is_in_the_arrays():
+    run = rehearse(plan_of(NAME, *LONG, CERTAIN))
+    dt, latencies, variances = run.plan.world.dt, np.array([0.2, 0.1]), run.plan.world.pursuit.target.variances
+    seen = np.isfinite(run.arrays["sighting"]).all(axis=-1)
+    assert (np.isfinite(run.arrays["sighting"]).any(axis=-1) == seen).all()
+    # Detections follow each other without a pause, and each is where the target was when it began.
+    target = (run.arrays["target"] - run.plan.world.formation.nominal)[:, 0]
+    squares = []
+    for agent in range(seen.shape[1]):
+        done = np.flatnonzero(seen[:, agent])
+        took = np.diff(np.concatenate([[0], done]))
+        assert set(took.tolist()) == set(np.rint(latencies / dt).astype(int).tolist())
+        off = run.arrays["sighting"][done, agent] - target[done - took]
+        squares.append((off**2).mean(axis=1) / variances[np.argmin(np.abs(took[:, None] * dt - latencies), axis=1)])
+    assert 0.85 < np.concatenate(squares).mean() < 1.15
 
 
 def test_a_first_order_target_is_followed_by_single_integrators():
