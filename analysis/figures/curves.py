@@ -9,7 +9,9 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from analysis.metrics.consistency import DRAWN, band
@@ -180,6 +182,7 @@ def sweep(
     for panel in panels[0]:
         if min(labels) > 0.0 and max(labels) > _DECADES * min(labels):
             panel.set_xscale("log")
+            _plain(panel.xaxis)
         if bound is not None:
             panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
     _finish(figure, panels, title, along, quantity, each)
@@ -250,12 +253,19 @@ def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: 
     figure.suptitle(title)
     for panel in panels.ravel():
         panel.set_yscale("log")
+        _plain(panel.yaxis)
     for panel in panels[-1]:
         panel.set_xlabel(x)
     figure.supylabel(y, fontsize=8)
     drawn = [panel.get_legend_handles_labels() for panel in panels.ravel()]
     named = {label: handle for handles, labels in drawn for handle, label in zip(handles, labels, strict=True)}
     figure.legend(named.values(), named.keys(), title=legend, fontsize=7, loc="outside right center")
+
+
+def _plain(axis: Axis) -> None:
+    """Numbers of a logarithmic axis without the markup that is not parsed here."""
+    axis.set_major_formatter(LogFormatter())
+    axis.set_minor_formatter(LogFormatter())
 
 
 def _colours(cases: Sequence[Curve], axis: str) -> dict[str, str]:
