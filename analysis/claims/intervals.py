@@ -97,12 +97,12 @@ def ratio(values: Array, others: Array, *, paired: bool, tests: int = 1) -> Inte
     found = both.mean / both.other if both.other and np.isfinite(both.other) else np.nan
     if not np.isfinite(found) or both.quantile == np.inf:
         return _unsure(found)
-    square = both.quantile**2
-    divisor = both.other**2 - square * both.other_variance
+    square = both.quantile * both.quantile
+    divisor = both.other * both.other - square * both.other_variance
     if divisor <= 0.0:
         return Interval(found, -np.inf, np.inf)
     middle = both.mean * both.other - square * both.covariance
-    under = middle**2 - (both.mean**2 - square * both.variance) * divisor
+    under = middle * middle - (both.mean * both.mean - square * both.variance) * divisor
     reach = np.sqrt(max(under, 0.0))
     return Interval(found, (middle - reach) / divisor, (middle + reach) / divisor)
 

@@ -602,6 +602,7 @@ def test_a_sweep_over_decades_is_drawn_on_a_logarithmic_axis(labels, scale, tmp_
     curves.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
     ((panel,),) = (figure.axes for figure in drawn)
     assert panel.get_xscale() == scale
+    assert not any("$" in text for figure in drawn for text in written_in(figure))
 
 
 def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_each(drawn, tmp_path):
