@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman, tape
+from agents.algebra import inputs, kalman, late_news
 from agents.algebra.blocks import diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.algebra.unknowns import Belief, EdgeModel
@@ -44,7 +44,7 @@ class EdgeStates(NamedTuple):
     """The filters, what they remember of the last ticks, and what is measured in this one: (..., n, D) and (..., n)."""
 
     edges: Edges
-    past: tape.Tape[Edges]
+    past: late_news.RecentTicks[Edges]
     measured: Array
     seen: Mask
 
@@ -75,7 +75,7 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
     def __post_init__(self) -> None:
         refuse_negative(prior_position=self.prior_position, sigma_n=self.sigma_n)
         inputs.refuse_growing(self.coefficients)
-        tape.refuse_forgetful(self.memory)
+        late_news.refuse_forgetful(self.memory)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""
@@ -87,7 +87,7 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
         shape = (*batch, slots)
         prior = 2.0 * self.prior_position * self.prior_position * identity(dimension)
         edges = Edges(self._model(brief).begin(prior, of_edges(brief), shape), np.zeros(shape, dtype=bool))
-        past = tape.blank(edges, batch, (slots, dimension), min(self.memory, brief.lateness))
+        past = late_news.blank(edges, batch, (slots, dimension), min(self.memory, brief.lateness))
         return EdgeStates(edges, past, np.zeros((*shape, dimension)), np.zeros(shape, dtype=bool))
 
     def sense(
@@ -105,9 +105,9 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
     ) -> tuple[EdgeStates, Estimate]:
         """Predict every edge by the inputs (5c)-(5d), and correct those measured (5e)-(5g), from the oldest news on."""
         inputs.refuse_accelerations(heard[INPUT])
-        past = tape.turned(state.past, state.edges, own.velocity, state.measured, state.seen)
-        past, oldest = tape.written(past, heard[INPUT])
-        edges, past, nis = tape.flown(past, oldest, partial(self._step, brief))
+        past = late_news.advanced(state.past, state.edges, own.velocity, state.measured, state.seen)
+        past, oldest = late_news.filled_in(past, heard[INPUT])
+        edges, past, nis = late_news.reprocessed(past, oldest, partial(self._step, brief))
         mean, covariance = edges.belief.edges
         known = np.broadcast_to(brief.present, state.seen.shape)
         estimate = Estimate(mean, known, covariance, no_indicator(known), reports={NIS: nis})
@@ -120,7 +120,7 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
     def _model(self, brief: Brief) -> EdgeModel:
         return EdgeModel(brief.dt, tuple(self.coefficients), self.sigma_n, brief.persistence)
 
-    def _step(self, brief: Brief, edges: Edges, tick: tape.TakenIn) -> tuple[Edges, Array]:
+    def _step(self, brief: Brief, edges: Edges, tick: late_news.TakenIn) -> tuple[Edges, Array]:
         model, sure = self._model(brief), np.broadcast_to(tick.known[..., None], tick.inputs.shape)
         belief = model.hear(model.ahead(edges.belief, of_edges(brief)), tick.inputs, sure)
         belief = model.move(belief, tick.own[..., None, :])

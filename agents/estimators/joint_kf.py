@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman, tape
+from agents.algebra import inputs, kalman, late_news
 from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
@@ -34,7 +34,7 @@ class Joint(NamedTuple):
     """What is believed of all edges, of the last ticks, and what is measured in this one: (..., n, D) and (..., n)."""
 
     edges: Belief
-    past: tape.Tape[Belief]
+    past: late_news.RecentTicks[Belief]
     measured: Array
     seen: Mask
 
@@ -59,7 +59,7 @@ class JointEdgeFilter(Estimator[Joint]):
     def __post_init__(self) -> None:
         refuse_negative(prior_position=self.prior_position, sigma_n=self.sigma_n)
         inputs.refuse_growing(self.coefficients)
-        tape.refuse_forgetful(self.memory)
+        late_news.refuse_forgetful(self.memory)
 
     def channels(self, brief: Brief) -> Channels:  # noqa: ARG002
         """Nothing beyond the inputs that every agent broadcasts."""
@@ -71,7 +71,7 @@ class JointEdgeFilter(Estimator[Joint]):
         edges = np.ones((slots, slots)) + np.eye(slots)
         prior = self.prior_position * self.prior_position * np.kron(edges, identity(dimension)).astype(np.float64)
         belief = self._model(brief).begin(prior, brief.process, batch)
-        past = tape.blank(belief, batch, (slots, dimension), min(self.memory, brief.lateness))
+        past = late_news.blank(belief, batch, (slots, dimension), min(self.memory, brief.lateness))
         return Joint(belief, past, np.zeros((*batch, slots, dimension)), np.zeros((*batch, slots), dtype=bool))
 
     def sense(
@@ -87,9 +87,9 @@ class JointEdgeFilter(Estimator[Joint]):
     def fuse(self, brief: Brief, state: Joint, heard: Mapping[str, Heard], own: Own) -> tuple[Joint, Estimate]:
         """Predict all edges by the inputs (14c)-(14d), and correct those measured (14e)-(14g), from the oldest news on."""
         inputs.refuse_accelerations(heard[INPUT])
-        past = tape.turned(state.past, state.edges, own.velocity, state.measured, state.seen)
-        past, oldest = tape.written(past, heard[INPUT])
-        belief, past, nis = tape.flown(past, oldest, partial(self._step, brief))
+        past = late_news.advanced(state.past, state.edges, own.velocity, state.measured, state.seen)
+        past, oldest = late_news.filled_in(past, heard[INPUT])
+        belief, past, nis = late_news.reprocessed(past, oldest, partial(self._step, brief))
         mean, covariance = belief.edges
         known, edges = np.broadcast_to(brief.present, state.seen.shape), diagonal_blocks(covariance, brief.dimension)
         estimate = Estimate(mean.reshape(state.measured.shape), known, edges, no_indicator(known), reports={NIS: nis})
@@ -102,7 +102,7 @@ class JointEdgeFilter(Estimator[Joint]):
     def _model(self, brief: Brief) -> EdgeModel:
         return EdgeModel(brief.dt, tuple(self.coefficients), self.sigma_n, brief.persistence)
 
-    def _step(self, brief: Brief, belief: Belief, tick: tape.TakenIn) -> tuple[Belief, Array]:
+    def _step(self, brief: Brief, belief: Belief, tick: late_news.TakenIn) -> tuple[Belief, Array]:
         model, all_edges = self._model(brief), (*tick.seen.shape[:-1], -1)
         sure = np.repeat(tick.known, brief.dimension, axis=-1)
         belief = model.hear(model.ahead(belief, brief.process), tick.inputs.reshape(all_edges), sure)

@@ -8,7 +8,18 @@ import numpy as np
 from briefs import BRIEF, of_all
 
 from agents import agent, estimate
-from agents.algebra import blocks, completion, constraints, geometry, kalman, prediction, redcho, small, starts, tape
+from agents.algebra import (
+    blocks,
+    completion,
+    constraints,
+    geometry,
+    kalman,
+    late_news,
+    prediction,
+    redcho,
+    small,
+    starts,
+)
 from agents.algebra.geometry import Fit
 from agents.algebra.prediction import Prediction
 from agents.algebra.unknowns import Belief, EdgeModel
@@ -46,7 +57,7 @@ CENTRE = SwarmFilter(
 )
 FILTERS = EdgeFilters()
 MODEL = EdgeModel(0.013, (0.5, -0.3), 0.2, 0.6)
-TAPED = (
+REMEMBERED = (
     real(3, 2),
     real(3, 2),
     real(3, NEIGHBOURS, 2),
@@ -61,8 +72,8 @@ def _brief(**held):
     return SimpleNamespace(dt=0.013, **held)
 
 
-def _tape(before, *taken_in):
-    return tape.Tape(Belief(before, 2.0 * before), tape.TakenIn(*taken_in))
+def _recent(before, *taken_in):
+    return late_news.RecentTicks(Belief(before, 2.0 * before), late_news.TakenIn(*taken_in))
 
 
 def _step(before, tick):
@@ -177,15 +188,15 @@ CASES = {
     "agents.algebra.unknowns.Belief.placed": of(
         lambda mean, spread, edges: Belief(mean, spread).placed(edges), real(5, 2), covariance(4, 4), real(2)
     ),
-    "agents.algebra.tape.turned": of(
-        lambda *given: tape.turned(_tape(*given[:6]), Belief(given[6], given[6]), *given[7:]),
-        *(*TAPED, real(2), real(2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.algebra.late_news.advanced": of(
+        lambda *given: late_news.advanced(_recent(*given[:6]), Belief(given[6], given[6]), *given[7:]),
+        *(*REMEMBERED, real(2), real(2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
-    "agents.algebra.tape.written": of(
-        lambda *given: tape.written(_tape(*given[:6]), Heard({"velocity": given[6]}, *given[7:]))[0],
-        *(*TAPED, real(NEIGHBOURS, 2), truth(NEIGHBOURS), whole(4, NEIGHBOURS)),
+    "agents.algebra.late_news.filled_in": of(
+        lambda *given: late_news.filled_in(_recent(*given[:6]), Heard({"velocity": given[6]}, *given[7:]))[0],
+        *(*REMEMBERED, real(NEIGHBOURS, 2), truth(NEIGHBOURS), whole(4, NEIGHBOURS)),
     ),
-    "agents.algebra.tape.flown": of(lambda *given: tape.flown(_tape(*given), 2, _step), *TAPED),
+    "agents.algebra.late_news.reprocessed": of(lambda *given: late_news.reprocessed(_recent(*given), 2, _step), *REMEMBERED),
     "agents.estimators.joint_kf.corrected": of(
         lambda mean, spread, *measured: joint_kf.corrected(Belief(mean, spread), *measured),
         *(real(3, 18), covariance(36, 36), real(18), covariance(18, 18), truth(NEIGHBOURS)),

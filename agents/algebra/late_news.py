@@ -39,7 +39,7 @@ class TakenIn(NamedTuple):
     known: Mask
 
 
-class Tape(NamedTuple, Generic[T]):
+class RecentTicks(NamedTuple, Generic[T]):
     """The last ticks, newest first, along an axis after the batch's: what was believed before each, and what was taken in."""
 
     before: T
@@ -58,8 +58,8 @@ def refuse_forgetful(memory: int) -> None:
         raise ValueError(f"memory counts ticks, from 0; got {memory}")
 
 
-def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int) -> Tape[T]:
-    """A tape of nothing, for the newest tick and so many before it.
+def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int) -> RecentTicks[T]:
+    """Nothing remembered of the newest tick and of so many before it.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int
     nothing, no = np.zeros((*kept, *edges)), np.zeros((*kept, edges[0]), dtype=bool)
     own = np.zeros((*kept, edges[1]))
     repeated = _each(lambda array: np.repeat(np.expand_dims(array, axis), memory + 1, axis), before)
-    return Tape(repeated, TakenIn(own, nothing, no, nothing, no))
+    return RecentTicks(repeated, TakenIn(own, nothing, no, nothing, no))
 
 
-def turned(tape: Tape[T], before: T, own: Array, measured: Array, seen: Mask) -> Tape[T]:
-    """The tape of a tick later: what is believed before it, and what is taken in in it; of inputs nothing is known yet."""
+def advanced(recent: RecentTicks[T], before: T, own: Array, measured: Array, seen: Mask) -> RecentTicks[T]:
+    """The ticks a tick later: with what is believed before it and taken in in it; of inputs nothing is known yet."""
     axis = seen.ndim - 1
     own = np.broadcast_to(own, (*measured.shape[:-2], measured.shape[-1]))
     newest = TakenIn(own, measured, seen, np.zeros_like(measured), np.zeros_like(seen))
@@ -89,57 +89,59 @@ def turned(tape: Tape[T], before: T, own: Array, measured: Array, seen: Mask) ->
         kept = past[(slice(None),) * axis + (slice(0, past.shape[axis] - 1),)]
         return np.concatenate([np.expand_dims(new, axis), kept], axis=axis)
 
-    return Tape(_each(pushed, before, tape.before), _each(pushed, newest, tape.ticks))
+    return RecentTicks(_each(pushed, before, recent.before), _each(pushed, newest, recent.ticks))
 
 
-def written(tape: Tape[T], said: Heard) -> tuple[Tape[T], int]:
-    """The tape with the inputs that were heard, each in the tick that it belongs to, and how many ticks ago news of it begins.
+def filled_in(recent: RecentTicks[T], said: Heard) -> tuple[RecentTicks[T], int]:
+    """The ticks with the inputs that were heard, each where it belongs, and how many ticks ago news of them begins.
 
-    What is older than the tape is lost, and what is known stays as it was heard first.
+    What is older than all of them is lost, and what is known stays as it was heard first.
 
     Parameters
     ----------
-    tape
+    recent
         Of this tick.
     said
         What arrived on the channel of inputs.
     """
-    ticks = tape.ticks
+    ticks = recent.ticks
     ago = np.arange(ticks.known.shape[-2])[:, None]
     arrived = said.fresh[..., None, :] & (np.broadcast_to(said.age, said.fresh.shape)[..., None, :] == ago)
     news = arrived & ~ticks.known
     inputs = np.where(news[..., None], said.fields["velocity"][..., None, :, :], ticks.inputs)
     oldest = int((ago * news).max(initial=0))
-    return tape._replace(ticks=ticks._replace(inputs=inputs, known=ticks.known | arrived)), oldest
+    return recent._replace(ticks=ticks._replace(inputs=inputs, known=ticks.known | arrived)), oldest
 
 
-def flown(tape: Tape[T], oldest: int, step: Callable[[T, TakenIn], tuple[T, Array]]) -> tuple[T, Tape[T], Array]:
-    """What is believed now, the tape with what was believed before, and the innovations of this tick.
+def reprocessed(
+    recent: RecentTicks[T], oldest: int, step: Callable[[T, TakenIn], tuple[T, Array]]
+) -> tuple[T, RecentTicks[T], Array]:
+    """What is believed now, the ticks with what was believed before each, and the innovations of this one.
 
     Parameters
     ----------
-    tape
+    recent
         With all that was heard.
     oldest
         How many ticks ago there is news. Where there is none, the same ticks give the same bits again.
     step
         What a tick makes of a belief, and its innovations.
     """
-    axis = tape.ticks.seen.ndim - 2
-    believed = _at(tape.before, oldest, axis)
+    axis = recent.ticks.seen.ndim - 2
+    believed = _at(recent.before, oldest, axis)
     after: list[T] = []
     innovation = np.zeros(0)
     for ago in range(oldest, -1, -1):
-        believed, innovation = step(believed, _at(tape.ticks, ago, axis))
+        believed, innovation = step(believed, _at(recent.ticks, ago, axis))
         after.insert(0, believed)
     if not oldest:
-        return believed, tape, innovation
+        return believed, recent, innovation
 
     def renewed(old: Array, *new: Array) -> Array:
         untouched = old[(slice(None),) * axis + (slice(oldest, None),)]
         return np.concatenate([np.stack(new, axis=axis), untouched], axis=axis)
 
-    return believed, tape._replace(before=_each(renewed, tape.before, *after[1:])), innovation
+    return believed, recent._replace(before=_each(renewed, recent.before, *after[1:])), innovation
 
 
 def _at(many: T, ago: int, axis: int) -> T:
