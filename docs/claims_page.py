@@ -14,10 +14,9 @@ from pathlib import Path
 
 from pydantic import Field, model_validator
 
-from affinet.scenario.profiles import Section
 from affinet.studies import judging, record
 from affinet.studies import study as studies
-from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
+from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
 from affinet.studies.study import Study
 
 DOCS = Path(__file__).parent
@@ -33,7 +32,7 @@ PAPERS = {
 }
 
 
-class PaperClaim(Section):
+class PaperClaim(Kept):
     """What a paper says somewhere, and what judges it: claims of a study, tests, or neither, for a reason."""
 
     paper: str

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from affinet.planning.link_classes import LinkClass, classes
-from affinet.scenario.sections import Scenario
+from affinet.planning.script import Script
+from affinet.scenario import profiles
+from affinet.scenario.sections import Scenario, said_at
 from agents.swarm import Late
 from netem.core.links import Links
 from netem.faults.fault import Fault, UnderWay, Verb
@@ -26,26 +28,28 @@ class Lateness(NamedTuple):
     ticks: int
 
 
-def of(given: Scenario, formation: Formation, links: Links, faults: Sequence[Fault]) -> Lateness:
+def of(given: Scenario, formation: Formation, links: Links, script: Script) -> Lateness:
     """How late messages of a scenario may be heard.
 
     Parameters
     ----------
     given, formation, links
         The scenario, who flies, and over which links.
-    faults
-        What is scripted.
+    script
+        What its timeline says.
 
     Raises
     ------
     ScenarioError
         When a profile is not there, cannot ever deliver, or selects nothing.
     """
-    degraded = dict.fromkeys(fault.profile_name for fault in faults if fault.verb is Verb.DEGRADE)
-    networks = [given.network, *(given.network.model_copy(update={"profile": name, "links": []}) for name in degraded)]
-    groups = chain.from_iterable(classes(network, formation, links) for network in networks)
+    for name, key in script.profiles:
+        with said_at(key):
+            profiles.resolve(name, given.network.profiles)
+    degraded = [given.network.model_copy(update={"profile": name, "links": []}) for name, _ in script.profiles]
+    groups = chain.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
     air = _distinct(_of_class(one, given) for one in groups if one.comms)
-    scripted = _distinct(_of_fault(fault, given) for fault in faults)
+    scripted = _distinct(_of_fault(fault, given) for fault in script.faults)
     ticks = sum(max((cause.ticks for cause in some), default=0.0) for some in (air, scripted))
     return Lateness((*air, *scripted), int(min(ticks, given.time.ticks)))
 

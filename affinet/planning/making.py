@@ -118,7 +118,7 @@ def _make(given: Scenario) -> Plan:
     fits = limits.swarm(formation, first.links, memory)
     _refuse_fatal([*findings, fits])
     played = script.write(given, formation, first.links)
-    swarm = swarm_of(given, first, L, lateness.of(given, formation, first.links, played.faults))
+    swarm = swarm_of(given, first, L, lateness.of(given, formation, first.links, played))
     with registry.refusing("agents", Unsuited):
         findings += algorithms.findings(estimator.build(), law.build(), swarm)
         centre = centre_of(estimator.build(), swarm)

@@ -14,6 +14,7 @@ from affinet.scenario.words import shown
 # Where the type alone does not say what is meant, by the `path` of a `Place`.
 EXAMPLES: Mapping[str, Any] = {
     "description": "what it is about",
+    "also": ["nees"],
     "formation.preset": "zhao7",
     "formation.nodes": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
     "formation.edges": ["1-2", "2-3"],

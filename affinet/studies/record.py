@@ -9,8 +9,8 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
-from affinet.scenario.profiles import Section
 from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Labels, Result, Study
 from analysis.claims import intervals
@@ -20,7 +20,13 @@ from analysis.claims.intervals import Decision, Interval
 FILE = "claims.json"
 
 
-class JudgedClaim(Section):
+class Kept(BaseModel):
+    """What is read from a file that a program wrote."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class JudgedClaim(Kept):
     """A claim, what becomes of it, and the figures that decided it."""
 
     says: str
@@ -28,7 +34,7 @@ class JudgedClaim(Section):
     found: str
 
 
-class CaseMean(Section):
+class CaseMean(Kept):
     """The mean over the runs of a case of what stands for a quantity in each, and its confidence interval; null is none."""
 
     labels: Labels
@@ -39,7 +45,7 @@ class CaseMean(Section):
     high: float | None
 
 
-class StudyRecord(Section):
+class StudyRecord(Kept):
     """The verdicts of a study, and the means of its cases; `flown` is a digest of the grid that they are of."""
 
     title: str

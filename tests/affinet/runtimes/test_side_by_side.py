@@ -136,7 +136,7 @@ def test_the_procrustes_error_falls_by_the_rates_told():
 def test_of_the_first_run_of_a_study_everything_that_is_reported_is_kept():
     short = (*SHORT, "time.duration=0.5")
     runs = fly_all(plan_of("corridor", *short), range(3, 60), every=4)  # more than are flown at once
-    assert runs.first.keys() == {"position", "input"}
+    assert runs.first.keys() == {"position", "input", "theta"}
     alone = rehearse(plan_of("corridor", *short, "seed=3")).arrays
     np.testing.assert_array_equal(runs.first["position"], alone["position"][:10:4])
     localized = ("localization", "time.duration=0.1")

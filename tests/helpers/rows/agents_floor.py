@@ -196,7 +196,9 @@ CASES = {
         lambda *given: late_news.filled_in(_recent(*given[:6]), Heard({"velocity": given[6]}, *given[7:]))[0],
         *(*REMEMBERED, real(NEIGHBOURS, 2), truth(NEIGHBOURS), whole(4, NEIGHBOURS)),
     ),
-    "agents.algebra.late_news.reprocessed": of(lambda *given: late_news.reprocessed(_recent(*given), 2, _step), *REMEMBERED),
+    "agents.algebra.late_news.reprocessed": of(
+        lambda *given: late_news.reprocessed(_recent(*given), 2, _step), *REMEMBERED
+    ),
     "agents.estimators.joint_kf.corrected": of(
         lambda mean, spread, *measured: joint_kf.corrected(Belief(mean, spread), *measured),
         *(real(3, 18), covariance(36, 36), real(18), covariance(18, 18), truth(NEIGHBOURS)),
