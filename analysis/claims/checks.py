@@ -134,19 +134,19 @@ def value(says: str, values: Array, level: float, between: Sequence[float], unit
     """The mean of runs (R,) is a level, to factors between two numbers."""
     found = intervals.mean(values)
     least, most = sorted(level * factor for factor in between)
-    return ClaimVerdict(says, found.decide(least, most), f"{found} {unit}, asked {least:.3g} to {most:.3g}")
+    return ClaimVerdict(says, found.decide(least, most), f"{_of(found, unit)}, asked {least:.3g} to {most:.3g}")
 
 
 def stays_below(says: str, seconds: Array, error: Array, level: float, span: Span, unit: str) -> ClaimVerdict:
     """In most runs (R, T) the error stays below a level all through a span of seconds."""
     below, above = _either_side(seconds, error, level, span)
-    return _of_most(says, below, ~(below | above), f"stay below {level:g} {unit}")
+    return _of_most(says, below, ~(below | above), f"stay below {_of(level, unit)}")
 
 
 def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, unit: str) -> ClaimVerdict:
     """In most runs (R, T) the error comes above a level at some time in a span of seconds."""
     below, above = _either_side(seconds, error, level, span)
-    return _of_most(says, above, ~(below | above), f"come above {level:g} {unit}")
+    return _of_most(says, above, ~(below | above), f"come above {_of(level, unit)}")
 
 
 def exponential(says: str, seconds: Array, error: Array, span: Span) -> ClaimVerdict:
@@ -270,6 +270,11 @@ def _of_most(says: str, those: Mask, unknown: Mask, do: str) -> ClaimVerdict:
     told = f"{those.sum()} of {len(those)} runs {do}{_untold(int(unknown.sum()))}"
     reach = f"{found.low:.0%} to {found.high:.0%} of all, asked {_MOST:.0%} at least"
     return ClaimVerdict(says, found.decide(least=_MOST), f"{told}; {reach}")
+
+
+def _of(value: float | Interval, unit: str) -> str:
+    said = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{said} {unit}".rstrip()
 
 
 def _untold(number: int) -> str:
