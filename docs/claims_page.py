@@ -16,8 +16,10 @@ from pydantic import Field, model_validator
 
 from affinet.studies import judging, record
 from affinet.studies import study as studies
-from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
+from affinet.studies.record import CaseMean, Kept, StudyRecord
 from affinet.studies.study import Study
+from analysis.claims.checks import ClaimVerdict
+from analysis.claims.intervals import Decision
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "claims.md"
@@ -91,7 +93,7 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def verdicts(one: PaperClaim, study: Study) -> Iterator[tuple[str, JudgedClaim | None]]:
+def verdicts(one: PaperClaim, study: Study) -> Iterator[tuple[str, ClaimVerdict | None]]:
     """Every verdict on its claims, for each label: the labels, and what was judged, if it was flown.
 
     Raises
@@ -116,7 +118,7 @@ def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]
     for paper in PAPERS:
         ours = [one for one in rows if one.paper == paper]
         flown = [judged for one in ours if one.study for _, judged in verdicts(one, named[one.study])]
-        decided = [sum(judged is not None and judged.decision == what for judged in flown) for what in record.Decision]
+        decided = [sum(judged is not None and judged.decision == what for judged in flown) for what in Decision]
         tested = sum(bool(one.tests) for one in ours)
         left = sum(not one.tests and not one.study for one in ours)
         numbers = [len(ours), *decided, tested, sum(judged is None for judged in flown), left]
@@ -136,7 +138,7 @@ def _row(one: PaperClaim, named: dict[str, Study]) -> str:
     return f"| {one.where} | {one.says} | {'<br>'.join(said)} | {'<br>'.join(by)} |"
 
 
-def _said(labels: str, judged: JudgedClaim | None) -> str:
+def _said(labels: str, judged: ClaimVerdict | None) -> str:
     where = f"{labels}: " if labels else ""
     if judged is None:
         return f"{where}not flown in full yet"

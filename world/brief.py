@@ -27,17 +27,12 @@ class RecordOptions:
         Whether to make a recording.
     viewer
         URL of a viewer to stream to.
-    localizes, pursues, perceives
-        Whether agents report where they believe they are, where a target is, and the map Theta that they perceive.
     """
 
     every: int
     window: int
     record: bool
     viewer: str | None
-    localizes: bool
-    pursues: bool
-    perceives: bool
 
     @property
     def batch(self) -> int:

@@ -108,7 +108,7 @@ def main() -> None:
         last: list[Callable[[], None]] = []
         with (
             system_errors.afterwards(lambda: [step() for step in last]),
-            RunWriter(out, brief.run, brief.world, brief.channels, brief.books) as logbook,
+            RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books) as logbook,
         ):
             node = WorldNode(session, supervisor, brief, logbook)
             node.await_everybody()

@@ -115,7 +115,7 @@ def claims(judged: StudyRecord, full: StudyRecord | None, out: Path) -> None:
     console = Console()
     console.print(table)
     if judged.quick and full is not None:
-        for _, other in judged.contradicted(full):
+        for other in judged.contradicted(full):
             said = f"{other.says}: in the full study, of {full.runs} runs, it {other.decision}: {other.found}"
             console.print(_plain(said))
     console.print(_plain(f"data and figure in {out}"))

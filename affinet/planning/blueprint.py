@@ -10,7 +10,8 @@ import numpy as np
 
 from affinet.planning.lateness import Lateness
 from affinet.scenario import sections, selectors
-from affinet.scenario.sections import Scenario, ScenarioError, TargetSection, TimeSection, Waypoint
+from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
+from affinet.scenario.target import TargetSection, Waypoint
 from agents.brief import Brief
 from agents.swarm import SwarmBrief
 from analysis.models.affine import Manoeuvre

@@ -10,8 +10,7 @@ import numpy as np
 
 from affinet.planning.link_classes import LinkClass, classes
 from affinet.planning.script import Script
-from affinet.scenario import profiles
-from affinet.scenario.sections import Scenario, said_at
+from affinet.scenario.sections import Scenario
 from agents.swarm import Late
 from netem.core.links import Links
 from netem.faults.fault import Fault, UnderWay, Verb
@@ -41,11 +40,8 @@ def of(given: Scenario, formation: Formation, links: Links, script: Script) -> L
     Raises
     ------
     ScenarioError
-        When a profile is not there, cannot ever deliver, or selects nothing.
+        When a profile cannot ever deliver, or selects nothing.
     """
-    for name, key in script.profiles:
-        with said_at(key):
-            profiles.resolve(name, given.network.profiles)
     degraded = [given.network.model_copy(update={"profile": name, "links": []}) for name, _ in script.profiles]
     groups = chain.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
     air = _distinct(_of_class(one, given) for one in groups if one.comms)

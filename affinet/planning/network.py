@@ -13,7 +13,7 @@ from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
 from affinet.scenario.profiles import LinkProfile
-from affinet.scenario.sections import NetworkSection, Scenario, ScenarioError, TimeSection, said_at
+from affinet.scenario.sections import NetworkSection, Scenario, ScenarioError, TimeSection
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.finding import Finding
@@ -104,8 +104,6 @@ def degraded(
     ScenarioError
         As `plan` does.
     """
-    with said_at(key):
-        profiles.resolve(name, given.network.profiles)
     network = given.network.model_copy(update={"profile": name, "links": []})
     try:
         air, said = plan(given.model_copy(update={"network": network}), formation, links, message_bits, ruled)

@@ -17,8 +17,6 @@ from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.arrays import Mask
 from analysis.models.finding import Finding
-from analysis.models.information import reported
-from netem.core import channels
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
@@ -95,16 +93,7 @@ class Plan:
     def books(self, viewer: str | None) -> RecordOptions:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
-        pursues = self.world.pursuit is not None and reported(self.reports)
-        return RecordOptions(
-            every=record.every,
-            window=self.window,
-            record=record.enabled,
-            viewer=viewer,
-            localizes=channels.PLACE in self.reports,
-            pursues=pursues,
-            perceives=self.reports.get(channels.THETA) == (self.world.formation.dimension,) * 2,
-        )
+        return RecordOptions(record.every, self.window, record.enabled, viewer)
 
     @property
     def window(self) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from affinet.scenario import selectors, verbs
+from affinet.scenario import profiles, selectors, verbs
 from affinet.scenario.events import Event, Found, Lasting, When
 from affinet.scenario.sections import Scenario, ScenarioError, said_at
 from affinet.scenario.selectors import ChoiceKey
@@ -208,6 +208,8 @@ def _shapes(draft: _Draft, number: int, entry: Any, key: str) -> list[Fault]:
 def _profile(draft: _Draft, name: str, key: str) -> int:
     names = [known for known, _ in draft.profiles]
     if name not in names:
+        with said_at(key):
+            profiles.resolve(name, draft.given.network.profiles)
         draft.profiles.append((name, key))
         names.append(name)
     return names.index(name) + 1

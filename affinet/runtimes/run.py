@@ -165,7 +165,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     try:
         with (
             journal.Writer(out / JOURNAL, plan.world.links, plan.channels, books.batch) as booked,
-            RunWriter(out, keys.fresh(), plan.world, plan.channels, books) as logbook,
+            RunWriter(out, keys.fresh(), plan.world, plan.channels, plan.reports, books) as logbook,
         ):
 
             def see(moments: Moments, next_position: Array) -> None:

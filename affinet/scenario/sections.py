@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -15,6 +14,7 @@ from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import IN_CODE, Source
+from affinet.scenario.target import TargetSection
 from affinet.scenario.units import (
     Bearing,
     Below1,
@@ -26,6 +26,7 @@ from affinet.scenario.units import (
     Steps,
     Tick,
     Ticks,
+    refuse_unordered,
 )
 from affinet.scenario.verbs import AnyEvent
 from affinet.scenario.words import among
@@ -34,7 +35,6 @@ from world.formation.nominal import PRESETS
 from world.physics.bodies import BodyModel
 
 Matrix = list[list[Finite]]
-_ROUNDING = 1e-9
 
 
 class ScenarioError(ValueError):
@@ -106,9 +106,7 @@ class ManoeuvreSection(Section):
             raise ValueError("give a preset ('hover', 'corridor', 'ravine'), or keyframes")
         if self.keyframes and len(self.keyframes) < 2:
             raise ValueError("give at least two keyframes")
-        times = [frame.time for frame in self.keyframes]
-        if any(later <= earlier for earlier, later in pairwise(times)):
-            raise ValueError(f"keyframe times must increase, got {times}")
+        refuse_unordered("keyframe times", [frame.time for frame in self.keyframes])
         if len({frame.angle is None for frame in self.keyframes}) > 1:
             raise ValueError("give every keyframe an angle (rad), or none")
         return self
@@ -237,71 +235,6 @@ class DynamicsSection(Section):
     def order(self) -> int:
         """How often the input is integrated to a position."""
         return self.body.build().order
-
-
-class Waypoint(Section):
-    """Where a target is at a time, in metres."""
-
-    time: NotNegative
-    position: list[Finite]
-
-
-class TargetSection(Section):
-    """A target to pursue: position in m, velocity in m/s.
-
-    `intensity` is W of the noise that drives it, per axis, in m2/s^(2 order - 1), as agents know it; `true_intensity` the true
-    one, where it is another. Or it takes a `path`. Detectors take one of `latencies` (s), and find it with the variance (m2) of
-    that one: chosen at random for each detection, all alike or with `probabilities`; by turns, as in `schedule`; or of each
-    agent its own, as in `methods`, both with numbers from 1. They find nothing in a share of `misses`, and in one of
-    `false_positives` something else, about the target by the standard deviation `clutter` (m).
-    """
-
-    order: Annotated[int, Field(ge=1, le=4)] = 2
-    intensity: NotNegative = 1.0
-    true_intensity: NotNegative | None = None
-    path: Annotated[list[Waypoint], Field(min_length=2)] | None = None
-    position: list[Finite] | None = None
-    velocity: list[Finite] | None = None
-    latencies: Annotated[list[Positive], Field(min_length=1)]
-    variances: Annotated[list[Positive], Field(min_length=1)]
-    probabilities: list[Probability] | None = None
-    schedule: Annotated[list[Steps], Field(min_length=1)] | None = None
-    methods: list[Steps] | None = None
-    misses: Probability = 0.0
-    false_positives: Probability = 0.0
-    clutter: NotNegative = 5.0
-
-    @model_validator(mode="after")
-    def _paired(self) -> TargetSection:
-        if len(self.latencies) != len(self.variances):
-            raise ValueError("give a variance for each latency")
-        return self
-
-    @model_validator(mode="after")
-    def _chosen(self) -> TargetSection:
-        keys = ("probabilities", "schedule", "methods")
-        if len(given := [key for key in keys if getattr(self, key) is not None]) > 1:
-            raise ValueError(f"give one of {' and '.join(given)}: each says which method a detection uses")
-        if self.probabilities is not None:
-            if len(self.probabilities) != len(self.latencies):
-                raise ValueError("give a probability for each latency")
-            if abs(sum(self.probabilities) - 1.0) > _ROUNDING:
-                raise ValueError(f"probabilities come to {sum(self.probabilities):g}, not to 1")
-        for key in ("schedule", "methods"):
-            if max(getattr(self, key) or [1]) > len(self.latencies):
-                raise ValueError(f"{key} has a method {max(getattr(self, key))}, and there are {len(self.latencies)}")
-        return self
-
-    @model_validator(mode="after")
-    def _moved(self) -> TargetSection:
-        if self.path is None:
-            return self
-        if other := [key for key in ("true_intensity", "position", "velocity") if getattr(self, key) is not None]:
-            raise ValueError(f"a target on a path has no {' and no '.join(other)}: give the one or the other")
-        times = [point.time for point in self.path]
-        if any(later <= earlier for earlier, later in pairwise(times)):
-            raise ValueError(f"times of the path must increase, got {times}")
-        return self
 
 
 class AgentsSection(Section):

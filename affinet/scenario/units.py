@@ -6,6 +6,8 @@ quotients of what a scenario says are far from where floats vanish and overflow,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from math import pi
 from typing import Annotated
 
@@ -41,3 +43,15 @@ Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValid
 Tick = Annotated[float, Field(gt=0.0, le=100.0, allow_inf_nan=False), AfterValidator(_long_enough)]
 Steps = Annotated[int, Field(ge=1, le=MOST)]
 Ticks = Annotated[int, Field(ge=0, le=MOST)]
+
+
+def refuse_unordered(what: str, times: Sequence[float]) -> None:
+    """Refuse times that do not increase.
+
+    Raises
+    ------
+    ValueError
+        When one is not later than the one before.
+    """
+    if any(later <= earlier for earlier, later in pairwise(times)):
+        raise ValueError(f"{what} must increase, got {times}")

@@ -26,14 +26,6 @@ class Kept(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class JudgedClaim(Kept):
-    """A claim, what becomes of it, and the figures that decided it."""
-
-    says: str
-    decision: Decision
-    found: str
-
-
 class CaseMean(Kept):
     """The mean over the runs of a case of what stands for a quantity in each, and its confidence interval; null is none."""
 
@@ -54,16 +46,16 @@ class StudyRecord(Kept):
     quick: bool
     runs: int
     confidence: float
-    claims: list[JudgedClaim]
+    claims: list[ClaimVerdict]
     cases: list[CaseMean]
 
-    def contradicted(self, full: StudyRecord) -> Iterator[tuple[JudgedClaim, JudgedClaim]]:
-        """Claims that are decided one way here, and the other way in a full study."""
+    def contradicted(self, full: StudyRecord) -> Iterator[ClaimVerdict]:
+        """The verdicts of a full study on claims that are decided the other way here."""
         others = {claim.says: claim for claim in full.claims}
         for claim in self.claims:
             other = others.get(claim.says)
             if other and {claim.decision, other.decision} == {Decision.HOLDS, Decision.DOES_NOT_HOLD}:
-                yield claim, other
+                yield other
 
 
 def grid(study: Study, *, quick: bool) -> str:
@@ -83,7 +75,7 @@ def recorded(study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVe
         quick=quick,
         runs=study.size(quick=quick).runs,
         confidence=intervals.CONFIDENCE,
-        claims=[JudgedClaim(says=one.says, decision=one.decision, found=one.found) for one in verdicts],
+        claims=list(verdicts),
         cases=[_mean(one, quantity, study.since) for one in results for quantity in quantities],
     )
 

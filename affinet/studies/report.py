@@ -7,6 +7,7 @@ row for each run, with what stands for each quantity over its time.
 from __future__ import annotations
 
 import traceback
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +105,8 @@ def _draw_quantity(path: Path, study: Study, results: list[Result], quantity: Qu
     axes, drawn = [axis.name for axis in study.axes], _curves(results, quantity, study.since)
     bound = None if study.bound is None or quantity != study.quantity else (study.bound.at, study.bound.says)
     if study.along is None:
-        curves.curves(path, study.title, drawn, axes, curves.said(*said(quantity)), bound)
+        changing = [replace(curve, changes=_changes(one.plan)) for curve, one in zip(drawn, results, strict=True)]
+        curves.curves(path, study.title, changing, axes, curves.said(*said(quantity)), bound)
     else:
         curves.sweep(path, study.title, drawn, axes, study.along, curves.said(*said(quantity)), bound)
 
@@ -155,7 +157,6 @@ def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Cur
             seconds=one.runs.seconds,
             error=one.runs.quantities[quantity],
             overall=over_time(one.runs, quantity, (since, None)),
-            changes=_changes(one.plan),
         )
         for one in results
     ]

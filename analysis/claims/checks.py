@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from analysis.claims import intervals
-from analysis.claims.intervals import CONFIDENCE, Decision, Interval, all_of
+from analysis.claims.intervals import Decision, Interval, all_of
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import log, whole_power
@@ -107,8 +106,7 @@ def lower(says: str, mean_errors: Array, others: Array, unit: str, *, paired: bo
         Decision.DOES_NOT_HOLD if one.high <= rounding else one.decide(least=np.nextafter(rounding, np.inf))
         for one, rounding in zip(below, np.where(np.isfinite(least), least, 0.0), strict=True)
     ]
-    apart = "" if paired else ", of runs with draws of their own"
-    return ClaimVerdict(says, all_of(decisions), f"lower by {_list_of(below)} {unit}".rstrip() + apart)
+    return ClaimVerdict(says, all_of(decisions), f"lower by {_list_of(below)} {unit}".rstrip() + _drawn(paired))
 
 
 def ratio(says: str, values: Array, others: Array, between: Sequence[float], *, paired: bool) -> ClaimVerdict:
@@ -126,8 +124,8 @@ def ratio(says: str, values: Array, others: Array, between: Sequence[float], *, 
         Whether run r of the one meets the draws of run r of the other.
     """
     found = intervals.ratio(values, others, paired=paired)
-    apart = "" if paired else ", of runs with draws of their own"
-    return ClaimVerdict(says, found.decide(*between), f"ratio {found}, asked {between[0]:g} to {between[1]:g}{apart}")
+    asked = f"asked {between[0]:g} to {between[1]:g}"
+    return ClaimVerdict(says, found.decide(*between), f"ratio {found}, {asked}{_drawn(paired)}")
 
 
 def value(says: str, values: Array, level: float, between: Sequence[float], unit: str) -> ClaimVerdict:
@@ -201,9 +199,8 @@ def below_in_mean(says: str, seconds: Array, values: Array, bound: Array, define
     excess = np.where(defined, values - bound, 0.0)
     mean = excess.sum(axis=0) / np.maximum(number, 1)
     variance = np.where(defined, whole_power(excess - mean, 2), 0.0).sum(axis=0) / np.maximum(number - 1, 1)
-    with np.errstate(invalid="ignore"):
-        quantile = -special.stdtrit(np.maximum(number - 1, 1), (1.0 - CONFIDENCE) / (2.0 * mean.size))
-        reach = np.where(number > 1, quantile * np.sqrt(variance / np.maximum(number, 1)), np.inf)
+    error = np.where(number > 1, np.sqrt(variance / np.maximum(number, 1)), 1.0)
+    reach = intervals.student(number, mean.size) * error
     above = np.argwhere(mean - reach > 0.0)
     if len(above):
         tick, which = above[0]
@@ -275,6 +272,10 @@ def _of_most(says: str, those: Mask, unknown: Mask, do: str) -> ClaimVerdict:
 def _of(value: float | Interval, unit: str) -> str:
     said = f"{value:g}" if isinstance(value, float) else str(value)
     return f"{said} {unit}".rstrip()
+
+
+def _drawn(paired: bool) -> str:
+    return "" if paired else ", of runs with draws of their own"
 
 
 def _untold(number: int) -> str:

@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from scipy import special
 
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Integers
 
 CONFIDENCE = 0.99
 
@@ -107,6 +107,20 @@ def ratio(values: Array, others: Array, *, paired: bool, tests: int = 1) -> Inte
     return Interval(found, (middle - reach) / divisor, (middle + reach) / divisor)
 
 
+def student(runs: Integers, tests: int) -> Array:
+    """How many standard errors of means over so many runs reach the confidence (Student's t); infinite for fewer than two.
+
+    Parameters
+    ----------
+    runs
+        Any shape.
+    tests
+        How many intervals are to hold at once (Bonferroni).
+    """
+    quantile = -special.stdtrit(np.maximum(runs - 1, 1), (1.0 - CONFIDENCE) / (2.0 * tests))
+    return np.where(runs > 1, quantile, np.inf)
+
+
 def share(those: int, unknown: int, runs: int) -> Interval:
     """Which share of all runs does what `those` did, by Clopper and Pearson, each end with the confidence.
 
@@ -135,7 +149,7 @@ class _Both:
     @classmethod
     def of(cls, values: Array, others: Array, *, paired: bool, tests: int) -> _Both:
         fewest = min(len(values), len(others))
-        quantile = -float(special.stdtrit(fewest - 1, (1.0 - CONFIDENCE) / (2.0 * tests))) if fewest > 1 else np.inf
+        quantile = float(student(np.array(fewest), tests))
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return cls(
                 mean=float(values.mean()),

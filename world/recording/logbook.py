@@ -11,7 +11,7 @@ import pyarrow as pa
 from netem.core.arrow import NAMES, Stream, named
 from netem.faults.timeline import Timeline
 from netem.processes import system_errors
-from world.books.history import Moments
+from world.books.history import Moments, Reports
 from world.books.realised import GraphWatch, columns
 from world.brief import RecordOptions
 from world.physics.world import World
@@ -39,8 +39,8 @@ class RunWriter:
     ----------
     out, run
         The run directory, and a name that no other run has.
-    world, channels
-        What is flown.
+    world, channels, reports
+        What is flown, and what estimators report of it.
     books
         How to write it down.
 
@@ -50,7 +50,9 @@ class RunWriter:
         When something cannot be written, from the first byte to the last: which file, and why.
     """
 
-    def __init__(self, out: Path, run: str, world: World, channels: Sequence[str], books: RecordOptions) -> None:
+    def __init__(
+        self, out: Path, run: str, world: World, channels: Sequence[str], reports: Reports, books: RecordOptions
+    ) -> None:
         self._every = books.every
         self._channels = list(channels)
         self._out = out
@@ -63,9 +65,7 @@ class RunWriter:
                 run=run,
                 name=out.absolute().name,
                 world=world,
-                localizes=books.localizes,
-                pursues=books.pursues,
-                perceives=books.perceives,
+                reports=reports,
                 every=books.every,
                 viewer=books.viewer,
             )

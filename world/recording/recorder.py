@@ -6,7 +6,7 @@ Many ticks are logged at once, as columns: that is several times cheaper than ti
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from analysis.metrics import consistency
 from analysis.metrics.errors import procrustes_error
 from analysis.models.arrays import Array, Mask
+from analysis.models.information import reported
 from analysis.models.reports import NIS
+from netem.core.channels import PLACE, THETA
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
 from world.books.edges import of_swarms
-from world.books.history import Moments
+from world.books.history import Moments, Reports
 from world.books.realised import Realised
 from world.formation.nominal import Formation
 from world.physics.world import World
@@ -53,6 +55,7 @@ _LINK_COLOURS = {
     Verdict.OVERFLOW: 0x26C6DAFF,
 }
 _FLUSH_S = 20.0
+Layer = Places | Pursued | PerceivedFormations
 _COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 
 
@@ -69,8 +72,8 @@ class Recorder:
         What people call it.
     world
         What is flown.
-    localizes, pursues, perceives
-        Whether agents report where they believe they are, where a target is, and the map Theta that they perceive.
+    reports
+        What the agents' estimators report, by name, and the shape of each for one agent: it decides what is shown.
     every
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
@@ -89,9 +92,7 @@ class Recorder:
         run: str,
         name: str,
         world: World,
-        localizes: bool,
-        pursues: bool,
-        perceives: bool,
+        reports: Reports,
         every: int,
         viewer: str | None = None,
     ) -> None:
@@ -109,16 +110,14 @@ class Recorder:
                 "unset it, or set record.enabled=false"
             )
         make_room(path)
+        shown = _shown(world, reports)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
         with writing(path):
-            self._stream.set_sinks(
-                *sinks, default_blueprint=_blueprint(world.formation, localizes=localizes, pursues=pursues)
-            )
+            self._stream.set_sinks(*sinks, default_blueprint=_blueprint(world.formation, shown))
         self._stream.send_recording_name(name)
         self._origin = origin(world)
         self._log_static()
-        kinds = ((Places, localizes), (Pursued, pursues), (PerceivedFormations, perceives))
-        self._layers = [layer(self._stream, world, self._origin) for layer, wanted in kinds if wanted]
+        self._layers = [layer(self._stream, world, self._origin) for layer in shown]
         self._flush()  # what a killed run leaves can be read from the first tick on
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
@@ -301,7 +300,17 @@ class Recorder:
         scalars(self._stream, path, time, values)
 
 
-def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.Blueprint:
+def _shown(world: World, reports: Reports) -> list[type[Layer]]:
+    """The layers for what is reported: places, a target, and maps of the formation."""
+    kinds: list[tuple[type[Layer], bool]] = [
+        (Places, PLACE in reports),
+        (Pursued, world.pursuit is not None and reported(reports)),
+        (PerceivedFormations, reports.get(THETA) == (world.formation.dimension,) * 2),
+    ]
+    return [layer for layer, wanted in kinds if wanted]
+
+
+def _blueprint(formation: Formation, shown: Collection[type[Layer]]) -> rrb.Blueprint:
     reach = float(np.ptp(formation.nominal, axis=0).max())
     trail = rrb.VisibleTimeRange(
         TIMELINE,
@@ -327,13 +336,13 @@ def _blueprint(formation: Formation, *, localizes: bool, pursues: bool) -> rrb.B
     )
     plots = rrb.Vertical(
         rrb.Tabs(
-            *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if localizes else []),
-            *([rrb.TimeSeriesView(origin="metrics/target", name="error of the target")] if pursues else []),
+            *([rrb.TimeSeriesView(origin="metrics/localization", name="localization")] if Places in shown else []),
+            *([rrb.TimeSeriesView(origin="metrics/target", name="error of the target")] if Pursued in shown else []),
             rrb.TimeSeriesView(origin="metrics/tracking_error", name="tracking error"),
             rrb.TimeSeriesView(origin="metrics/procrustes", name="Procrustes error"),
             rrb.TimeSeriesView(origin="metrics/consistency", name="filter consistency, means over the edges"),
         ),
-        *([] if localizes or pursues else [local_maps]),
+        *([] if Places in shown or Pursued in shown else [local_maps]),
         rrb.TimeSeriesView(origin="metrics/messages", name="messages per tick, by verdict"),
         rrb.Tabs(
             rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),

@@ -10,7 +10,7 @@ from affinet.cli import show
 from affinet.scenario.sections import ScenarioError
 from affinet.studies import judging, record, study
 from affinet.studies.batch import fly_all
-from affinet.studies.record import JudgedClaim, StudyRecord
+from affinet.studies.record import StudyRecord
 from analysis.claims.checks import ClaimVerdict
 from analysis.claims.intervals import Decision
 
@@ -89,7 +89,7 @@ def test_a_grid_is_what_flies_and_not_what_is_said_of_it(two):
 
 
 def judged(quick, **decisions):
-    claims = [JudgedClaim(says=says, decision=Decision(said), found=f"as {said}") for says, said in decisions.items()]
+    claims = [ClaimVerdict(says, Decision(said), f"as {said}") for says, said in decisions.items()]
     return StudyRecord(title="t", source="s", flown="", quick=quick, runs=3, confidence=0.99, claims=claims, cases=[])
 
 

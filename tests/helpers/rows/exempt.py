@@ -86,7 +86,7 @@ EXEMPT = {
         analysis.claims.checks.leaves analysis.claims.checks.exponential analysis.claims.checks.never_above
         analysis.claims.checks.below_in_mean analysis.claims.checks.within analysis.claims.checks.value
         analysis.claims.checks.follows analysis.claims.intervals.mean analysis.claims.intervals.difference
-        analysis.claims.intervals.ratio analysis.figures.curves.evolution
+        analysis.claims.intervals.ratio analysis.claims.intervals.student analysis.figures.curves.evolution
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
     """,
     SHAPES: """

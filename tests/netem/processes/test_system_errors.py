@@ -336,7 +336,7 @@ def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, m
     out.mkdir()
     monkeypatch.setattr("netem.core.arrow.Stream.close", lambda _: broken("a table")())
     for table in (
-        RunWriter(out, "run", plan.world, plan.channels, plan.books(None)),
+        RunWriter(out, "run", plan.world, plan.channels, plan.reports, plan.books(None)),
         journal.Writer(out / JOURNAL, plan.world.links, plan.channels, 50),
     ):
         with pytest.raises(KeyError, match="first"), table:
