@@ -63,7 +63,8 @@ class Runs:
         is from where each finds it by itself, from where the agents agree that it is, and from where all they know together
         puts it (8); how far agreed and ideal are apart; how far each agent's agreed one is from their mean; how far agents are
         from the places that they steer for; how hard they steer. Root mean squares over the agents, in metres, and metres per
-        second or per second squared. NaN where nobody pursues.
+        second or per second squared. `target_nees`: `agreed`, squared, normalised by the variance that agents report of it, in
+        the mean over the agents; as many as there are axes where they know how unsure they are. NaN where nobody pursues.
 
         `peak`: the longest input of any agent since the moment before, in metres per second or per second squared.
 
@@ -297,7 +298,7 @@ def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], A
     names = ("found", "agreed", "ideal", "apart", "disagreed", "behind", "effort")
     pursuit, nominal = plan.world.pursuit, plan.world.formation.nominal
     if pursuit is None or not reported(moment.reports):
-        return dict.fromkeys(names, np.full(plan.world.swarms, np.nan))
+        return dict.fromkeys((*names, "target_nees"), np.full(plan.world.swarms, np.nan))
     said = moment.reports
     target, flown = of_runs(moment.target - nominal), of_runs(moment.position - nominal)
     agreed, found, information = map(of_runs, (said["reference"][:, 0], said["found"], said["information"][:, 0]))
@@ -307,4 +308,6 @@ def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], A
     together = np.where(awake[..., None], agreed, 0.0).sum(axis=1, keepdims=True) / number[:, None, None]
     steered = (flown - agreed, of_runs(moment.input))
     off = (found - target, agreed - target, ideal - target, agreed - ideal, agreed - together, *steered)
-    return {name: errors.root_mean_square(each, awake) for name, each in zip(names, off, strict=True)}
+    normalised = errors.root_mean_square((agreed - target) / np.sqrt(of_runs(said["variance"]))[..., None], awake)
+    squares = {name: errors.root_mean_square(each, awake) for name, each in zip(names, off, strict=True)}
+    return {**squares, "target_nees": normalised * normalised}

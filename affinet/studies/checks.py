@@ -34,7 +34,7 @@ _ONE_CASE = {"ratio", "value", *_INDICATED}  # checks of a single case
 _SPREAD = {"lower", "ratio", "value", *_INDICATED}  # checks that need more than one run
 _MOST_PATHS = 8  # side by side in a picture
 _PLACES = {"localization", "drift", "ringing", "place_error", "place_nees"}
-_PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "effort"}
+_PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "target_nees", "effort"}
 
 
 def of_file(study: Study) -> Iterator[Wrong]:

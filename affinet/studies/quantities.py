@@ -28,6 +28,7 @@ NAMES: dict[str, tuple[str, str]] = {
     "apart": ("distance of agreement from all that is known", "m"),
     "disagreed": ("disagreement about the target", "m"),
     "behind": ("distance from the places steered for", "m"),
+    "target_nees": ("NEES of the target steered for", ""),
     "effort": ("input", "m/s²"),
     "peak": ("longest input", "m/s²"),
     "roughness": ("change of a step from the one before", "m"),

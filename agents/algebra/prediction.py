@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.models import jets
-from analysis.models.algebra import product
-from analysis.models.arrays import Array, Integers
-from analysis.models.pursuit import Target, diffusion, transition
+from analysis.models.algebra import product, sum_over
+from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.pursuit import Sighting, Target, diffusion, transition
 
 
 class Prediction(NamedTuple):
@@ -43,3 +43,48 @@ def predicted(target: Target, prediction: Prediction, now: Integers, dt: float) 
         covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
     Q = jets.inverse(np.stack(covariance))
     return Q, jets.times(Q, np.stack(mean))
+
+
+def detected(target: Target, last: Prediction, now: Integers, sighting: Sighting, gate: float, dt: float) -> Prediction:
+    """The optimal estimate of the tick in which a detection was done (5).
+
+    Parameters
+    ----------
+    target, last
+        What is pursued, and the estimate before.
+    now
+        The tick, shape (...).
+    sighting
+        The detection. One of nothing, NaN, leaves the prediction, and so does one that is too far off.
+    gate
+        How far off it may be, in standard deviations of what is expected; 0 for any distance.
+    dt
+        Tick, in seconds.
+    """
+    latency, R = target.latencies[sighting.by], target.variances[sighting.by]
+    seconds = np.asarray(latency * dt, dtype=np.float64)
+    # As a rule the last estimate is of the tick in which this detection began; after a pause it is older.
+    lag = np.maximum(now - last.made - latency, 0)
+    mean, P = carried(target, last, lag * dt)
+    A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
+    innovation, doubt = sighting.position - mean[..., 0, :], P[..., 0, 0] + R
+    counts = np.asarray(~np.isnan(innovation).any(axis=-1))
+    innovation = np.where(counts[..., None], innovation, 0.0)
+    if gate > 0.0:
+        counts = counts & (sum_over(innovation * innovation, -1) <= gate * gate * doubt)
+    L = np.where(counts[..., None, None], product(A, P[..., :, :1]) / doubt[..., None, None], 0.0)
+    corrected = product(A, mean) + product(L, innovation[..., None, :])
+    closed = A - product(L, np.eye(1, target.order))
+    covariance = (
+        product(closed, P, np.swapaxes(closed, -1, -2)) + R[..., None, None] * product(L, np.swapaxes(L, -1, -2)) + W
+    )
+    return Prediction(corrected, covariance, now)
+
+
+def chosen(where: Mask, one: Prediction, other: Prediction) -> Prediction:
+    """The one where a mask (...) says so, the other elsewhere."""
+    return Prediction(
+        mean=np.where(where[..., None, None], one.mean, other.mean),
+        covariance=np.where(where[..., None, None], one.covariance, other.covariance),
+        made=np.where(where, one.made, other.made),
+    )

@@ -10,6 +10,10 @@ import numpy as np
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array
 from analysis.models.elementary import power, whole_power
+from analysis.models.finding import Finding
+
+_SMALL_CHATTER = 1.0
+_FORGOTTEN = 2.0  # an Euler step of -gamma diverges from here on
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,23 @@ class Consensus:
             )
         stepped: Array = internal + dt * np.stack(rates, axis=-2)
         return stepped
+
+    def findings(self, dt: float, *, aided: bool) -> list[Finding]:
+        """How the protocol comes along with the tick; whether it is aided by derivatives of the agents' own.
+
+        How hard its sign switches in a tick (errata), and whether a tick is short enough to forget by gamma what it gathered.
+        """
+        switched = self.k[self.order] * whole_power(self.theta, self.order + 1) * dt
+        what = f"k_m theta^{self.order + 1} dt; 0.4 in paper 002"
+        own = "" if aided or switched < _SMALL_CHATTER else "; take the agents' own derivatives"
+        found = [
+            Finding("REDCHO", "note", f"REDCHO switches its highest derivative by {switched:.3g} a tick ({what}){own}")
+        ]
+        fastest, bound = max(self.gamma), _FORGOTTEN / dt
+        if fastest * dt >= _FORGOTTEN:
+            says = f"gamma {fastest:g} 1/s is not below the bound {bound:g} at dt {dt:g} s: REDCHO diverges; lower it, or dt"
+            found.append(Finding("REDCHO", "error", says))
+        return found
 
 
 @cache

@@ -1,39 +1,37 @@
 """Where a target is that is found with a latency: DOE and SOE, fused by REDCHO (paper 002, sections 3 and 4).
 
 Every axis is a filter of its own, with one covariance for all. Between detections the optimal estimate is predicted, and jumps
-when one is done (DOE); the smooth one passes from the last prediction to this one in between (SOE). What is exchanged is
-information: consensus on it and its derivatives gives all agents one estimate; or each takes the mean of what it hears.
+when one is done (DOE); the smooth one passes from the last prediction to this one in between (SOE). A spline through the
+estimates and a low-pass filter are smooth too (remark 3). What is exchanged is information: consensus on it and its derivatives
+gives all agents one estimate; or each takes the mean of what it hears.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from agents.algebra import starts
-from agents.algebra.prediction import Prediction, carried, predicted
+from agents.algebra import smoothing, starts
+from agents.algebra.prediction import Prediction, chosen, detected, predicted
 from agents.algebra.redcho import Consensus
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_edges
 from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
 from agents.swarm import SwarmBrief
-from analysis.models import jets
-from analysis.models.algebra import product, sum_over
+from analysis.models.algebra import sum_over
 from analysis.models.arrays import Array, Integers, Mask
-from analysis.models.elementary import whole_power
 from analysis.models.finding import Finding
 from analysis.models.information import numbers, packed, position_jet, unpacked
-from analysis.models.pursuit import Sighting, Target, diffusion, transition
+from analysis.models.pursuit import Sighting, Target
 from analysis.models.unsuited import Unsuited
 from netem.core.channels import TARGET
 
 _SUREST, _LEAST_SURE = 1e-3, 1e3  # standard deviations whose information can be inverted side by side
-_SMALL_CHATTER = 1.0
-_FORGOTTEN = 2.0  # an Euler step of -gamma diverges from here on
+_SHORTEST, _LONGEST = 1e-3, 1e3  # lags, in seconds
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
 
@@ -54,6 +52,8 @@ class Track(NamedTuple):
         Variables of REDCHO, shape (..., m + 1, C), for the C different numbers of information matrix and vectors.
     theirs, silent
         What neighbours said last, shape (..., n, C), and for how many ticks they have not been heard, shape (..., n).
+    stages
+        Of the low-pass filter, shape (..., m + 1, C); (..., 0, C) with other outputs.
     """
 
     now: Integers
@@ -64,6 +64,7 @@ class Track(NamedTuple):
     internal: Array
     theirs: Array
     silent: Integers
+    stages: Array
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,14 @@ class TargetEstimator(Estimator[Track]):
     Parameters
     ----------
     output
-        "smooth" (SOE), or "optimal" (DOE), which jumps.
+        "smooth" (SOE), or "optimal" (DOE), which jumps; or what remark 3 holds against SOE: "spline", a polynomial from the
+        estimate before to the last, which comes there when the next is due, or "low-pass", the optimal one filtered.
     alpha
-        Of the transition function (appendix B): the smaller, the sooner the newer prediction counts.
+        Of the transition function (appendix B) of SOE: the smaller, the sooner the newer prediction counts.
     fusion
         What becomes of information: all agents agree on their mean (REDCHO); each takes the mean of its own and that of the
         neighbours it hears ("mean", which is (8) where everybody hears everybody); or each keeps to its own ("none"). The
-        former two want the smooth output.
+        former two want an output that is smooth.
     derivatives
         Whose derivatives go with the position found together: those found together too (Algorithm 1), or the agent's own. Those
         of REDCHO want far shorter ticks than networks have (docs/studies.md).
@@ -89,6 +91,8 @@ class TargetEstimator(Estimator[Track]):
         For how many ticks REDCHO counts a neighbour that it does not hear with what that said last.
     prior_position, prior_derivatives
         Standard deviations of the target's position and of each of its derivatives in tick 0, in SI units.
+    lag
+        Of the low-pass filter: the time constant of each of its m + 1 equal stages, in seconds.
     gate
         By how many standard deviations a detection may be off what was expected and still be of the target; 0 counts all.
     first
@@ -98,7 +102,7 @@ class TargetEstimator(Estimator[Track]):
         and vectors; none, 0, which begin agreed on the mean.
     """
 
-    output: Literal["smooth", "optimal"] = "smooth"
+    output: Literal["smooth", "optimal", "spline", "low-pass"] = "smooth"
     alpha: float = 1.0
     fusion: Literal["redcho", "mean", "none"] = "redcho"
     derivatives: Literal["agreed", "own"] = "agreed"
@@ -108,6 +112,7 @@ class TargetEstimator(Estimator[Track]):
     hold: int = 10
     prior_position: float = 1.0
     prior_derivatives: float = 1.0
+    lag: float = 0.05
     gate: float = 0.0
     first: Sequence[Sequence[float]] = ()
     internal: Sequence[Sequence[Sequence[float]]] = ()
@@ -119,6 +124,8 @@ class TargetEstimator(Estimator[Track]):
             )
         if self.alpha <= 0.0:
             raise ValueError(f"alpha must be above 0, not {self.alpha}")
+        if not _SHORTEST <= self.lag <= _LONGEST:
+            raise ValueError(f"lag is from {_SHORTEST:g} to {_LONGEST:g} s, not {self.lag:g}")
         if min(self.theta, *self.k, *self.gamma) <= 0.0:
             raise ValueError(f"REDCHO's gains must be above 0: theta {self.theta}, k {self.k}, gamma {self.gamma}")
         if self.gate < 0.0:
@@ -154,6 +161,8 @@ class TargetEstimator(Estimator[Track]):
         slots, different = brief.present.shape[-1], numbers(order, brief.dimension)
         internal = np.zeros((*batch, order + 1, different))
         internal += starts.own(self.internal, brief.number, internal.shape[-2:])
+        entering = packed(*predicted(_target(brief), first, first.made, brief.dt))[0]
+        stages = order + 1 if self.output == "low-pass" else 0
         return Track(
             now=np.full(batch, -1, dtype=np.int64),
             last=first,
@@ -163,6 +172,7 @@ class TargetEstimator(Estimator[Track]):
             internal=internal,
             theirs=np.zeros((*batch, slots, different)),
             silent=np.full((*batch, slots), self.hold, dtype=np.int64),
+            stages=np.broadcast_to(entering[..., None, :], (*batch, stages, different)).copy(),
         )
 
     def sense(
@@ -173,7 +183,7 @@ class TargetEstimator(Estimator[Track]):
         seen: Mask,  # noqa: ARG002
     ) -> tuple[Track, Mapping[str, Fields]]:
         """A tick has passed; tell the information."""
-        state = state._replace(now=state.now + 1)
+        state = self._lagging(brief, state)._replace(now=state.now + 1)
         if self.fusion == "none":
             return state, {}
         own = packed(*self._information(brief, state))
@@ -219,27 +229,9 @@ class TargetEstimator(Estimator[Track]):
             )
             found.append(Finding("information", "note", says))
         if self.fusion == "redcho":
-            found += [self._chatter(swarm.dt), *self._forgetting(swarm.dt)]
+            consensus = Consensus(len(self.k) - 1, self.theta, tuple(self.k), tuple(self.gamma))
+            found += consensus.findings(swarm.dt, aided=self.derivatives == "own")
         return found
-
-    def _chatter(self, dt: float) -> Finding:
-        """How hard REDCHO's sign switches in a tick (errata of paper 002)."""
-        order = len(self.k) - 1
-        switched = self.k[order] * whole_power(self.theta, order + 1) * dt
-        what = f"k_m theta^{order + 1} dt; 0.4 in paper 002"
-        own = "" if self.derivatives == "own" or switched < _SMALL_CHATTER else "; take the agents' own derivatives"
-        says = f"REDCHO switches its highest derivative by {switched:.3g} a tick ({what}){own}"
-        return Finding("REDCHO", "note", says)
-
-    def _forgetting(self, dt: float) -> list[Finding]:
-        """Whether a tick is short enough for REDCHO to forget what it has gathered, by gamma."""
-        fastest, bound = max(self.gamma), _FORGOTTEN / dt
-        if fastest * dt < _FORGOTTEN:
-            return []
-        says = (
-            f"gamma {fastest:g} 1/s is not below the bound {bound:g} at dt {dt:g} s: REDCHO diverges; lower it, or dt"
-        )
-        return [Finding("REDCHO", "error", says)]
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
         """The information found together, jets (m + 1, ..., C) like the agent's own."""
@@ -257,64 +249,47 @@ class TargetEstimator(Estimator[Track]):
         return state._replace(internal=internal, theirs=held, silent=silent), agreed
 
     def _detected(self, brief: Brief, state: Track, own: Own) -> Track:
-        """The optimal estimate of the tick in which the detection was done (5), where one was."""
-        sighting, target = own.sighting, _target(brief)
-        if sighting is None:
+        """What is known in the tick in which a detection was done, where one was."""
+        if own.sighting is None:
             raise Unsuited("this estimator needs a target: give the scenario a [target]")
-        latency = target.latencies[sighting.by]
-        seconds = np.asarray(latency * brief.dt, dtype=np.float64)
-        R = target.variances[sighting.by]
-        # As a rule the last estimate is of the tick in which this detection began; after a pause it is older.
-        lag = np.maximum(state.now - state.last.made - latency, 0)
-        mean, P = carried(target, state.last, lag * brief.dt)
-        A, W = transition(target.order, seconds), diffusion(target.order, seconds, target.intensity)
-        innovation, doubt = sighting.position - mean[..., 0, :], P[..., 0, 0] + R
-        counts = np.asarray(~np.isnan(innovation).any(axis=-1))
-        innovation = np.where(counts[..., None], innovation, 0.0)
-        if self.gate > 0.0:
-            counts = counts & (sum_over(innovation * innovation, -1) <= self.gate * self.gate * doubt)
-        # A detection of nothing, or of something else, leaves the prediction.
-        L = np.where(counts[..., None, None], product(A, P[..., :, :1]) / doubt[..., None, None], 0.0)
-        corrected = product(A, mean) + product(L, innovation[..., None, :])
-        closed = A - product(L, np.eye(1, target.order))
-        covariance = (
-            product(closed, P, np.swapaxes(closed, -1, -2))
-            + R[..., None, None] * product(L, np.swapaxes(L, -1, -2))
-            + W
-        )
-        done = sighting.done
+        done = own.sighting.done
+        taken = detected(_target(brief), state.last, state.now, own.sighting, self.gate, brief.dt)
+        last, before = chosen(done, taken, state.last), chosen(done, state.last, state.before)
+        return state._replace(last=last, before=before, settled=state.settled | done, method=own.sighting.method)
 
-        def replaced(new: Any, old: Any) -> Any:
-            return np.where(done.reshape(done.shape + (1,) * (old.ndim - done.ndim)), new, old)
-
-        made = np.asarray(np.where(done, state.now, state.last.made), dtype=np.int64)
-        last = Prediction(replaced(corrected, state.last.mean), replaced(covariance, state.last.covariance), made)
-        before = Prediction(*(replaced(new, old) for new, old in zip(state.last, state.before, strict=True)))
-        return state._replace(last=last, before=before, settled=state.settled | done, method=sighting.method)
+    def _lagging(self, brief: Brief, state: Track) -> Track:
+        """A tick passes in the low-pass filter, with the optimal information as it was."""
+        if self.output != "low-pass":
+            return state
+        entering = packed(*predicted(_target(brief), state.last, state.now, brief.dt))[0]
+        return state._replace(stages=smoothing.lagging(state.stages, entering, brief.dt / self.lag))
 
     def _information(self, brief: Brief, state: Track) -> tuple[Array, Array]:
-        """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D) (7)."""
+        """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D)."""
         target = _target(brief)
-        if self.output == "optimal":
-            return predicted(target, state.last, state.now, brief.dt)
-        both = Prediction(*(np.stack(pair) for pair in zip(state.before, state.last, strict=True)))
-        share = self._share(target, state, brief.dt)
-        rest = np.concatenate([1.0 - share[:1], -share[1:]])
-        Q, y = (
-            jets.scaled(rest, of_both[:, 0]) + jets.scaled(share, of_both[:, 1])
-            for of_both in predicted(target, both, state.now, brief.dt)
-        )
-        return Q, y
+        match self.output:
+            case "optimal":
+                return predicted(target, state.last, state.now, brief.dt)
+            case "smooth":
+                share = self._share(target, state, brief.dt)
+                older, newer = (predicted(target, one, state.now, brief.dt) for one in (state.before, state.last))
+                return smoothing.mixed(older[0], newer[0], share), smoothing.mixed(older[1], newer[1], share)
+            case "spline":
+                passed, seconds = _passed(target, state, brief.dt)
+                older, newer = (predicted(target, one, one.made, brief.dt) for one in (state.before, state.last))
+                return (
+                    smoothing.splined(older[0], newer[0], passed, seconds),
+                    smoothing.splined(older[1], newer[1], passed, seconds),
+                )
+            case "low-pass":
+                leaving = smoothing.last_of(state.stages, 1.0 / self.lag)
+                return unpacked(leaving, brief.dimension, target.order)
 
     def _share(self, target: Target, state: Track, dt: float) -> Array:
-        """The jet of eta (appendix B), shape (m + 1, ...): how far the smooth output has passed to the newer prediction."""
-        latency = _seconds(target, state, dt)
-        rate, exponent, orders = 1.0 / latency, target.order + 1, target.order + 1
-        passed = np.clip((state.now - state.last.made) * dt / latency, 0.0, 1.0)
-        rising = jets.power(passed, exponent, rate, orders)
-        falling = whole_power(self.alpha, exponent) * jets.power(1.0 - passed, exponent, -rate, orders)
-        share = jets.quotient(rising, rising + falling)
-        alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((orders - 1, *passed.shape))])
+        """The jet of eta, shape (m + 1, ...); all of the only estimate there is, before the first detection."""
+        passed, seconds = _passed(target, state, dt)
+        share = smoothing.passed_over(passed, 1.0 / seconds, self.alpha, target.order)
+        alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((target.order, *passed.shape))])
         return np.where(state.settled, share, alone)
 
     def _consensus(self, brief: Brief) -> Consensus:
@@ -327,9 +302,10 @@ def _target(brief: Brief) -> Target:
     return brief.target
 
 
-def _seconds(target: Target, state: Track, dt: float) -> Array:
-    """How long the detection at work takes, shape (...)."""
-    return np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
+def _passed(target: Target, state: Track, dt: float) -> tuple[Array, Array]:
+    """How much of its latency the detection at work has taken, and that latency in seconds, both (...)."""
+    seconds = np.asarray(target.latencies[state.method] * dt, dtype=np.float64)
+    return np.clip((state.now - state.last.made) * dt / seconds, 0.0, 1.0), seconds
 
 
 def _sighted(sighting: Sighting | None, like: Array) -> Array:

@@ -20,6 +20,8 @@ ESTIMATORS = {
     "smooth, own": TargetEstimator(theta=2.0, derivatives="own", alpha=0.3),
     "mean": TargetEstimator(fusion="mean"),
     "alone": TargetEstimator(fusion="none"),
+    "spline": TargetEstimator(fusion="mean", output="spline"),
+    "low-pass": TargetEstimator(theta=2.0, output="low-pass"),
     "jumping": TargetEstimator(fusion="none", output="optimal"),
 }
 

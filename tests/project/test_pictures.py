@@ -1,6 +1,7 @@
 """The README's first picture is drawn from the data of the study that it names."""
 
 import draw_bursts
+import draw_measurements
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -50,3 +51,28 @@ def test_the_picture_shows_the_data(left):
 def test_who_names_no_study_is_told():
     with pytest.raises(SystemExit, match="give the directory that `affinet study bursts` has left"):
         draw_bursts.main([])
+
+
+def test_the_ellipses_of_measurements_are_those_of_their_covariances(tmp_path):
+    places = np.array([[0.0, 0.0], [3.0, 2.0]])
+    origin, found, slanting = places[:1], places[1:] + 0.1, np.array([[[0.3, 0.2], [0.2, 0.3]]])
+    pictures = []
+    for number, covariance in enumerate((slanting, slanting * np.eye(2), slanting)):
+        draw_measurements.draw(places, origin, found, covariance, tmp_path / f"{number}.png")
+        with Image.open(tmp_path / f"{number}.png") as picture:
+            pictures.append(np.asarray(picture.convert("RGB")))
+    full, diagonal, again = pictures
+    half = full.shape[1] // 2
+    assert (full == again).all()
+    assert (full[:, :half] != diagonal[:, :half]).any()
+    assert (full[:, half:] == diagonal[:, half:]).all()
+
+
+def test_what_is_drawn_as_measured_is_about_where_the_agents_are(monkeypatch):
+    drawn_with = []
+    monkeypatch.setattr(draw_measurements, "draw", lambda *given: drawn_with.append(given))
+    draw_measurements.main()
+    ((places, origin, found, covariance, _),) = drawn_with
+    off = np.linalg.norm(found[:, None] - places, axis=-1).min(axis=1)
+    assert origin.shape == found.shape == (28, 2)
+    assert (off < 4.0 * np.sqrt(np.linalg.eigvalsh(covariance)[:, -1])).all()

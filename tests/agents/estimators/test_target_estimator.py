@@ -84,10 +84,15 @@ def test_derivatives_of_the_smooth_output_are_those_of_the_function_of_time():
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.parametrize("alpha", [0.1, 1.0, 10.0])
-def test_a_detection_that_is_taken_in_changes_no_derivative_of_the_smooth_output(order, alpha):
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        *(pytest.param(replace(SMOOTH, alpha=alpha), id=f"SOE {alpha:g}") for alpha in (0.1, 1.0, 10.0)),
+        *(pytest.param(replace(SMOOTH, output=output), id=output) for output in ("spline", "low-pass")),
+    ],
+)
+def test_a_detection_that_is_taken_in_changes_no_derivative_of_the_smooth_output(order, estimator):
     target, taken = target_of(order), 0
-    estimator = replace(SMOOTH, alpha=alpha)
     alone = replace(brief(np.zeros((1, 1, 2))), dt=0.05, target=target)
     nothing = np.zeros((1, 2))
     for one in watch(estimator, target, ticks=100, seed=3):

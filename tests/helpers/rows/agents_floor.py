@@ -18,6 +18,7 @@ from agents.algebra import (
     prediction,
     redcho,
     small,
+    smoothing,
     starts,
 )
 from agents.algebra.geometry import Fit
@@ -33,7 +34,7 @@ from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Heard
 from agents.laws import base, leaders
 from analysis.models.affine import Manoeuvre
-from analysis.models.pursuit import Target
+from analysis.models.pursuit import Sighting, Target
 from analysis.models.sensor import Sensor
 from rows.case import covariance, of, real, share, truth, whole
 from world.formation.nominal import Formation
@@ -217,6 +218,29 @@ CASES = {
         lambda mean, spread, s: prediction.carried(TARGET, Prediction(mean, spread, None), s),
         *(real(3, 2), covariance(3, 3), share()),
     ),
+    "agents.algebra.prediction.detected": of(
+        lambda mean, spread, made, now, where, done, method: prediction.detected(
+            TARGET, Prediction(mean, spread, made), now + 50, Sighting(where, done, method, method), 2.0, 0.013
+        ),
+        *(real(3, 2), covariance(3, 3), whole(50), whole(99), real(2), truth(), whole(2)),
+    ),
+    "agents.algebra.prediction.chosen": of(
+        lambda where, *both: prediction.chosen(where, Prediction(*both[:3]), Prediction(*both[3:])),
+        *(truth(), real(3, 2), covariance(3, 3), whole(50), real(3, 2), covariance(3, 3), whole(50)),
+    ),
+    "agents.algebra.smoothing.passed_over": of(
+        lambda passed, seconds: smoothing.passed_over(passed, 1.0 / seconds, 0.3, 3), share(), share(), out=1
+    ),
+    "agents.algebra.smoothing.mixed": of(
+        smoothing.mixed, real(4, 3, 2, axis=1), real(4, 3, 2, axis=1), real(4, axis=1), out=1
+    ),
+    "agents.algebra.smoothing.splined": of(
+        smoothing.splined, real(4, 3, 2, axis=1), real(4, 3, 2, axis=1), share(), share(), out=1
+    ),
+    "agents.algebra.smoothing.lagging": of(
+        lambda stages, entering: smoothing.lagging(stages, entering, 0.26), real(4, 9), real(9)
+    ),
+    "agents.algebra.smoothing.last_of": of(lambda stages: smoothing.last_of(stages, 20.0), real(4, 9), out=1),
     "agents.algebra.prediction.predicted": of(
         lambda mean, spread, made, now: prediction.predicted(TARGET, Prediction(mean, spread, made), now, 0.013),
         *(real(3, 2), covariance(3, 3), whole(50), whole(99)),
