@@ -9,8 +9,11 @@ from __future__ import annotations
 import shutil
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -24,6 +27,8 @@ from analysis.claims.intervals import Decision
 DOCS = Path(__file__).parent
 PAGE = DOCS / "claims.md"
 PICTURES = DOCS / "pictures"
+_MANY = 4  # cases that come out alike are counted
+_NOT_FLOWN = "not flown in full yet"
 RESULTS = DOCS.parent / "affinet" / "shipped" / "results"
 PAPERS = {
     "000": "Robust affine formation control of multiagent systems",
@@ -93,8 +98,16 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def verdicts(one: PaperClaim, study: Study) -> Iterator[tuple[str, ClaimVerdict | None]]:
-    """Every verdict on its claims, for each label: the labels, and what was judged, if it was flown.
+class Found(NamedTuple):
+    """What became of a claim of a study in one case: which claim, which case, and what was judged, if it was flown."""
+
+    says: str
+    case: str
+    judged: ClaimVerdict | None
+
+
+def verdicts(one: PaperClaim, study: Study) -> Iterator[Found]:
+    """Every verdict on its claims, for each label.
 
     Raises
     ------
@@ -108,8 +121,7 @@ def verdicts(one: PaperClaim, study: Study) -> Iterator[tuple[str, ClaimVerdict 
         if not matching:
             raise KeyError(f"{one.study} makes no claim {says!r}")
         for spelled in (spelled for claim in matching for spelled in judging.spelled_out(study, claim)):
-            labels = spelled.says if len(one.claims) > 1 else spelled.says.replace(says, "").strip(" :")
-            yield labels, found.get(spelled.says)
+            yield Found(says, spelled.says.replace(says, "").strip(" :"), found.get(spelled.says))
 
 
 def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
@@ -117,7 +129,7 @@ def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]
     yield "|---|---|---|---|---|---|---|---|"
     for paper in PAPERS:
         ours = [one for one in rows if one.paper == paper]
-        flown = [judged for one in ours if one.study for _, judged in verdicts(one, named[one.study])]
+        flown = [judged for one in ours if one.study for *_, judged in verdicts(one, named[one.study])]
         decided = [sum(judged is not None and judged.decision == what for judged in flown) for what in Decision]
         tested = sum(bool(one.tests) for one in ours)
         left = sum(not one.tests and not one.study for one in ours)
@@ -128,7 +140,8 @@ def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]
 def _row(one: PaperClaim, named: dict[str, Study]) -> str:
     said, by = [], []
     if one.study:
-        said += [_said(labels, judged) for labels, judged in verdicts(one, named[one.study])]
+        for says, all_found in groupby(verdicts(one, named[one.study]), key=attrgetter("says")):
+            said += _summed_up(says if len(one.claims) > 1 else "", list(all_found))
         by.append(f"`{one.study}`" + _picture(one.study))
     if one.tests:
         said.append("holds, by tests")
@@ -138,11 +151,31 @@ def _row(one: PaperClaim, named: dict[str, Study]) -> str:
     return f"| {one.where} | {one.says} | {'<br>'.join(said)} | {'<br>'.join(by)} |"
 
 
-def _said(labels: str, judged: ClaimVerdict | None) -> str:
-    where = f"{labels}: " if labels else ""
+def _summed_up(says: str, cases: Sequence[Found]) -> Iterator[str]:
+    """Case by case; of many that hold, how many and which."""
+    holding = [found for found in cases if found.judged is not None and found.judged.decision == Decision.HOLDS]
+    missing = [found for found in cases if found.judged is None]
+    many = [group for group in (holding, missing) if len(group) > _MANY]
+    for group in many:
+        what = "holds" if group is holding else _NOT_FLOWN
+        yield f"{_prefix(says)}{what} in {len(group)} of {len(cases)} cases" + _which(group, cases)
+    for found in cases:
+        if not any(found in group for group in many):
+            yield _said(_prefix(found.case) + _prefix(says), found.judged)
+
+
+def _which(group: Sequence[Found], cases: Sequence[Found]) -> str:
+    return "" if len(group) == len(cases) else f" ({'; '.join(found.case for found in group)})"
+
+
+def _prefix(text: str) -> str:
+    return f"{text}: " if text else ""
+
+
+def _said(where: str, judged: ClaimVerdict | None) -> str:
     if judged is None:
-        return f"{where}not flown in full yet"
-    decision = judged.decision if judged.decision == "holds" else f"**{judged.decision}**"
+        return f"{where}{_NOT_FLOWN}"
+    decision = judged.decision if judged.decision == Decision.HOLDS else f"**{judged.decision}**"
     return f"{where}{decision}: {judged.found}"
 
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.figures.axes import logarithmic
+from analysis.figures.axes import logarithmic, named_aside, titled
 from analysis.metrics.consistency import DRAWN, band
 from analysis.models.arrays import Array
 
@@ -143,7 +143,7 @@ def evolution(path: Path, title: str, cases: Sequence[tuple[Mapping[str, str], A
         panel.set_xlabel("time (s)")
     for panel in panels[:, 0]:
         panel.set_ylabel("estimated position (m)")
-    figure.suptitle(title)
+    titled(figure, title)
     figure.savefig(path)
 
 
@@ -155,7 +155,7 @@ def rates(path: Path, title: str, found: Array) -> None:
     panel.plot([found.min(), 1.0], [found.min(), 1.0], color="grey", lw=0.8)
     panel.set_xlabel("with an anchor")
     panel.set_ylabel("weighted centroid")
-    figure.suptitle(f"{title}: convergence rates on {len(found)} random graphs", fontsize=7)
+    titled(figure, f"{title}: convergence rates on {len(found)} random graphs", 7.0)
     figure.savefig(path)
 
 
@@ -237,7 +237,7 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
         panel.set_yticks(range(len(rows)), rows)
         panel.set_title(label)
         panel.grid(visible=False)
-    figure.suptitle(title)
+    titled(figure, title)
     figure.colorbar(image, label="mean tracking error (m²), power of ten")
     figure.savefig(path)
 
@@ -263,12 +263,12 @@ def _draw(panel: Axes, case: Curve, label: str, colour: str) -> None:
 
 
 def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
-    figure.suptitle(title)
+    titled(figure, title)
     for panel in panels.ravel():
         logarithmic(panel, "y")
     for panel in panels[-1]:
         panel.set_xlabel(x)
-    figure.supylabel(y, fontsize=8)
+    named_aside(figure, y)
     drawn = [panel.get_legend_handles_labels() for panel in panels.ravel()]
     named = {label: handle for handles, labels in drawn for handle, label in zip(handles, labels, strict=True)}
     figure.legend(named.values(), named.keys(), title=legend, fontsize=7, loc="outside right center")

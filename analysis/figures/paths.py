@@ -9,6 +9,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.figures.axes import titled
 from analysis.models.arrays import Array, Integers
 
 _AXES = "xyz"
@@ -65,7 +66,7 @@ def paths(path: Path, title: str, flights: Sequence[Flight]) -> None:
     planes[0].set_ylabel("y (m)")
     inputs[0].set_ylabel("input (m/s, or m/s²)")
     inputs[0].legend(fontsize=6)
-    figure.suptitle(title)
+    titled(figure, title)
     figure.savefig(path)
 
 

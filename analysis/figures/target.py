@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.axes import logarithmic
+from analysis.figures.axes import logarithmic, titled
 from analysis.models.arrays import Array
 
 _ALONE, _TOGETHER, _TRUE = "0.65", "tab:blue", "black"
@@ -62,7 +62,7 @@ def pursued(path: Path, title: str, flights: Sequence[TargetRun]) -> None:
         logarithmic(behind, "y")
         _named(behind, "time (s)", "distance from the place steered for (m)")
         coordinate.set_title(", ".join(flight.labels.values()), fontsize=8)
-    figure.suptitle(title)
+    titled(figure, title)
     figure.savefig(path)
 
 
@@ -97,9 +97,7 @@ def agreement(path: Path, title: str, seconds: Array, fused: Array, known: Array
         if derivative == rows - 1:
             for panel in (whole, end):
                 panel.set_xlabel("time (s)")
-    figure.suptitle(
-        f"{title}: first number of the information vector, agents thin, mean of what they know red", fontsize=8
-    )
+    titled(figure, f"{title}: first number of the information vector, agents thin, mean of what they know red", 8.0)
     figure.savefig(path)
 
 
