@@ -107,6 +107,24 @@ def test_every_case_of_a_shipped_study_can_fly_be_drawn_and_be_judged(name, quic
     assert [case for case, _ in study.plans(shipped, quick=quick)] == [*study.cases(shipped, quick=quick)]
 
 
+RIGID = [name for name in study.shipped() if name.startswith(("paper-001", "paper-004"))]
+NOISELESS = 1e-12  # m²
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_quick_forms_have_as_much_noise_in_a_second_as_the_full_ones(name):
+    shipped, compared = study.load(name), 0
+    full = {tuple(case.labels.values()): plan.world for case, plan in study.plans(shipped, quick=False)}
+    for case, plan in study.plans(shipped, quick=True):
+        coarse, fine = plan.world, full[tuple(case.labels.values())]
+        if fine.sensor.common.max() > NOISELESS:
+            compared += 1
+            np.testing.assert_allclose(coarse.sensor.common * coarse.dt, fine.sensor.common * fine.dt, rtol=1e-9)
+        pushes = [one.disturbance.covariance / one.dt for one in (coarse, fine)]
+        np.testing.assert_allclose(*pushes, rtol=1e-5)
+    assert compared or name == "paper-004-fig33"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
