@@ -19,9 +19,8 @@ from pydantic import Field, model_validator
 
 from affinet.studies import judging, record
 from affinet.studies import study as studies
-from affinet.studies.record import CaseMean, Kept, StudyRecord
-from affinet.studies.study import Study
-from analysis.claims.checks import ClaimVerdict
+from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
+from affinet.studies.study import Claim, Study
 from analysis.claims.intervals import Decision
 
 DOCS = Path(__file__).parent
@@ -91,7 +90,13 @@ def page() -> str:
             "|---|---|---|---|",
         ]
         lines += [_row(one, named) for one in rows if one.paper == paper]
-    lines += ["", "## Means of all cases", "", "Over the runs of each case, with their intervals."]
+    lines += [
+        "",
+        "## Means of all cases",
+        "",
+        "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own,",
+        "which are with them.",
+    ]
     for name in named:
         if full := record.full_study(name):
             lines += ["", f"### {name}: {full.title} ({full.source})", "", *_cases(full)]
@@ -103,7 +108,7 @@ class Found(NamedTuple):
 
     says: str
     case: str
-    judged: ClaimVerdict | None
+    judged: JudgedClaim | None
 
 
 def verdicts(one: PaperClaim, study: Study) -> Iterator[Found]:
@@ -115,13 +120,21 @@ def verdicts(one: PaperClaim, study: Study) -> Iterator[Found]:
         When the study makes no such claim.
     """
     full = record.full_study(one.study or "")
-    found = {} if full is None else {claim.says: claim for claim in full.claims}
+    found = {} if full is None else {claim.asked: claim for claim in full.claims}
     for says in one.claims:
         matching = [claim for claim in study.claims if claim.says == says]
         if not matching:
             raise KeyError(f"{one.study} makes no claim {says!r}")
         for spelled in (spelled for claim in matching for spelled in judging.spelled_out(study, claim)):
-            yield Found(says, spelled.says.replace(says, "").strip(" :"), found.get(spelled.says))
+            case = " ".join(spelled.says.replace(says, "").strip(" :").split()).replace(": ", " ").lstrip(", ")
+            yield Found(says, f"{case}{_window(spelled)}".lstrip(", "), found.get(record.asked(study, spelled)))
+
+
+def _window(claim: Claim) -> str:
+    """When it is judged."""
+    if claim.until is not None:
+        return f", {claim.since:g} to {claim.until:g} s"
+    return f", from {claim.since:g} s on" if claim.since else ""
 
 
 def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
@@ -172,7 +185,7 @@ def _prefix(text: str) -> str:
     return f"{text}: " if text else ""
 
 
-def _said(where: str, judged: ClaimVerdict | None) -> str:
+def _said(where: str, judged: JudgedClaim | None) -> str:
     if judged is None:
         return f"{where}{_NOT_FLOWN}"
     decision = judged.decision if judged.decision == Decision.HOLDS else f"**{judged.decision}**"

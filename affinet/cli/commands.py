@@ -25,7 +25,7 @@ from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
-from affinet.runtimes.interruption import Interrupted
+from affinet.runtimes.interruption import Interrupted, ended_by_signals
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
@@ -212,7 +212,7 @@ def _study(parsed: argparse.Namespace) -> int:
     planned = studies.plans(study, quick=parsed.quick)
     out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
     results: list[Result] = []
-    with directories.unless_empty(out):
+    with directories.unless_empty(out), ended_by_signals():
         try:
             with show.Grid(study.title, len(planned)) as grid:
                 for result in studies.fly(planned, study.size(quick=parsed.quick).runs):

@@ -59,6 +59,27 @@ class Interruption:
 
 
 @contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Signals that ask to end raise `Interrupted` where the block is, so that what it has is kept."""
+    if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
+        yield
+        return
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        raise Interrupted(number)
+
+    before = {number: signal.getsignal(number) for number in _HEEDED}
+    heeded = [number for number, handler in before.items() if handler in _BY_DEFAULT]
+    for number in heeded:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])
+
+
+@contextmanager
 def interruptible() -> Iterator[Interruption]:
     """Note the signals that come while the block runs; those that are ignored, as under nohup, stay ignored."""
     interruption = Interruption()

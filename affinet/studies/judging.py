@@ -31,7 +31,7 @@ def judge(study: Study, results: list[Result]) -> list[ClaimVerdict]:
         When a claim looks at what was not flown.
     """
     verdicts = []
-    for claim in itertools.chain.from_iterable(spelled_out(study, claim) for claim in study.claims):
+    for claim in all_spelled_out(study):
         try:
             verdicts.append(_judge(claim, results, claim.quantity or study.quantity))
         except ValueError as error:
@@ -39,15 +39,21 @@ def judge(study: Study, results: list[Result]) -> list[ClaimVerdict]:
     return verdicts
 
 
+def all_spelled_out(study: Study) -> Iterator[Claim]:
+    """Every claim for each label of the axes it is for."""
+    return itertools.chain.from_iterable(spelled_out(study, claim) for claim in study.claims)
+
+
 def spelled_out(study: Study, claim: Claim) -> Iterator[Claim]:
-    """A claim for each label of the axes it is for."""
+    """A claim for each label of the axes it is for; what it says ends in its level, where a comma leaves room for it."""
     for where in claim.settings(study.axes):
         labels = list(where.values())
         other = None if claim.to is None else claim.to | where
         says, level = ", ".join(labels) + ": " * bool(labels) + claim.says, claim.level
         if claim.levels is not None:
             level = claim.levels[labels[0]]
-            says += f" {level:g} {said(claim.quantity or study.quantity)[1]}".rstrip()
+            if says.endswith(","):
+                says += f" {level:g} {said(claim.quantity or study.quantity)[1]}".rstrip()
         yield claim.model_copy(update={"says": says, "of": claim.of | where, "to": other, "level": level})
 
 

@@ -7,17 +7,20 @@ import json
 from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from affinet.studies import judging
 from affinet.studies.quantities import Quantity, over_time, said
-from affinet.studies.study import Labels, Result, Study
+from affinet.studies.study import Claim, Labels, Result, Study
 from analysis.claims import intervals
 from analysis.claims.checks import ClaimVerdict
 from analysis.claims.intervals import Decision, Interval
 
 FILE = "claims.json"
+_SEAL = "seal"
 
 
 class Kept(BaseModel):
@@ -37,8 +40,17 @@ class CaseMean(Kept):
     high: float | None
 
 
+class JudgedClaim(Kept):
+    """What became of a claim; `asked` is a digest of what was asked, and not of how it is said."""
+
+    says: str
+    asked: str
+    decision: Decision
+    found: str
+
+
 class StudyRecord(Kept):
-    """The verdicts of a study, and the means of its cases; `flown` is a digest of the grid that they are of."""
+    """The verdicts of a study, and the means of its cases; `flown` is a digest of what they are of."""
 
     title: str
     source: str
@@ -46,23 +58,44 @@ class StudyRecord(Kept):
     quick: bool
     runs: int
     confidence: float
-    claims: list[ClaimVerdict]
+    claims: list[JudgedClaim]
     cases: list[CaseMean]
 
-    def contradicted(self, full: StudyRecord) -> Iterator[ClaimVerdict]:
+    def contradicted(self, full: StudyRecord) -> Iterator[JudgedClaim]:
         """The verdicts of a full study on claims that are decided the other way here."""
-        others = {claim.says: claim for claim in full.claims}
+        others = {claim.asked: claim for claim in full.claims}
         for claim in self.claims:
-            other = others.get(claim.says)
+            other = others.get(claim.asked)
             if other and {claim.decision, other.decision} == {Decision.HOLDS, Decision.DOES_NOT_HOLD}:
                 yield other
 
 
 def grid(study: Study, *, quick: bool) -> str:
-    """A digest of what a study flies: its scenario by name, cases and runs, and not of what it makes of them."""
+    """A digest of what a study flies: its scenario, cases and runs, and not of what it makes of them.
+
+    Raises
+    ------
+    ScenarioError
+        When there is something wrong with its scenario.
+    """
     flies = study.model_dump(mode="json", include={"scenario", "set", "axes", "skip"})
-    flies |= {"size": study.size(quick=quick).model_dump(mode="json")}
-    return hashlib.sha256(json.dumps(flies, sort_keys=True).encode()).hexdigest()[:16]
+    flies |= {
+        "size": study.size(quick=quick).model_dump(mode="json"),
+        "of": study.loaded(study.set).model_dump(mode="json"),
+    }
+    return _digest(flies)
+
+
+def asked(study: Study, claim: Claim) -> str:
+    """A digest of what a claim that is spelled out asks of which cases."""
+    asks = claim.model_dump(
+        mode="json", include={"check", "of", "to", "to_quantity", "level", "between", "since", "until"}
+    )
+    return _digest(asks | {"quantity": claim.quantity or study.quantity})
+
+
+def _digest(of: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(of, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def recorded(study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVerdict], *, quick: bool) -> StudyRecord:
@@ -75,19 +108,32 @@ def recorded(study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVe
         quick=quick,
         runs=study.size(quick=quick).runs,
         confidence=intervals.CONFIDENCE,
-        claims=list(verdicts),
+        claims=[
+            JudgedClaim(says=verdict.says, asked=asked(study, claim), decision=verdict.decision, found=verdict.found)
+            for claim, verdict in zip(judging.all_spelled_out(study), verdicts, strict=True)
+        ],
         cases=[_mean(one, quantity, study.since) for one in results for quantity in quantities],
     )
 
 
 def write(out: Path, record: StudyRecord) -> None:
     """Write it into a directory."""
-    (out / FILE).write_text(json.dumps(record.model_dump(mode="json"), indent=1, allow_nan=False) + "\n")
+    kept = record.model_dump(mode="json")
+    (out / FILE).write_text(json.dumps(kept | {_SEAL: _digest(kept)}, indent=1, allow_nan=False) + "\n")
 
 
 def read(file: Path) -> StudyRecord:
-    """What was kept of a study."""
-    return StudyRecord.model_validate_json(file.read_text())
+    """What was kept of a study.
+
+    Raises
+    ------
+    ValueError
+        When it is no longer as it was written.
+    """
+    kept = json.loads(file.read_text())
+    if kept.pop(_SEAL, None) != _digest(kept):
+        raise ValueError(f"{file} is not as the study left it: fly it again")
+    return StudyRecord.model_validate_json(json.dumps(kept))
 
 
 def full_study(name: str) -> StudyRecord | None:

@@ -7,6 +7,7 @@ with the check that decides it (`judging.py`, `analysis/claims/checks.py`); `rep
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from affinet.scenario import files
 from affinet.scenario import loading as scenarios
 from affinet.scenario.explain import explained, named_in
 from affinet.scenario.profiles import Section
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.source import Source
 from affinet.scenario.units import Finite, NotNegative
 from affinet.studies import checks
@@ -47,6 +48,9 @@ _WANTED: dict[str, frozenset[str]] = {
     "ratio": frozenset({"to", "between"}),
     "value": frozenset({"level", "between"}),
 }
+
+# Of what no quantity is below, and no ratio of the largest to the smallest.
+_LEAST_LEVEL: dict[str, float] = {"flat": 1.0, "stays_below": 0.0, "leaves": 0.0}
 
 
 class Axis(Section):
@@ -102,6 +106,13 @@ class Claim(Section):
             raise ValueError("to_quantity is that of what is compared with: give to")
         if self.check == "value" and 0.0 in (self.level, *(self.levels or {}).values()):
             raise ValueError("a value is between multiples of its level: give one that is not 0")
+        if self.between is not None and self.between[0] >= self.between[1]:
+            raise ValueError(
+                f"between is from a smaller to a larger number, got {self.between[0]:g} and {self.between[1]:g}"
+            )
+        least = _LEAST_LEVEL.get(self.check, -math.inf)
+        if any(level <= least for level in (self.level, *(self.levels or {}).values()) if level is not None):
+            raise ValueError(f"the level of {self.check!r} must be above {least:g}, below which nothing is")
         if self.levels is not None and (len(self.each) != 1 or self.level is not None):
             raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")
         return self
@@ -165,6 +176,18 @@ class Study(Section):
         if self.also and self.figure not in ("curves", "sweep"):
             raise ValueError(f"also is of curves and sweeps, and the figure is {self.figure!r}: leave it out")
         return self
+
+    def loaded(self, overrides: Sequence[str]) -> Scenario:
+        """Its scenario with overrides, which name paths and modules from the folder of the study.
+
+        Raises
+        ------
+        ScenarioError
+            When there is something wrong with it.
+        """
+        folder = self.folder or Path()
+        name = str(folder / self.scenario) if self.scenario.endswith(".toml") else self.scenario
+        return scenarios.load(name, overrides, self.folder)
 
     def size(self, *, quick: bool) -> Size:
         """How large it is."""
@@ -267,11 +290,9 @@ def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
 
 
 def _planned(study: Study, case: Case) -> Plan:
-    folder = study.folder or Path()
-    name = str(folder / study.scenario) if study.scenario.endswith(".toml") else study.scenario
     try:
         with _in_case(case):
-            return planning.make(scenarios.load(name, case.overrides, study.folder))
+            return planning.make(study.loaded(case.overrides))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
         said = str(error).removeprefix("--set: ")  # which nobody typed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -19,6 +20,8 @@ from netem.loading.calling import Calling
 from netem.loading.returned import WrongReturn, shown
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
+
+_CORRELATION_TIMES = 40.0  # in a run that says something: four to a batch, as short series find theirs too short
 
 Signal = Callable[[Evidence], Mask]
 
@@ -159,8 +162,9 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
     """The filters' covariances tell the truth: the mean NEES over edges and ticks is their dimension.
 
     From `since` on, in seconds. It fails where the confidence interval of that mean, of probability `level`, leaves the
-    dimension out, or the mean is off by more than a share `within` of it; it is vacuous where the interval is wider than that,
-    which says nothing. The interval is by batch means: edges share their noise, and ticks are correlated.
+    dimension out; it is vacuous where the interval is wider than a share `within` of it to either side, or where the run is
+    shorter than forty times what its ticks are correlated over, which says nothing, unless the mean is out of what a single
+    draw can be. The interval is by batch means: edges share their noise, and ticks are correlated.
     """
     name = f"consistent({level:g}, within={within:g}, since={since:g})"
     if not 0.0 < level < 1.0:
@@ -183,7 +187,19 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
         found, dimension = consistency.averaged(mean[ticks], level), evidence.plan.world.formation.dimension
         says = f"mean NEES {found.mean:.3g} +- {found.half:.2g} for {dimension} dimensions"
         off = found.mean - dimension
-        if abs(off) > min(found.half, within * dimension):
+        wanted = math.ceil(_CORRELATION_TIMES * consistency.correlation_time(mean[ticks]))
+        low, high = consistency.band(level, dimension, 1)
+        explicable = (
+            low <= found.mean <= high
+        )  # by correlation, however much there is: one draw is the most it can leave
+        if len(ticks) < wanted and explicable:
+            return CheckResult(
+                name,
+                "vacuous",
+                None,
+                f"{says} in {len(ticks)} ticks, of which {wanted} are needed, as they are correlated",
+            )
+        if abs(off) > found.half or not explicable:
             worst = int(np.argmax(np.sign(off) * (found.batches - dimension) >= abs(off)))
             first = ticks[worst * len(ticks) // consistency.BATCHES]
             return CheckResult(name, "fail", span.start + int(first), says)

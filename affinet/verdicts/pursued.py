@@ -17,16 +17,17 @@ def found(within: float, by: float = 0.0) -> Checker:
 
     That is where it steers for, with what others tell it; vacuous where nobody pursues a target.
     """
-    return _all_within("found", within, by, lambda evidence, steered: steered - _target(evidence), "from the target")
+    return _all_within("found", 1, within, by, lambda evidence, steered: steered - _target(evidence), "from the target")
 
 
 def agreed(within: float, by: float = 0.0) -> Checker:
     """From a time on, in seconds, where each agent takes the target to be is within so many metres of the mean of all.
 
-    Vacuous where nobody pursues a target.
+    Vacuous where nobody pursues a target, or in some tick nobody but one does.
     """
     return _all_within(
         "agreed",
+        2,
         within,
         by,
         lambda _, steered: steered - np.nanmean(steered, axis=1, keepdims=True),
@@ -34,7 +35,9 @@ def agreed(within: float, by: float = 0.0) -> Checker:
     )
 
 
-def _all_within(word: str, within: float, by: float, off_of: Callable[[Evidence, Array], Array], says: str) -> Checker:
+def _all_within(
+    word: str, least: int, within: float, by: float, off_of: Callable[[Evidence, Array], Array], says: str
+) -> Checker:
     name = f"{word}({within:g}, by={by:g})"
     above_zero(name, within=within)
     times(name, by=by)
@@ -45,8 +48,10 @@ def _all_within(word: str, within: float, by: float, off_of: Callable[[Evidence,
         span = span_of(evidence, by, None)
         steered = evidence.arrays["reference"][:, :, 0]
         told = np.asarray(~np.isnan(steered).any(axis=-1))[span.start : span.stop]
-        if len(told) and not told.any(axis=1).all():
-            return CheckResult(name, "vacuous", None, "in some tick nobody said where it is")
+        fewest = int(told.sum(axis=1).min(initial=told.shape[1]))
+        if fewest < least:
+            who = "nobody" if fewest == 0 else "one agent alone"
+            return CheckResult(name, "vacuous", None, f"in some tick {who} said where it is")
         off = np.linalg.norm(off_of(evidence, steered)[span.start : span.stop], axis=-1)
         farthest = np.where(told, off, 0.0)
 

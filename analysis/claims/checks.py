@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import rankdata
 
 from analysis.claims import intervals
 from analysis.claims.intervals import Decision, Interval, all_of
@@ -106,7 +107,9 @@ def lower(says: str, mean_errors: Array, others: Array, unit: str, *, paired: bo
         Decision.DOES_NOT_HOLD if one.high <= rounding else one.decide(least=np.nextafter(rounding, np.inf))
         for one, rounding in zip(below, np.where(np.isfinite(least), least, 0.0), strict=True)
     ]
-    return ClaimVerdict(says, all_of(decisions), f"lower by {_list_of(below)} {unit}".rstrip() + _drawn(paired))
+    higher = all(one.found < 0.0 for one in below)
+    found = f"higher by {_list_of([one.negated for one in below])}" if higher else f"lower by {_list_of(below)}"
+    return ClaimVerdict(says, all_of(decisions), f"{found} {unit}".rstrip() + _drawn(paired))
 
 
 def ratio(says: str, values: Array, others: Array, between: Sequence[float], *, paired: bool) -> ClaimVerdict:
@@ -247,11 +250,12 @@ def follows(says: str, seconds: Array, values: Array, others: Array, defined: Ma
 
 def _rank_correlation(values: Array, others: Array) -> Array:
     """Spearman's, of series (P, T), shape (P,); NaN where a value is none."""
-    ranks = [each.argsort(axis=1).argsort(axis=1).astype(np.float64) for each in (values, others)]
+    ranks = [rankdata(each, axis=1) for each in (values, others)]  # what is equal shares its ranks
     one, other = (each - each.mean(axis=1, keepdims=True) for each in ranks)
-    correlation = (one * other).sum(axis=1) / np.sqrt(
-        whole_power(one, 2).sum(axis=1) * whole_power(other, 2).sum(axis=1)
-    )
+    with np.errstate(invalid="ignore"):  # what is the same all the time rises and falls with nothing
+        correlation = (one * other).sum(axis=1) / np.sqrt(
+            whole_power(one, 2).sum(axis=1) * whole_power(other, 2).sum(axis=1)
+        )
     return np.where(np.isfinite(values).all(axis=1) & np.isfinite(others).all(axis=1), correlation, np.nan)
 
 
@@ -275,7 +279,7 @@ def _of(value: float | Interval, unit: str) -> str:
 
 
 def _drawn(paired: bool) -> str:
-    return "" if paired else ", of runs with draws of their own"
+    return "" if paired else " (the runs compared do not meet the same draws)"
 
 
 def _untold(number: int) -> str:

@@ -44,6 +44,11 @@ class Interval:
             return Decision.HOLDS
         return Decision.DOES_NOT_HOLD if self.high < least or self.low > most else Decision.UNDECIDED
 
+    @property
+    def negated(self) -> Interval:
+        """That of the number with the other sign."""
+        return Interval(-self.found, -self.high, -self.low)
+
     def __str__(self) -> str:
         return f"{self.found:.3g} ({self.low:.3g} to {self.high:.3g})"
 

@@ -14,6 +14,7 @@ from analysis.models.elementary import whole_power
 
 DRAWN = 0.95  # how probable the bands of pictures are
 BATCHES = 10
+_WINDOW = 5.0  # correlation times over which correlations are summed
 _SINGULAR = 1e-12  # of the trace: a smallest eigenvalue below this is what rounding leaves of nothing
 
 
@@ -96,6 +97,28 @@ def averaged(series: Array, level: float) -> Averaged:
     spread = np.sqrt(whole_power(batches - batches.mean(), 2).sum() / (BATCHES - 1))
     half = stdtrit(BATCHES - 1, (1.0 + level) / 2) * spread / np.sqrt(BATCHES)
     return Averaged(float(series.mean()), float(half), batches)
+
+
+def correlation_time(series: Array) -> float:
+    """Over how many values of a series its fluctuations last: 1 of independent ones (integrated, with Sokal's window).
+
+    Parameters
+    ----------
+    series
+        Shape (T,). That of a series not much longer than this is found too short.
+
+    References
+    ----------
+    Sokal, "Monte Carlo methods in statistical mechanics", section 3, 1996.
+    """
+    off = series - series.mean()
+    power = np.abs(np.fft.rfft(off, 2 * len(off))) ** 2
+    covariance = np.fft.irfft(power)[: len(off)]
+    if covariance[0] <= 0.0:
+        return 1.0
+    times = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
+    enough = np.arange(len(off)) >= _WINDOW * times
+    return float(max(1.0, times[int(np.argmax(enough)) if enough.any() else -1]))
 
 
 def nees(error: Array, covariance: Array) -> Array:

@@ -7,6 +7,7 @@ import pytest
 from paths import ROOT
 
 from affinet.studies import record, study
+from analysis.claims.intervals import Decision
 
 ROWS = claims_page.paper_claims()
 TESTS = sorted({test for one in ROWS for test in one.tests})
@@ -49,3 +50,21 @@ def test_what_judges_a_claim_has_to_be_said(left_out):
 def test_full_verdicts_are_of_the_grid_that_the_study_has(name):
     full = record.full_study(name)
     assert full.flown == record.grid(study.load(name), quick=False), f"fly {name} again, or take its verdicts away"
+
+
+def test_cases_that_come_out_alike_are_counted_and_the_others_named():
+    def found(case, decision):
+        judged = record.JudgedClaim(says="s", asked="a", decision=Decision(decision), found="1 (0 to 2)")
+        return claims_page.Found("s", case, judged)
+
+    cases = [
+        *(found(f"case {n}", "holds") for n in range(5)),
+        found("odd", "undecided"),
+        claims_page.Found("s", "late", None),
+    ]
+    assert list(claims_page._summed_up("it flies", cases)) == [
+        "it flies: holds in 5 of 7 cases (case 0; case 1; case 2; case 3; case 4)",
+        "odd: it flies: **undecided**: 1 (0 to 2)",
+        "late: it flies: not flown in full yet",
+    ]
+    assert list(claims_page._summed_up("", cases[:1])) == ["case 0: holds: 1 (0 to 2)"]

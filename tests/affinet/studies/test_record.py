@@ -1,6 +1,8 @@
 """What is kept of a study's verdicts: read as it was written, of which grid it is, and where a quick one contradicts."""
 
 from dataclasses import replace
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from affinet.cli import show
 from affinet.scenario.sections import ScenarioError
 from affinet.studies import judging, record, study
 from affinet.studies.batch import fly_all
-from affinet.studies.record import StudyRecord
+from affinet.studies.record import JudgedClaim, StudyRecord
 from analysis.claims.checks import ClaimVerdict
 from analysis.claims.intervals import Decision
 
@@ -44,6 +46,9 @@ to = { estimator = "rkf", dt = "long" }
 """
 
 
+ROOT_OF_RIGID = (Path(str(resources.files("affinet.shipped"))) / "scenarios" / "rigid.toml").read_text()
+
+
 @pytest.fixture
 def two(tmp_path):
     path = tmp_path / "two.toml"
@@ -54,7 +59,7 @@ def two(tmp_path):
 def test_cases_of_other_ticks_are_not_called_paired(two):
     results = [*study.fly(study.plans(two, quick=True), 3)]
     *paired, apart = judging.judge(two, results)
-    assert apart.found.endswith("of runs with draws of their own")
+    assert apart.found.endswith("(the runs compared do not meet the same draws)")
     assert not any("draws" in one.found for one in paired)
 
 
@@ -72,7 +77,8 @@ def test_runs_are_paired_where_they_meet_the_same_draws(over):
 
 def test_it_is_read_as_it_was_written_and_what_is_no_number_is_null(two, tmp_path):
     results = [*study.fly(study.plans(two, quick=True)[:1], 1)]
-    kept = record.recorded(two, results, [ClaimVerdict("s", Decision.UNDECIDED, "f")], quick=True)
+    verdicts = [ClaimVerdict(claim.says, Decision.UNDECIDED, "f") for claim in judging.all_spelled_out(two)]
+    kept = record.recorded(two, results, verdicts, quick=True)
     record.write(tmp_path, kept)
     assert record.read(tmp_path / record.FILE) == kept
     (mean,) = kept.cases
@@ -88,8 +94,52 @@ def test_a_grid_is_what_flies_and_not_what_is_said_of_it(two):
     assert record.grid(axes, quick=True) not in grids
 
 
+def test_a_grid_is_of_the_scenario_as_it_is(tmp_path):
+    def grid(sigma):
+        (tmp_path / "own.toml").write_text(ROOT_OF_RIGID.replace("samples = 10", f"samples = {sigma}"))
+        (tmp_path / "two.toml").write_text(STUDY.replace('"rigid"', '"own.toml"'))
+        return record.grid(study.load(str(tmp_path / "two.toml")), quick=True)
+
+    assert grid(10) == grid(10) != grid(11)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("check", "ratio"),
+        ("of", {"estimator": "mle"}),
+        ("to", {"estimator": "rkf"}),
+        ("quantity", "error"),
+        ("to_quantity", "error"),
+        ("level", 0.5),
+        ("between", [0.9, 1.1]),
+        ("since", 0.1),
+        ("until", 0.1),
+    ],
+)
+def test_a_claim_is_what_it_asks_and_not_how_it_says_so(two, key, value):
+    claim = next(judging.all_spelled_out(two))
+    said_otherwise, asked_otherwise = (claim.model_copy(update=change) for change in ({"says": "else"}, {key: value}))
+    assert record.asked(two, said_otherwise) == record.asked(two, claim)
+    assert record.asked(two, asked_otherwise) != record.asked(two, claim)
+
+
+def test_a_record_that_was_written_to_by_hand_is_refused(tmp_path):
+    record.write(tmp_path, judged(False, one="does not hold"))
+    file = tmp_path / record.FILE
+    assert record.read(file) == judged(False, one="does not hold")
+    file.write_text(file.read_text().replace("does not hold", "holds"))
+    with pytest.raises(ValueError, match="is not as the study left it: fly it again"):
+        record.read(file)
+
+
 def judged(quick, **decisions):
-    claims = [ClaimVerdict(says, Decision(said), f"as {said}") for says, said in decisions.items()]
+    claims = [
+        JudgedClaim(
+            says=f"{says}, said anew" if quick else says, asked=says, decision=Decision(said), found=f"as {said}"
+        )
+        for says, said in decisions.items()
+    ]
     return StudyRecord(title="t", source="s", flown="", quick=quick, runs=3, confidence=0.99, claims=claims, cases=[])
 
 
@@ -110,8 +160,9 @@ def test_full_verdicts_that_come_with_affinet_are_of_the_claims_of_their_studies
     full, shipped = record.full_study(name), study.load(name)
     assert not full.quick
     assert full.runs == shipped.full.runs
-    said = [claim.says for claim in full.claims]
-    assert said == [claim.says for one in shipped.claims for claim in judging.spelled_out(shipped, one)]
+    assert {claim.asked for claim in full.claims} == {
+        record.asked(shipped, claim) for claim in judging.all_spelled_out(shipped)
+    }
 
 
 def test_a_value_has_no_multiples_of_nothing(tmp_path):

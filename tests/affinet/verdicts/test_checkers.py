@@ -346,6 +346,11 @@ PLANTED = [
     (1000, 0.9, 0.0, 1.0, "at most", 8),
     (1000, 0.9, 0.5, 1.0, "at most", 8),
     (4000, 0.97, 0.5, 1.0, "at most", 8),
+    (20, 0.95, 1.0, 1.0, "at most", 8),
+    (60, 0.95, 1.0, 1.0, "at most", 8),
+    (200, 0.99, 0.0, 1.0, "at most", 8),
+    (200, 0.99, 1.0, 1.0, "at most", 8),
+    (1000, 0.99, 0.5, 1.0, "at most", 8),
     (1000, 0.9, 0.0, 1.05, "at least", 30),
     (1000, 0.9, 0.0, 1.1, "at least", 160),
     (1000, 0.9, 0.0, 0.9, "at least", 160),
@@ -358,16 +363,15 @@ PLANTED = [
 def test_consistent_passes_filters_that_tell_the_truth_and_fails_the_others(
     ticks, memory, shared, wrong, bound, number, monkeypatch
 ):
-    """Before: 15 of 15 truthful runs failed."""
     found = judged(monkeypatch, planted(200, ticks, memory, shared, wrong))
     assert found["fail"] <= number if bound == "at most" else found["fail"] >= number
-    if wrong == 1.0:
-        assert found["pass"] >= 180
+    if wrong == 1.0:  # enough ticks tell, too few do not
+        assert found["pass"] >= 180 or found["vacuous"] >= 180 or ticks * (1 - memory) < 20
 
 
 def test_a_run_too_short_to_tell_is_vacuous_and_one_that_diverges_is_not(monkeypatch):
     short = judged(monkeypatch, planted(200, 100, 0.97, 0.5, 1.0))
-    assert short["vacuous"] > 60  # some of the others are wrong: a batch is no longer than what correlates the ticks
+    assert short["vacuous"] >= 190
     growing = planted(50, 1000, 0.9, 0.0, 1.0) * np.exp(np.linspace(-5.0, 5.0, 1000))
     assert judged(monkeypatch, growing)["fail"] == 50
     monkeypatch.undo()
