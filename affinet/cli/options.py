@@ -133,7 +133,7 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         description="Exit status 0 whatever the verdicts on the claims: that a claim does not hold is a finding.",
     )
     study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
-    study.add_argument("--quick", action="store_true", help="a coarse version, in a minute")
+    study.add_argument("--quick", action="store_true", help="a coarse version, of fewer runs")
     study.add_argument("--out", type=_path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
 
 
