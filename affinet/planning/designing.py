@@ -80,7 +80,16 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
 
 
 def nodes(kind: str, agents: int | None, dimension: int | None, seed: int) -> Array:
-    """Nominal positions, shape (N, D), in metres: of a kind, or what a file has, a line for each.
+    """Nominal positions, shape (N, D), in metres.
+
+    Parameters
+    ----------
+    kind
+        One of `KINDS`, or the path of a file with a node in each line.
+    agents, dimension
+        How many of a kind, and in how many dimensions, 2 where nothing is said; a file has its own.
+    seed
+        Of random nodes.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from world.formation.nominal import Formation, NotRigid
 _MOST_NAMED = 6  # agents
 _SINGULAR = 1e-9  # of the largest eigenvalue: what no leaders hold
 _DIGITS = 3
-_ROUNDS = 3  # of evening out: more bring nothing (docs/decisions/0025)
+ROUNDS = 3  # of evening out: more bring little (docs/decisions/0025)
 
 
 def compose(formation: Formation) -> Array:
@@ -36,7 +36,7 @@ def compose(formation: Formation) -> Array:
         When an agent is in no clique that carries a stress, or the cliques do not hold together: the sum has a nullity above
         D + 1.
     """
-    L = _sum(formation)
+    L = summed(formation)
     if alone := (np.flatnonzero(L.diagonal() == 0.0) + 1).tolist():
         least = formation.dimension + 2
         more = f", and {len(alone) - _MOST_NAMED} more," if len(alone) > _MOST_NAMED else ""
@@ -52,13 +52,22 @@ def compose(formation: Formation) -> Array:
     return weights
 
 
-def _sum(formation: Formation) -> sparse.csr_array:
+def summed(formation: Formation, rounds: int = ROUNDS) -> sparse.csr_array:
+    """The sum of the stresses of the cliques, shape (N, N), at its own scale.
+
+    Parameters
+    ----------
+    formation
+        Its nodes and edges.
+    rounds
+        How often the shares of the cliques are evened out.
+    """
     alike = [_carried(formation.nominal, np.stack(list(same))) for _, same in groupby(_sizable(formation), key=len)]
     groups = [(pieces, stress) for pieces, stress in alike if len(pieces)]
     size = (formation.agents, formation.agents)
     if not groups:
         return sparse.csr_array(size)
-    shares = _evened(formation.agents, groups)
+    shares = _evened(formation.agents, groups, rounds)
     rows = [np.repeat(pieces, pieces.shape[1], axis=1).ravel() for pieces, _ in groups]
     columns = [np.tile(pieces, (1, pieces.shape[1])).ravel() for pieces, _ in groups]
     values = [(share[:, None, None] * stress).ravel() for share, (_, stress) in zip(shares, groups, strict=True)]
@@ -79,12 +88,12 @@ def _carried(nominal: Array, pieces: Integers) -> tuple[Integers, Array]:
     return pieces[spans], stress[spans]
 
 
-def _evened(agents: int, groups: list[tuple[Integers, Array]]) -> list[Array]:
+def _evened(agents: int, groups: list[tuple[Integers, Array]], rounds: int) -> list[Array]:
     """A share (K,) of each piece, less where many overlap: else those would set the largest eigenvalue, and the rim be slow."""
     rows = np.concatenate([pieces.ravel() for pieces, _ in groups])
     own = [np.einsum("kii->ki", stress) for _, stress in groups]
     shares = [np.ones(len(pieces)) for pieces, _ in groups]
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         parts = [(share[:, None] * weight).ravel() for share, weight in zip(shares, own, strict=True)]
         degree = np.bincount(rows, weights=np.concatenate(parts), minlength=agents)
         shares = [

@@ -14,6 +14,7 @@ from netem.core.draws import Purpose, uniform
 # Of nodes strewn one to a unit of volume: far below where no more fit (Feder 1980: .55 of the plane, .38 of space).
 _CLOSEST = 0.7
 _DIGITS = 3
+_AHEAD = 256  # draws at a time
 
 
 def grid(agents: int, dimension: int) -> Array:
@@ -34,11 +35,14 @@ def strewn(agents: int, dimension: int, seed: int) -> Array:
     seed
         What the draws are a function of.
     """
-    side, nodes, tried = float(power(agents, 1.0 / dimension)), np.empty((0, dimension)), 0
-    while len(nodes) < agents:
-        draws = uniform(seed, Purpose.LAYOUT, tick=tried, lanes=dimension)
-        node, tried = np.round(side * (draws - 0.5), _DIGITS), tried + 1
-        apart = nodes - node
-        if ((apart * apart).sum(axis=-1) >= _CLOSEST * _CLOSEST).all():
-            nodes = np.vstack([nodes, node])
-    return nodes
+    side = float(power(agents, 1.0 / dimension))
+    nodes, tried = np.empty((0, dimension)), 0
+    while True:
+        draws = uniform(seed, Purpose.LAYOUT, tick=np.arange(tried, tried + _AHEAD), lanes=dimension)
+        for node in np.round(side * (draws - 0.5), _DIGITS):
+            apart = nodes - node
+            if ((apart * apart).sum(axis=-1) >= _CLOSEST * _CLOSEST).all():
+                nodes = np.vstack([nodes, node])
+                if len(nodes) == agents:
+                    return nodes
+        tried += _AHEAD
