@@ -146,7 +146,7 @@ def designed(made: Designed, file: Path) -> None:
     formation = made.formation
     has = f"{formation.agents} agents, {len(formation.edges)} edges, {len(formation.leaders)} leaders"
     print(f"{has}: what is slowest settles to 1/e in {made.settles:.1f} s")  # noqa: T201
-    print(f"{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
+    print(f"{file}: affinet run {directories.on_a_command_line(file)} --runtime inprocess")  # noqa: T201
 
 
 def outcome(outcome: Outcome, plan: Plan) -> None:

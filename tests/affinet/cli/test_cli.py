@@ -122,7 +122,7 @@ def test_a_design_is_written_once_and_checked_by_its_name(tmp_path):
     assert done.returncode == 0, done.stderr
     says, how = done.stdout.splitlines()
     assert re.fullmatch(r"45 agents, \d+ edges, \d+ leaders: what is slowest settles to 1/e in \d+\.\d s", says)
-    assert how == "designed-grid.toml: affinet run designed-grid.toml"
+    assert how == "designed-grid.toml: affinet run designed-grid.toml --runtime inprocess"
     checked = affinet("check", "designed-grid.toml", cwd=tmp_path)
     assert checked.returncode == 0, checked.stdout
     assert "can fly" in checked.stdout
