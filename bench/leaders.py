@@ -101,7 +101,7 @@ WAYS: dict[str, Callable[[sparse.csr_array, Array, int], Chosen]] = {
 def stress_of(formation: Formation, rounds: int) -> sparse.csr_array:
     """The sum of the stresses of the cliques after so many rounds of evening out, with a largest eigenvalue of 1."""
     L = composed.summed(formation, rounds)
-    return L / spectrum.largest(L)
+    return sparse.csr_array(L / spectrum.largest(L))
 
 
 def _row(name: str) -> str:
