@@ -21,7 +21,7 @@ from world.formation.nominal import Formation, NotRigid
 KINDS = ("grid", "random")
 _GAIN = Static().alpha
 _TICK = 0.05  # s: half of what the fastest mode takes, at this gain
-_SETTLED = 4.0  # so many times what it takes to 1/e
+_SETTLED, _LONGEST = 4.0, 3600.0  # a run lasts so many times what it takes to 1/e, an hour at the most
 
 
 class Designed(NamedTuple):
@@ -59,7 +59,7 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
     except ValueError as error:
         raise ScenarioError(f"--settle {settle:g}: {error}; give more time") from error
     assert formation.weights is not None
-    duration = ceil(_SETTLED * settle / _TICK) * _TICK
+    duration = ceil(min(_SETTLED * settle, _LONGEST) / _TICK) * _TICK
     said = {
         "description": f"{len(nominal)} agents within {reach:g} m of each other, designed to settle to 1/e in {settle:g} s",
         "formation": {

@@ -50,6 +50,12 @@ def test_a_design_read_from_its_file_flies_as_predicted(tmp_path):
     assert (off_diagonal == off_diagonal.T).all()
 
 
+def test_a_design_that_may_take_for_ever_needs_no_more_than_corners_and_flies_for_an_hour():
+    made = designing.designed(layouts.grid(60, 2), 3.0, 1e9)
+    assert len(made.formation.leaders) == 3
+    assert made.scenario.time.duration == 3600.0
+
+
 def test_a_range_too_short_is_refused_with_the_way_out():
     with pytest.raises(
         ScenarioError, match=r"--range 1: agents .* in no clique of 4 or more that spans; give a longer range"

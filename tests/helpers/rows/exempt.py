@@ -63,7 +63,7 @@ EXEMPT = {
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
-        world.formation.composed.compose world.formation.composed.summed world.formation.design.design
+        world.formation.composed.compose world.formation.design.design
         world.formation.layouts.grid
         world.formation.layouts.strewn world.formation.leading.corners world.formation.leading.leaders
         world.formation.spectrum.slowest analysis.models.cuts.smallest_cut
