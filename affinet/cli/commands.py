@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from affinet.cli import options, show, terminal
+from affinet.planning import designing
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
@@ -237,6 +238,16 @@ def _study(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _design(parsed: argparse.Namespace) -> int:
+    nominal = designing.nodes(parsed.nodes, parsed.agents, parsed.dimension, parsed.seed)
+    made = designing.designed(nominal, parsed.range, parsed.settle)
+    file = directories.for_design(parsed.out or Path(parsed.nodes).stem)
+    with directories.unless_empty(file), about(file):
+        file.write_text(loading.to_toml(made.scenario), encoding="utf-8")
+    show.designed(made, file)
+    return PASS
+
+
 def _fit(parsed: argparse.Namespace) -> int:
     model = fit.inputs(parsed.directory, parsed.order)
     print(json.dumps(asdict(model)) if parsed.json else "\n".join(fit.overrides(model)))  # noqa: T201
@@ -333,6 +344,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,
+    "design": _design,
     "fit": _fit,
     "inject": _inject,
 }

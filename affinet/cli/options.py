@@ -6,7 +6,9 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
+from affinet.planning.designing import KINDS
 from affinet.scenario import files, loading
+from affinet.scenario.units import LARGEST, SMALLEST
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
     _add_hunt(commands)
     _add_study(commands)
+    _add_design(commands)
     _add_fit(commands)
     _add_inject(commands)
     return whole
@@ -85,6 +88,22 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
     return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**64:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a whole number below 2^64")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not SMALLEST <= value <= LARGEST:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number from {SMALLEST:g} to {LARGEST:g}")
+    return value
 
 
 def _path(text: str) -> Path:
@@ -135,6 +154,32 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
     study.add_argument("--quick", action="store_true", help="a coarse version, of fewer runs")
     study.add_argument("--out", type=_path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
+
+
+def _add_design(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    design = commands.add_parser(
+        "design",
+        help="a large formation: edges, leaders and stress for nodes and a range, as a scenario",
+        description="Compose the stress of a formation of its cliques, choose leaders until what is slowest settles in time, "
+        "and write a scenario.",
+    )
+    design.add_argument(
+        "nodes", help=f"a file with the coordinates of a node in each line, in metres, or {', '.join(KINDS)}"
+    )
+    design.add_argument("--range", type=_positive, required=True, metavar="M", help="of sensing and communication")
+    design.add_argument("--agents", type=_count, metavar="N", help="how many, a metre from each other or so")
+    design.add_argument("--dimension", type=int, choices=[2, 3], help="default: 2")
+    design.add_argument(
+        "--settle",
+        type=_positive,
+        default=15.0,
+        metavar="S",
+        help="to 1/e, under the static law (default: %(default)g)",
+    )
+    design.add_argument("--seed", type=_seed, default=1, metavar="N", help="of random nodes (default: %(default)s)")
+    design.add_argument(
+        "--out", type=_scenario_file, metavar="FILE", help="the scenario (default: designed-NODES.toml)"
+    )
 
 
 def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -14,11 +14,13 @@ from rich.text import Text
 
 from affinet.cli.progress import Bar
 from affinet.planning.plan import Plan
+from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
 from analysis.models.finding import Finding
 from netem.faults.control import Answer
 
 if TYPE_CHECKING:
+    from affinet.planning.designing import Designed
     from affinet.studies.record import StudyRecord
     from affinet.studies.study import Result
     from affinet.testing.hunt import Counterexample, Coverage
@@ -137,6 +139,14 @@ def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
             table.add_row(_plain(name), str(number))
         table.add_section()
     console.print(table)
+
+
+def designed(made: Designed, file: Path) -> None:
+    """What a formation has become, and how to fly it."""
+    formation = made.formation
+    has = f"{formation.agents} agents, {len(formation.edges)} edges, {len(formation.leaders)} leaders"
+    print(f"{has}: what is slowest settles to 1/e in {made.settles:.1f} s")  # noqa: T201
+    print(f"{file}: affinet run {directories.on_a_command_line(file)} --runtime inprocess")  # noqa: T201
 
 
 def outcome(outcome: Outcome, plan: Plan) -> None:

@@ -19,8 +19,8 @@ from analysis.models.arrays import Array
 from analysis.models.pursuit import Target
 from netem.core.links import Links
 from netem.loading.given import protect
-from world.formation import manoeuvre
-from world.formation.nominal import PRESETS, Formation
+from world.formation import manoeuvre, swarms
+from world.formation.nominal import Formation
 from world.physics.bodies import BodyModel
 from world.physics.detectors import Detectors
 from world.physics.disturbance import Disturbance, Kernel
@@ -46,11 +46,11 @@ def formation_of(given: Scenario) -> Formation:
     Raises
     ------
     ScenarioError
-        When an edge or a leader is nobody.
+        When an edge or a leader is nobody, or weights are of other edges.
     """
     section = given.formation
     if section.preset:
-        preset = PRESETS[section.preset]
+        preset = swarms.preset(section.preset)
         nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
     else:
         nodes = np.array(section.nodes, dtype=np.float64)
@@ -60,7 +60,16 @@ def formation_of(given: Scenario) -> Formation:
     for key, numbers in (("leaders", leaders), ("edges", [agent for edge in edges for agent in edge])):
         if strangers := sorted({agent for agent in numbers if not 1 <= agent <= len(nodes)}):
             raise ScenarioError(f"formation.{key}: no agents {strangers}; agents are 1 to {len(nodes)}")
-    return Formation(section.scale * nodes, edges, leaders)
+    return Formation(section.scale * nodes, edges, leaders, _weights(given, len(edges)))
+
+
+def _weights(given: Scenario, edges: int) -> Array | None:
+    section = given.formation
+    if section.weights is None:
+        return None
+    both_ways = any(isinstance(weight, list) for weight in section.weights)
+    weights = sections.array("formation.weights", section.weights, (edges, 2) if both_ways else (edges,))
+    return weights if both_ways else np.column_stack([weights, weights])
 
 
 def world_of(given: Scenario, formation: Formation) -> World:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import combinations
 from typing import Any, Literal
@@ -11,7 +12,7 @@ import numpy as np
 from agents.algebra import stability
 from agents.loading import capabilities
 from agents.swarm import SwarmBrief
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Integers
 from analysis.models.finding import Finding
 from analysis.models.graph import reached
 from netem.faults.fault import Fault
@@ -21,6 +22,8 @@ from world.formation.nominal import Formation
 
 _NARROW = 0.7  # a quarter turn by the entries of theta gets no narrower
 _ROUNDING = 1e-6
+_BALANCED = 1e-6  # of what a follower's weights pull with
+_POSITIVE = 1e-9  # of the largest
 
 
 def graph(formation: Formation) -> list[Finding]:
@@ -96,6 +99,40 @@ def rigid(formation: Formation, L: Array) -> list[Finding]:
     ]
 
 
+def own_weights(formation: Formation, L: Array) -> list[Finding]:
+    """Whether weights of a user's own, in the stress matrix L, shape (N, N), hold the followers in their places.
+
+    Those of a follower balance where it stands, and sum to something positive, by which laws divide; the eigenvalues of the
+    followers' block have positive real parts. Rows of L sum to zero by how it is made; those of leaders are nothing to a law.
+    """
+    followers = np.flatnonzero(~formation.is_leader)
+    rows = L[followers]
+    off = np.abs(rows @ formation.nominal).max(axis=1)
+    apart = np.abs(formation.nominal[followers][:, None] - formation.nominal).max(axis=-1)
+    unbalanced = off > _BALANCED * (np.abs(rows) * apart).sum(axis=1)
+    if unbalanced.any():
+        agents, by = followers[unbalanced] + 1, off[unbalanced][0]
+        says = f"the weights of agent {agents[0]} do not balance: sum l_ij p_ij is {by:.3g} m off"
+        return [Finding("weights", "error", f"{says}{_others(agents)}; give more digits, or other weights")]
+    idle = followers[np.diag(L)[followers] <= 0.0] + 1
+    if len(idle):
+        says = f"the weights of agent {idle[0]} do not sum to more than 0, and laws divide by their sum"
+        return [Finding("weights", "error", f"{says}{_others(idle)}; give all of its weights the other sign")]
+    real = np.sort(np.linalg.eigvals(rows[:, followers]).real)
+    if real[0] <= _POSITIVE * real[-1]:
+        says = f"follower block has an eigenvalue with a real part of {real[0]:.4g}, not above 0: it does not settle"
+        return [Finding("weights", "error", f"{says}; give other weights, or other leaders")]
+    kind = "alike both ways" if (L == L.T).all() else "not alike both ways"
+    return [
+        Finding("weights", "ok", f"of its own, {kind}: followers balance where they stand"),
+        Finding("followers", "ok", f"follower block eigenvalues {real[0]:.4f} to {real[-1]:.4f}"),
+    ]
+
+
+def _others(agents: Integers) -> str:
+    return f", and {len(agents) - 1} more" if len(agents) > 1 else ""
+
+
 def step(law: Any, swarm: SwarmBrief) -> Finding:
     """Whether the gains of a law, and the step, hold the formation, as far as it says what they make of it."""
     matrix, dt = capabilities.step_matrix(law, swarm), swarm.dt
@@ -110,7 +147,7 @@ def step(law: Any, swarm: SwarmBrief) -> Finding:
         gains = f", gain {gain:g}" if gain else ""
         settles = stability.settling_time(radius, dt)
         return Finding("step", "ok", f"radius {radius:.6f} < 1 at dt {dt:g} s{gains}: {settles}")
-    fast = np.linalg.eigvalsh(swarm.follower_stress)[-1]
+    fast = stability.radius(swarm.follower_stress)
     return Finding(
         "step",
         "error",
@@ -146,8 +183,8 @@ def _connected(formation: Formation) -> Finding:
 
 def _edges(formation: Formation) -> Finding:
     loops = [f"{i}-{j}" for i, j in formation.edges if i == j]
-    pairs = [tuple(sorted(edge)) for edge in formation.edges]
-    doubled = sorted({f"{i}-{j}" for i, j in pairs if pairs.count((i, j)) > 1})
+    times = Counter(tuple(sorted(edge)) for edge in formation.edges)
+    doubled = sorted(f"{i}-{j}" for (i, j), often in times.items() if often > 1)
     if loops or doubled:
         return Finding("edges", "error", f"every edge joins two agents, once; look at {', '.join(loops + doubled)}")
     return Finding("edges", "ok", "every edge joins two agents, once")

@@ -40,7 +40,7 @@ from netem.core.links import Links
 from netem.faults.fault import Fault, Verb
 from netem.medium.medium import JOURNAL
 from world.formation import stress
-from world.formation.nominal import Formation
+from world.formation.nominal import Formation, NotRigid
 
 
 def make(given: Scenario, *, injected: Sequence[Fault] = (), journal: Path | None = None) -> Plan:
@@ -188,9 +188,12 @@ def _framework(given: Scenario, formation: Formation, law: Law[Any]) -> tuple[li
     _refuse_fatal(findings)
     if not law.by_stress:
         return findings, np.zeros((formation.agents, formation.agents))
+    if formation.weights is not None:
+        L = stress.own(formation, formation.weights)
+        return [*findings, *checks.own_weights(formation, L)], L
     try:
         L = stress.laplacian(formation, stress.solve(formation))
-    except stress.NotRigid as error:
+    except NotRigid as error:
         raise PlanError([checks.not_rigid(str(error))]) from error
     return [*findings, *checks.rigid(formation, L)], L
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import completion
+from agents.algebra import completion, stability
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
@@ -106,7 +106,7 @@ def _finding(swarm: SwarmBrief, links: Links, phase: Phase, again: int, whole: G
         return Finding(check, "note", f"{when}: no follower takes part")
     matrix, fits = completed_stress(swarm, links, graph)
     spectrum = np.linalg.eigvals(matrix)
-    zero = _ZERO * np.linalg.eigvalsh(swarm.follower_stress)[-1]
+    zero = _ZERO * stability.radius(swarm.follower_stress)
     real = np.sort(np.where(np.abs(spectrum) <= zero, 0.0, spectrum.real))
     words = [f"{when}: completed stress of the followers has eigenvalues {', '.join(f'{each:.4f}' for each in real)}"]
     if unfit := (np.flatnonzero(graph.steered & ~fits) + 1).tolist():

@@ -46,14 +46,18 @@ def for_hunt(file: Path | str) -> Path:
     OSError
         When it is there already, or cannot be made.
     """
-    if isinstance(file, str):
-        return _claimed(Path(), f"hunted-{_shortened(file)}", ".toml", partial(Path.touch, exist_ok=False))
-    with system_errors.about(file):
-        try:
-            file.touch(exist_ok=False)
-        except FileExistsError as error:
-            raise FileExistsError(f"{str(file)!r} is there already; name another file with --out") from error
-    return file
+    return _file(file, "hunted")
+
+
+def for_design(file: Path | str) -> Path:
+    """A new, empty file for a scenario that is designed: this one, or by default designed-NAME.toml, numbered likewise.
+
+    Raises
+    ------
+    OSError
+        When it is there already, or cannot be made.
+    """
+    return _file(file, "designed")
 
 
 @contextmanager
@@ -75,6 +79,17 @@ def _remove_if_empty(path: Path) -> None:
             path.rmdir()
     elif path.exists() and not path.stat().st_size:
         path.unlink()
+
+
+def _file(file: Path | str, how: str) -> Path:
+    if isinstance(file, str):
+        return _claimed(Path(), f"{how}-{_shortened(file)}", ".toml", partial(Path.touch, exist_ok=False))
+    with system_errors.about(file):
+        try:
+            file.touch(exist_ok=False)
+        except FileExistsError as error:
+            raise FileExistsError(f"{str(file)!r} is there already; name another file with --out") from error
+    return file
 
 
 def _claimed(folder: Path, stem: str, ending: str, make: Callable[[Path], None]) -> Path:

@@ -19,6 +19,7 @@ EXAMPLES: Mapping[str, Any] = {
     "formation.nodes": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
     "formation.edges": ["1-2", "2-3"],
     "formation.leaders": [1, 2, 3],
+    "formation.weights": [1.0, 1.0, -1.0, 1.0, -1.0, 1.0],
     "manoeuvre": {"preset": "hover"},
     "manoeuvre.keyframes.offset": [0.0, 0.0],
     "target.path": [{"time": 0.0, "position": [0.0, 0.0]}, {"time": 10.0, "position": [5.0, 0.0]}],

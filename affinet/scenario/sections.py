@@ -31,7 +31,7 @@ from affinet.scenario.units import (
 from affinet.scenario.verbs import AnyEvent
 from affinet.scenario.words import among
 from analysis.models.sensor import Sensor
-from world.formation.nominal import PRESETS
+from world.formation import swarms
 from world.physics.bodies import BodyModel
 
 Matrix = list[list[Finite]]
@@ -61,12 +61,17 @@ Edge = Annotated[str, AfterValidator(_edge)]
 
 
 class FormationSection(Section):
-    """Who flies: a preset, or nodes, edges and leaders. Positions in metres, agents numbered from 1."""
+    """Who flies: a preset, or nodes, edges and leaders. Positions in metres, agents numbered from 1.
+
+    `weights` of one's own take the place of the stress that is solved for: of each edge i-j one number, or what i gives j and
+    what j gives i.
+    """
 
     preset: str | None = None
     nodes: Matrix | None = None
     edges: list[Edge] | None = None
     leaders: list[int] | None = None
+    weights: list[Finite] | Matrix | None = None
     scale: Positive = 1.0
     start: Literal["targets", "origin"] = "targets"
     spread: NotNegative = 1.0
@@ -74,8 +79,8 @@ class FormationSection(Section):
     @model_validator(mode="after")
     def _whole(self) -> FormationSection:
         if self.preset is not None:
-            if self.preset not in PRESETS:
-                raise ValueError(f"no preset {self.preset!r}; {among(self.preset, PRESETS)}")
+            if self.preset not in swarms.NAMES:
+                raise ValueError(f"no preset {self.preset!r}; {among(self.preset, swarms.NAMES)}")
             if self.nodes is not None or self.edges is not None:
                 raise ValueError("give a preset, or nodes and edges, not both")
         elif self.nodes is None or self.edges is None or self.leaders is None:

@@ -104,3 +104,9 @@ def stress_force(brief: Brief, estimate: Estimate) -> Array:
 def weighted(stress: Array, of_neighbours: Array) -> Array:
     """Sum over the neighbours of their weights (..., n) by what is known of each (..., n, D), shape (..., D)."""
     return sum_over(stress[..., None] * of_neighbours, -2)
+
+
+def by_degree(summed: Array, degree: Array) -> Array:
+    """What is summed over the neighbours (..., D) by gamma_i = sum_j l_ij (...); nothing for leaders that weigh nobody."""
+    idle = (degree == 0.0)[..., None]
+    return np.where(idle, 0.0, summed / np.where(idle, 1.0, degree[..., None]))

@@ -16,7 +16,7 @@ from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
 from agents.laws import heard_late
-from agents.laws.base import Law, stress_force, weighted
+from agents.laws.base import Law, by_degree, stress_force, weighted
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
@@ -127,7 +127,7 @@ class DoubleVaryingVelocity(_Damped):
         """Accelerate as the neighbours do, and fall toward the formation, damped."""
         said = _hear(state, inputs)
         accelerations = weighted(brief.stress, said.acceleration)
-        law = (accelerations - self._pull(brief, own, estimate, said)) / brief.degree[..., None]
+        law = by_degree(accelerations - self._pull(brief, own, estimate, said), brief.degree)
         return said, (1.0 - self.relaxation) * own.input + self.relaxation * law
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:

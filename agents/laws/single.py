@@ -16,7 +16,7 @@ from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
 from agents.laws import heard_late
-from agents.laws.base import Law, Nothing, stress_force, weighted
+from agents.laws.base import Law, Nothing, by_degree, stress_force, weighted
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
 from analysis.models.arrays import Array
@@ -180,7 +180,7 @@ class VaryingVelocity(Law[LastHeard]):
         """Move as the neighbours do, and fall toward the formation."""
         heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
         theirs = self._neighbours_velocity(brief, tick, own, estimate, heard)
-        law = (weighted(brief.stress, theirs) - self.alpha * stress_force(brief, estimate)) / brief.degree[..., None]
+        law = by_degree(weighted(brief.stress, theirs) - self.alpha * stress_force(brief, estimate), brief.degree)
         return LastHeard(heard), (1.0 - self.relaxation) * own.input + self.relaxation * law
 
     def _neighbours_velocity(self, brief: Brief, tick: Reading, own: Own, estimate: Estimate, heard: Array) -> Array:

@@ -58,6 +58,7 @@ class Purpose(IntEnum):
     MISS = 25
     FALSE_POSITIVE = 26
     CLUTTER = 27
+    LAYOUT = 28
 
 
 def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:

@@ -33,6 +33,7 @@ _DELAYS: dict[str, dict[str, Any]] = {
     "table": {"table": [0.05, 0.1]},
 }
 _RULED = ["1-2", "1-3", "1-4", "1-5", "2-4", "2-7", "3-5", "3-6", "4-5", "4-6", "5-7", "6-7"]
+_WEIGHTS = [4.0, 4.0, -2.0, -2.0, 8.0, -2.0, 8.0, -2.0, 1.0, 4.0, 4.0, 2.0]  # the stress of zhao7
 _PROFILES: dict[str, dict[str, Any]] = {
     **{f"loss-{model}": {"loss": [{"model": model, **keys}]} for model, keys in _LOSSES.items()},
     **{f"delay-{model}": {"delay": {"model": model, **keys}} for model, keys in _DELAYS.items()},
@@ -115,6 +116,8 @@ BASES: dict[str, dict[str, Any]] = {
         "sensing": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
         "dynamics": {"covariance": [[0.01, 0.001], [0.001, 0.01]]},
     },
+    "weights": {**_FLOWN, "formation": {**_FLOWN["formation"], "weights": _WEIGHTS}},
+    "directed": {**_FLOWN, "formation": {**_FLOWN["formation"], "weights": [[weight, weight] for weight in _WEIGHTS]}},
     "unicycles": {
         **_FLOWN,
         "dynamics": {"model": "unicycle", "ahead": 0.3},

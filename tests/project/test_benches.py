@@ -15,6 +15,7 @@ SMALLEST = {
         "| zhao7, constant velocity, ral | ral | 0: -0.591, 12: -2.17, 28: 0, 44: 0 |\n"
         "| zhao7, constant velocity, conral | conral | 0: -0.591, 12: -2.16, 28: -0.707, 44: -0.999 |\n",
     ),
+    "leaders": (("--swarms", "swarm50"), "| swarm50 | 8 | 7.0 | "),
     "lockstep": (("--ticks", "5", "--rounds", "1", "--swarms", "corridor"), "| corridor, 7 agents | "),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }

@@ -11,6 +11,10 @@ from analysis.models.arrays import Array, Mask
 Edges = tuple[tuple[int, int], ...]
 
 
+class NotRigid(ValueError):
+    """No stress stabilises the framework."""
+
+
 @dataclass(frozen=True)
 class Formation:
     """A nominal framework (paper 000, section II).
@@ -23,11 +27,14 @@ class Formation:
         Undirected edges between agents, numbered from 1.
     leaders
         Agents that follow the manoeuvre.
+    weights
+        Of its own: what i gives j and what j gives i over each edge i-j, shape (M, 2). None where they are solved for.
     """
 
     nominal: Array
     edges: Edges
     leaders: tuple[int, ...]
+    weights: Array | None = None
 
     @property
     def agents(self) -> int:

@@ -13,15 +13,15 @@ import numpy as np
 from scipy.linalg import null_space
 
 from analysis.models.arrays import Array, Mask
-from world.formation.nominal import Edges, Formation
+from world.formation import composed
+from world.formation.nominal import Edges, Formation, NotRigid
 
 # The smallest nonzero eigenvalue of a stress of unit norm below which the solver cannot tell it from zero.
 _RIGID = 1e-6
+# Agents up to which the program alone is asked, which takes seconds then; and up to which it is where cliques do not hold
+# together, which takes a minute. It grows with N^4 (docs/decisions/0025).
+_PROGRAM_FIRST, _PROGRAM_AT_ALL = 40, 100
 _ONE_AT_A_TIME = threading.Lock()  # filters of warnings are global: of two that overlap, one would never be undone
-
-
-class NotRigid(ValueError):
-    """No stress stabilises the framework."""
 
 
 def incidence(agents: int, edges: Edges) -> Array:
@@ -38,6 +38,23 @@ def laplacian(formation: Formation, weights: Array) -> Array:
     return (B * weights) @ B.T
 
 
+def own(formation: Formation, weights: Array) -> Array:
+    """Stress matrix of weights that need not be alike both ways, shape (N, N): row i has what i gives its neighbours.
+
+    Parameters
+    ----------
+    formation
+        Whose.
+    weights
+        What i gives j and what j gives i over each edge i-j, shape (M, 2).
+    """
+    i, j = np.array(formation.edges, dtype=np.int64).reshape(-1, 2).T - 1
+    L = np.zeros((formation.agents, formation.agents))
+    L[i, j], L[j, i] = -weights.T
+    L[np.diag_indices(formation.agents)] = -L.sum(axis=1)
+    return L
+
+
 def equilibrium(formation: Formation) -> Array:
     """Basis of the weights that balance every agent, shape (M, K): all w with B diag(w) B^T P = 0."""
     B = incidence(formation.agents, formation.edges)
@@ -46,16 +63,18 @@ def equilibrium(formation: Formation) -> Array:
 
 
 def solve(formation: Formation) -> Array:
-    """Edge weights w, shape (M,), of the best-conditioned stabilising stress (paper 004, eq. 3.5).
+    """Edge weights w, shape (M,), of the best-conditioned stabilising stress (paper 004, eq. 3.5); of large formations, of one.
 
     The semidefinite program maximises the smallest eigenvalue that an affine formation does not make zero. The paper bounds
     it by an arbitrary constant; here ||w|| <= 1 does, which also fixes the scale, so the answer is unique. The balance
-    L P = 0 is not left to the solver: w is sought among the weights that keep it exactly.
+    L P = 0 is not left to the solver: w is sought among the weights that keep it exactly. More than 40 agents get the sum of
+    the stresses of their cliques (`composed`) instead, of largest eigenvalue 1, where that stabilises.
 
     Raises
     ------
     NotRigid
-        When no stress is positive semidefinite of rank N - D - 1: the framework is not universally rigid (theorem 3.2).
+        When no stress is positive semidefinite of rank N - D - 1: the framework is not universally rigid (theorem 3.2). Or
+        when its cliques do not hold together, and it is too large for the program.
     """
     weights, why = _solved(formation.nominal.tobytes(), formation.nominal.shape, formation.edges)
     if weights is None:
@@ -75,6 +94,16 @@ def _without_warnings() -> Iterator[None]:
 def _solved(nominal: bytes, shape: tuple[int, int], edges: Edges) -> tuple[Array | None, str]:
     """The weights, or why there are none; a framework is solved once, however often it is planned."""
     formation = Formation(np.frombuffer(nominal).reshape(shape), edges, ())
+    if formation.agents > _PROGRAM_FIRST:
+        try:
+            return composed.compose(formation), ""
+        except NotRigid as error:
+            if formation.agents > _PROGRAM_AT_ALL:
+                return None, str(error)
+    return _programmed(formation)
+
+
+def _programmed(formation: Formation) -> tuple[Array | None, str]:
     basis = equilibrium(formation)
     affine = np.column_stack([formation.nominal, np.ones(formation.agents)])
     if np.linalg.matrix_rank(affine) <= formation.dimension:
@@ -118,7 +147,7 @@ def survives(formation: Formation, *, edge: tuple[int, int] | None = None, agent
     """Whether the framework still has a stabilising stress, and leaders that span, once an edge or an agent is lost."""
     edges = tuple(each for each in formation.edges if each != edge and agent not in each)
     if agent is None:
-        return _rigid(replace(formation, edges=edges))
+        return _rigid(replace(formation, edges=edges, weights=None))
     left = [other for other in range(1, formation.agents + 1) if other != agent]
     number = {other: place for place, other in enumerate(left, start=1)}
     leaders = tuple(number[leader] for leader in formation.leaders if leader != agent)
@@ -131,7 +160,7 @@ def survives(formation: Formation, *, edge: tuple[int, int] | None = None, agent
 
 def _carries_stress(formation: Formation, up: Mask) -> bool:
     edges = tuple(edge for edge, works in zip(formation.edges, up.tolist(), strict=True) if works)
-    return _rigid(replace(formation, edges=edges))
+    return _rigid(replace(formation, edges=edges, weights=None))
 
 
 def _rigid(formation: Formation) -> bool:

@@ -116,6 +116,40 @@ def test_check_prints_a_table():
     assert "0.873 < 1" in done.stdout
 
 
+def test_a_design_is_written_once_and_checked_by_its_name(tmp_path):
+    ask = ("design", "grid", "--agents", "45", "--range", "2.25", "--settle", "12")
+    done = affinet(*ask, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    says, how = done.stdout.splitlines()
+    assert re.fullmatch(r"45 agents, \d+ edges, \d+ leaders: what is slowest settles to 1/e in \d+\.\d s", says)
+    assert how == "designed-grid.toml: affinet run designed-grid.toml --runtime inprocess"
+    checked = affinet("check", "designed-grid.toml", cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout
+    assert "can fly" in checked.stdout
+    again = affinet(*ask, "--out", "designed-grid.toml", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "is there already; name another file with --out" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (
+            ("grid", "--agents", "45", "--range", "1"),
+            "--range 1: agents [1, 2, 3, 4, 5, 6], and 39 more, are in no clique",
+        ),
+        (("grid", "--agents", "45", "--range", "-1"), "'-1': give a number from 1e-09 to 1e+09"),
+        (("grid", "--range", "2"), "--agents: how many there are in the grid?"),
+        (("nowhere.csv", "--range", "2"), "nowhere.csv: no such file; give one with a node in each line"),
+    ],
+)
+def test_what_cannot_be_designed_is_said_and_leaves_no_file(words, says, tmp_path):
+    done = affinet("design", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert says in done.stderr.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_diverged_swarm_fails(out):
     absurd = (
         "--set",

@@ -14,7 +14,7 @@ from affinet.scenario.selectors import ChoiceKey
 from analysis.models import cuts
 from netem.core.links import Links
 from world.formation import stress
-from world.formation.nominal import PRESETS, Formation
+from world.formation.nominal import PRESETS, Formation, NotRigid
 
 ZHAO, HEXA = PRESETS["zhao7"], PRESETS["hexa10"]
 LOT = ChoiceKey(seed=1, entry=1)
@@ -327,7 +327,7 @@ def carries(formation, **changes):
     """Whether a formation has a stabilising stress."""
     try:
         stress.solve(replace(formation, **changes))
-    except stress.NotRigid:
+    except NotRigid:
         return False
     return True
 

@@ -121,6 +121,7 @@ CASES = {
         )
     },
     "agents.laws.base.weighted": of(base.weighted, real(NEIGHBOURS), real(NEIGHBOURS, 2)),
+    "agents.laws.base.by_degree": of(base.by_degree, real(2), real()),
     "agents.laws.base.stress_force": of(
         lambda stress, relative, known: base.stress_force(_brief(stress=stress), _estimate(relative, known)),
         *(real(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),

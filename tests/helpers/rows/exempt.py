@@ -61,7 +61,12 @@ EXEMPT = {
         netem.impairments.measured.delays netem.medium.journal.carried world.formation.manoeuvre.narrowest
         world.formation.manoeuvre.turned world.recording.stage.origin world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
-        world.formation.stress.solve world.formation.stress.stabilises analysis.models.cuts.smallest_cut
+        world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
+        world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
+        world.formation.composed.compose world.formation.design.design
+        world.formation.layouts.grid
+        world.formation.layouts.strewn world.formation.leading.corners world.formation.leading.leaders
+        world.formation.spectrum.slowest analysis.models.cuts.smallest_cut
         analysis.models.jacobi.step analysis.models.jacobi.rates analysis.claims.random_graphs.edges
         analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
         agents.algebra.stability.chain_step agents.algebra.stability.radius

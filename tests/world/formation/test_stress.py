@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from world.formation.nominal import PRESETS, Formation
-from world.formation.stress import NotRigid, equilibrium, incidence, laplacian, solve
+from world.formation.nominal import PRESETS, Formation, NotRigid
+from world.formation.stress import equilibrium, incidence, laplacian, solve
 
 ZHAO7, HEXA10, OCTA10 = PRESETS["zhao7"], PRESETS["hexa10"], PRESETS["octa10"]
 # 12:4 13:4 14:-2 15:-2 24:8 27:-2 35:8 36:-2 45:1 46:4 57:4 67:2
