@@ -5,12 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import subprocess
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Protocol
 
 import psutil
 
@@ -22,12 +21,43 @@ _LAST_LINES, _LAST_BYTES = 12, 1 << 16
 _LONGEST_REASON = 4000
 
 
+class Process(Protocol):
+    """What the launcher has of a process, be it a child of its own (`subprocess.Popen`) or one that the nursery forked."""
+
+    @property
+    def pid(self) -> int: ...  # noqa: D102 - as in `subprocess`
+
+    @property
+    def returncode(self) -> int | None: ...  # noqa: D102
+
+    @property
+    def stdin(self) -> IO[bytes] | None: ...  # noqa: D102
+
+    @property
+    def stdout(self) -> IO[bytes] | None: ...  # noqa: D102
+
+    def poll(self) -> int | None: ...  # noqa: D102
+
+    def wait(self, timeout: float | None = None) -> int: ...  # noqa: D102
+
+    def send_signal(self, number: int, /) -> None: ...  # noqa: D102
+
+    def terminate(self) -> None: ...  # noqa: D102
+
+    def kill(self) -> None: ...  # noqa: D102
+
+
 class RunFailed(RuntimeError):
     """The run ended before its last tick: why."""
 
 
 class UserCodeFailed(RunFailed):
     """It did because a user's own code did something wrong."""
+
+
+def named(role: str, number: int | None) -> str:
+    """What a process is called among those of a run."""
+    return role if number is None else called(number)
 
 
 @dataclass
@@ -52,8 +82,8 @@ class Child:
         Whether it said why it goes down.
     is_ready, is_done
         Whether it has told so.
-    rss_mb
-        The most memory it was seen to take, in megabytes.
+    pss_mb
+        The most memory it was seen to take, in megabytes; what several share is divided among them.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
     looks
@@ -62,7 +92,7 @@ class Child:
 
     role: str
     number: int | None
-    process: subprocess.Popen[bytes]
+    process: Process
     log: Path
     trusted: bool
     expected_to_die: bool = False
@@ -70,7 +100,7 @@ class Child:
     confessed: bool = False
     is_ready: bool = False
     is_done: bool = False
-    rss_mb: float = 0.0
+    pss_mb: float = 0.0
     doing: Beat | None = None
     beat_s: float = 0.0
     looks: StatusHistory | None = None
@@ -79,7 +109,7 @@ class Child:
     @property
     def name(self) -> str:
         """For people, and for those who wait for it."""
-        return self.role if self.number is None else called(self.number)
+        return named(self.role, self.number)
 
     @property
     def who(self) -> str:
@@ -118,9 +148,11 @@ class Child:
         self.process.send_signal(signal.SIGCONT)
 
     def measure(self) -> None:
-        """Note its resident memory."""
+        """Note its memory."""
+        if self.process.returncode is not None:
+            return
         with suppress(psutil.NoSuchProcess):
-            self.rss_mb = max(self.rss_mb, psutil.Process(self.process.pid).memory_info().rss / 2**20)
+            self.pss_mb = max(self.pss_mb, psutil.Process(self.process.pid).memory_full_info().pss / 2**20)
 
     def look(self) -> ProcessStatus:
         """What the system says of it.
@@ -179,7 +211,7 @@ class Child:
             "role": self.role,
             "id": self.number,
             "pid": self.process.pid,
-            "rss_mb": round(self.rss_mb, 1),
+            "pss_mb": round(self.pss_mb, 1),
             "exit": self.process.returncode,
         }
 

@@ -24,7 +24,7 @@ def killed(role, moment, *options):
         ("launcher", "2.2"),
         ("world", "0.5"),
         pytest.param("netem", "3", marks=pytest.mark.slow),
-        pytest.param("agents", "3.5", marks=pytest.mark.slow),
+        pytest.param("agent", "3.5", marks=pytest.mark.slow),
     ],
 )
 def test_a_kill_at_any_moment_leaves_nothing_but_what_can_be_read(role, moment):

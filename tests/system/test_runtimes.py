@@ -210,7 +210,8 @@ def test_a_run_leaves_its_scenario_arrays_recording_and_summary(out):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["digest"] == outcome.digest == history.digest(history.load(out / "arrays.npz"))
     roles = [(process["role"], process["id"]) for process in summary["processes"]]
-    assert roles == [("world", None), ("netem", None), *(("agent", number) for number in range(1, 8))]
+    agents = [("agent", number) for number in range(1, 8)]
+    assert roles == [("world", None), ("netem", None), *agents, ("nursery", None)]
     assert all(process["exit"] == 0 for process in summary["processes"])
 
 
