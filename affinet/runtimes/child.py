@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import subprocess
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +18,7 @@ import psutil
 from affinet.runtimes.silence import ProcessStatus, StatusHistory
 from affinet.runtimes.told import LONGEST_LINE, Beat, Event, NotItsOwn, beat, printable, read, shown
 from netem.processes.supervised import brief_bytes, called
+from netem.wire.session import ENVIRONMENT
 
 _LAST_LINES, _LAST_BYTES = 12, 1 << 16
 _LONGEST_REASON = 4000
@@ -58,6 +61,18 @@ class UserCodeFailed(RunFailed):
 def named(role: str, number: int | None) -> str:
     """What a process is called among those of a run."""
     return role if number is None else called(number)
+
+
+def started(command: Sequence[str], stdin: int, log: IO[bytes]) -> Process:
+    """A program as a process of the run, which writes its events to a pipe, and what else it says to its log."""
+    return subprocess.Popen(
+        command,
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        env=os.environ | ENVIRONMENT,
+        start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
+    )
 
 
 @dataclass

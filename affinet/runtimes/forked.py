@@ -16,10 +16,12 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, suppress
+from pathlib import Path
 from typing import IO
 
 from affinet.runtimes import nursery
-from affinet.runtimes.child import Child, Process, RunFailed
+from affinet.runtimes.child import Child, Process, RunFailed, started
+from affinet.runtimes.silence import StatusHistory
 
 NURSERY = "nursery"
 # What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
@@ -49,6 +51,25 @@ class Nursery:
         self._connection = connection
         self._patience_s = patience_s
         self._living: dict[int, ForkedProcess] = {}
+
+    @classmethod
+    def started(cls, log: IO[bytes], patience_s: float) -> Nursery:
+        """A nursery that has been started, and says when it is ready.
+
+        Raises
+        ------
+        RunFailed
+            When there is no such thing on this system.
+        """
+        if sys.platform != "linux":
+            raise RunFailed("processes are forked and watched as Linux has it: fly in one process (runtime inprocess)")
+        with ExitStack() as unless_started:
+            ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            unless_started.enter_context(ours)
+            with theirs:
+                process = started(program(), theirs.fileno(), log)
+            unless_started.pop_all()
+        return cls(Child(NURSERY, None, process, Path(log.name), trusted=True), ours, patience_s)
 
     def fork(self, name: str, log: IO[bytes]) -> ForkedProcess:
         """A new process: what to call it, which begins with its role, and where its standard error goes.
@@ -100,10 +121,11 @@ class Nursery:
         OSError
             When the system would not fork.
         """
+        self.child.looks = None
         while not _is_readable(self._connection.fileno(), self._patience_s):
             self.child.look()
-            looks = self.child.looks
-            if looks is not None and looks.stalled(self._patience_s, trusted=True):
+            looks: StatusHistory | None = self.child.looks
+            if looks and looks.stalled(self._patience_s, trusted=True):
                 raise RunFailed(f"{self.child.who} {looks.now}, and had not answered after {self._patience_s:.1f} s")
         try:
             answer, given, _, _ = socket.recv_fds(self._connection, _LONGEST_ANSWER, 1, socket.MSG_CMSG_CLOEXEC)
@@ -221,4 +243,6 @@ def _pipe() -> tuple[IO[bytes], IO[bytes]]:
 def _is_readable(descriptor: int, timeout_s: float | None) -> bool:
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
-    return bool(poll.poll(None if timeout_s is None else 1000.0 * timeout_s))
+    if poll.poll(None if timeout_s is None else 1000.0 * timeout_s):
+        return True
+    return bool(poll.poll(0))  # we may have been stopped past the timeout, and it has been readable all along

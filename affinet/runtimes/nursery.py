@@ -17,6 +17,7 @@ import gc
 import json
 import os
 import select
+import signal
 import socket
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -139,6 +140,7 @@ def main() -> None:
         for module in iter_modules(package.__path__, f"{package.__name__}."):
             import_module(module.name)
     _be_called("nursery")
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, as it may come to us, it has nobody's exit status told
     go_on_without_a_launcher()
     try:
         refuse_threads()

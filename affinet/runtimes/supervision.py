@@ -6,25 +6,21 @@ end is `netem/processes/supervised.py`.
 
 from __future__ import annotations
 
-import os
 import selectors
-import socket
 import subprocess
-import sys
 import time
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
-from affinet.runtimes.child import Child, Process, RunFailed, named
-from affinet.runtimes.forked import NURSERY, Nursery, end_by, program
+from affinet.runtimes.child import Child, RunFailed, named, started
+from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
 from netem.processes.supervised import BEAT_S
-from netem.wire.session import ENVIRONMENT
 
 _GRACE_S = 1.2
 # To start takes a second of processor time, and there may be a hundred on two cores.
@@ -82,16 +78,9 @@ class ProcessGroup:
         RunFailed
             When it dies or fails, or does not get anywhere for too long; or there is no such thing on this system.
         """
-        if sys.platform != "linux":
-            raise RunFailed("processes are forked and watched as Linux has it: fly in one process (runtime inprocess)")
-        with self._log(NURSERY) as log, ExitStack() as unless_started:
-            ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-            unless_started.enter_context(ours)
-            with theirs:
-                process = _started(program(), theirs.fileno(), log)
-            unless_started.pop_all()
-        child = Child(NURSERY, None, process, Path(log.name), trusted=True)
-        self._nursery = Nursery(child, ours, self._patience_s)
+        with self._log(NURSERY) as log:
+            self._nursery = Nursery.started(log, self._patience_s)
+        child = self._nursery.child
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         self.await_ready([child])
 
@@ -112,7 +101,7 @@ class ProcessGroup:
     def start(self, role: str, command: Sequence[str], brief: Any, number: int | None = None) -> Child:
         """Start a program of somebody else's making, and give it its brief."""
         with self._log(named(role, number)) as log:
-            process = _started(command, subprocess.PIPE, log)
+            process = started(command, subprocess.PIPE, log)
         return self._brief(Child(role, number, process, Path(log.name), trusted=False), brief)
 
     def _log(self, name: str) -> IO[bytes]:
@@ -302,17 +291,6 @@ def _has_ended(child: Child) -> bool:
         return child.process.poll() is not None
     except RunFailed:  # it has, and there is no nursery any more that would say how
         return True
-
-
-def _started(command: Sequence[str], stdin: int, log: IO[bytes]) -> Process:
-    return subprocess.Popen(
-        command,
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=log,
-        env=os.environ | ENVIRONMENT,
-        start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
-    )
 
 
 def _said_of(children: Sequence[Child]) -> str:

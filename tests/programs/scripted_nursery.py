@@ -10,7 +10,7 @@ import msgpack
 for other in ("netem", "world"):  # takes a while to import, and is not forked here
     sys.modules[f"{other}.process"] = SimpleNamespace(main=None)
 
-from affinet.runtimes import nursery
+from affinet.runtimes import nursery  # noqa: E402
 
 
 def obey() -> None:

@@ -13,12 +13,13 @@ import pytest
 from awaiting import PATIENCE, await_true
 from paths import PROGRAMS
 
-from affinet.runtimes import forked, nursery, supervision
+from affinet.runtimes import forked, nursery
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.supervision import ProcessGroup
 
 READY = """os.write(1, b'{"event": "ready"}\\n')\n"""
+HONEST = forked.program
 WAITS = READY + "import time\ntime.sleep(600)"
 
 
@@ -32,7 +33,7 @@ def crew(tmp_path, monkeypatch):
 
     @contextmanager
     def make(first="pass", patience=3.0):
-        monkeypatch.setattr(supervision, "program", lambda: program(first))
+        monkeypatch.setattr(forked, "program", lambda: program(first))
         with ProcessGroup(tmp_path, patience, Interruption()) as group:
             group.start_nursery()
             yield group
@@ -44,7 +45,10 @@ def crew(tmp_path, monkeypatch):
 def shared(tmp_path_factory):
     """A group whose nursery many tests may have fork."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(supervision, "program", program)
+        # As some parents leave it to their children: then nobody is told of the end of theirs.
+        patch.setattr(
+            forked, "program", lambda: program("import signal; signal.signal(signal.SIGCHLD, signal.SIG_IGN)")
+        )
         with ProcessGroup(tmp_path_factory.mktemp("logs"), 3.0, Interruption()) as group:
             group.start_nursery()
             yield group
@@ -178,7 +182,7 @@ def test_the_system_that_refuses_to_fork_is_an_error_of_the_system(crew):
 
 def test_there_is_none_where_nothing_is_forked(tmp_path, monkeypatch):
     with ProcessGroup(tmp_path, 3.0, Interruption()) as group:
-        monkeypatch.setattr(supervision.sys, "platform", "darwin")
+        monkeypatch.setattr(forked.sys, "platform", "darwin")
         with pytest.raises(RunFailed, match=r"fly in one process \(runtime inprocess\)$"):
             group.start_nursery()
 
@@ -233,10 +237,10 @@ def test_it_leaves_with_a_launcher_that_is_gone(crew):
 
 
 def test_a_nursery_that_cannot_import_says_what(tmp_path, monkeypatch):
-    monkeypatch.setattr(supervision, "program", forked.program)
+    monkeypatch.setattr(forked, "program", HONEST)
     monkeypatch.setattr(forked.nursery, "__name__", "affinet.runtimes.no_such_nursery")
-    with ProcessGroup(tmp_path, 3.0, Interruption()) as group:
-        with pytest.raises(
-            RunFailed, match=r"(?s)^nursery \(pid \d+\) was ended with exit status 1\..*no_such_nursery"
-        ):
-            group.start_nursery()
+    with (
+        ProcessGroup(tmp_path, 3.0, Interruption()) as group,
+        pytest.raises(RunFailed, match=r"(?s)^nursery \(pid \d+\) was ended with exit status 1\..*no_such_nursery"),
+    ):
+        group.start_nursery()
