@@ -28,26 +28,35 @@ class Process(Protocol):
     """What the launcher has of a process, be it a child of its own (`subprocess.Popen`) or one that the nursery forked."""
 
     @property
-    def pid(self) -> int: ...  # noqa: D102 - as in `subprocess`
+    def pid(self) -> int:
+        """Its number among the processes of the machine."""
 
     @property
-    def returncode(self) -> int | None: ...  # noqa: D102
+    def returncode(self) -> int | None:
+        """Its exit status, or minus the signal that ended it; None as long as nobody has asked, or it runs."""
 
     @property
-    def stdin(self) -> IO[bytes] | None: ...  # noqa: D102
+    def stdin(self) -> IO[bytes] | None:
+        """The end of a pipe from which it reads."""
 
     @property
-    def stdout(self) -> IO[bytes] | None: ...  # noqa: D102
+    def stdout(self) -> IO[bytes] | None:
+        """The end of a pipe to which it writes."""
 
-    def poll(self) -> int | None: ...  # noqa: D102
+    def poll(self) -> int | None:
+        """Its exit status; None as long as it runs."""
 
-    def wait(self, timeout: float | None = None) -> int: ...  # noqa: D102
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit status, once it has ended; `subprocess.TimeoutExpired` when it has not after so many seconds."""
 
-    def send_signal(self, number: int, /) -> None: ...  # noqa: D102
+    def send_signal(self, number: int, /) -> None:
+        """Send it a signal, unless it has ended."""
 
-    def terminate(self) -> None: ...  # noqa: D102
+    def terminate(self) -> None:
+        """Ask it to leave."""
 
-    def kill(self) -> None: ...  # noqa: D102
+    def kill(self) -> None:
+        """End it."""
 
 
 class RunFailed(RuntimeError):

@@ -85,7 +85,16 @@ class ProcessGroup:
         self.await_ready([child])
 
     def fork(self, role: str, brief: Any, number: int | None = None, *, trusted: bool = False) -> Child:
-        """Have the nursery fork a process, and give it its brief; `trusted` says that it runs no code of a user's own.
+        """Have the nursery fork a process.
+
+        Parameters
+        ----------
+        role, number
+            What it is to be, and of an agent which.
+        brief
+            What it is told.
+        trusted
+            Whether it runs no code of a user's own.
 
         Raises
         ------

@@ -1,6 +1,7 @@
 """Processes that the nursery forks are as good as fresh ones: their own, watched, and gone when they have to be."""
 
 import errno
+import json
 import os
 import signal
 import socket
@@ -91,7 +92,9 @@ def test_it_is_one_thread_in_a_session_of_its_own_under_its_name(shared):
 
 
 def test_what_it_draws_is_not_what_the_others_draw(shared):
-    for draw in ("import numpy; print(numpy.random.random())", "import random; print(random.random())"):
+    alone = {"mode": "peer", "listen": {"endpoints": []}, "scouting": {"multicast": {"enabled": False}}}
+    session = f"import zenoh; print(zenoh.open(zenoh.Config.from_json5({json.dumps(json.dumps(alone))})).zid())"
+    for draw in ("import numpy; print(numpy.random.random())", "import random; print(random.random())", session):
         assert len({said_by(shared, draw) for _ in range(3)}) == 3
 
 
