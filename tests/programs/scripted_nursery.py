@@ -6,6 +6,7 @@ import sys
 from types import SimpleNamespace
 
 import msgpack
+import numpy.random  # noqa: F401 - as what is left out below imports it
 
 for other in ("netem", "world"):  # takes a while to import, and is not forked here
     sys.modules[f"{other}.process"] = SimpleNamespace(main=None)
