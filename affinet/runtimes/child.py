@@ -175,7 +175,7 @@ class Child:
         """Note its memory."""
         if self.process.returncode is not None:
             return
-        with suppress(psutil.NoSuchProcess):
+        with suppress(psutil.NoSuchProcess, psutil.AccessDenied):  # a program with other rights keeps it to itself
             self.pss_mb = max(self.pss_mb, psutil.Process(self.process.pid).memory_full_info().pss / 2**20)
 
     def look(self) -> ProcessStatus:
