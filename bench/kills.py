@@ -1,6 +1,6 @@
 """Any process of a run killed at any moment: nothing is left, nothing hangs, what was written can be read, the reason is right.
 
-    python bench/kills.py [--kills 100] [--seed 1] [--only launcher,world,netem,agents] [--moments 0 6]
+    python bench/kills.py [--kills 100] [--seed 1] [--only launcher,nursery,world,netem,agent] [--moments 0 6]
 
 The victim and the moment are drawn: from the victim's start to three seconds of flight, so that many die before the first tick.
 The exit status is 1 when a row is not ok. A kill is drawn from its own seed: `--kills 1 --seed N` repeats it, as far as the
@@ -29,11 +29,13 @@ from typing import Any
 import psutil
 from rerun.chunk import RrdReader
 
+from affinet.runtimes.forked import NURSERY
 from netem.medium import journal
 from netem.medium.medium import JOURNAL
+from netem.processes.supervised import called
 from world.recording.logbook import RECORDING
 
-_ROLES = ("launcher", "world", "netem", "agents")
+_ROLES = ("launcher", NURSERY, "world", "netem", "agent")
 _LIMIT_S, _FLIGHT_S, _PATIENCE_S = 5.0, 3.0, 90.0
 
 
@@ -78,17 +80,19 @@ class Run:
         """Whether it is of this run and alive: what only waits to be reaped has no environment any more."""
         return _environment(process).get("TMPDIR") == str(self._folder)
 
-    def child(self, package: str, which: int) -> psutil.Process:
-        """One of the children that fly a package, as soon as there are so many."""
+    def child(self, name: str) -> psutil.Process:
+        """The process of this name, as soon as it is there."""
         found: list[psutil.Process] = []
 
         def there() -> bool:
-            children = psutil.Process(self.launcher.pid).children()
-            found[:] = [child for child in children if _command(child)[-2:] == ["-m", package]]
-            return len(found) > which
+            found[:] = psutil.Process(self.launcher.pid).children()  # the nursery, which has no name while it imports
+            if name != NURSERY:
+                forked = [child for nursery in found for child in _children(nursery)]
+                found[:] = [child for child in forked if _name(child) == name]
+            return bool(found)
 
-        _await(there, f"there was no {package}")
-        return found[which]
+        _await(there, f"there was no {name}")
+        return found[0]
 
     def text(self, name: str) -> str:
         """What was written to a file beside the run."""
@@ -102,11 +106,18 @@ def _environment(process: psutil.Process) -> dict[str, str]:
         return {}
 
 
-def _command(process: psutil.Process) -> list[str]:
+def _children(process: psutil.Process) -> list[psutil.Process]:
     try:
-        return list(process.cmdline())
+        return list(process.children())
     except psutil.Error:
         return []
+
+
+def _name(process: psutil.Process) -> str:
+    try:
+        return str(process.name())
+    except psutil.Error:
+        return ""
 
 
 def _await(condition: Callable[[], bool], otherwise: str) -> None:
@@ -128,13 +139,11 @@ def starts_s(scenario: str) -> dict[str, float]:
     """Seconds from a victim's start to the first tick, here and now."""
     launched = time.monotonic()
     with flying(scenario) as run:
-        run.child("world", 0)
+        run.child("world")
         born = time.monotonic()
         _await((run.out / "control.json").exists, "the run never got going")
         now = time.monotonic()
-    return {"launcher": now - launched, "ctrl-c": now - launched} | dict.fromkeys(
-        ("world", "netem", "agents"), now - born
-    )
+    return {"launcher": now - launched, "ctrl-c": now - launched} | dict.fromkeys(_ROLES[1:], now - born)
 
 
 def kill(scenario: str, seed: int, roles: tuple[str, ...], moments: Mapping[str, Sequence[float]]) -> Kill:
@@ -142,10 +151,10 @@ def kill(scenario: str, seed: int, roles: tuple[str, ...], moments: Mapping[str,
     draw = random.Random(seed)
     role = draw.choice(roles)
     done = Kill(seed, role, draw.uniform(*moments[role]))
-    agent = draw.randrange(7) if done.role == "agents" else 0
+    name = called(1 + draw.randrange(7)) if done.role == "agent" else done.role
     with flying(scenario) as run:
         ours = done.role in ("launcher", "ctrl-c")
-        victim = psutil.Process(run.launcher.pid) if ours else run.child(done.role, agent)
+        victim = psutil.Process(run.launcher.pid) if ours else run.child(name)
         waiting = os.pidfd_open(victim.pid)
         if select.select([waiting], [], [], done.moment_s)[0]:
             done.wrong.append("it had ended before it was killed")
@@ -153,10 +162,10 @@ def kill(scenario: str, seed: int, roles: tuple[str, ...], moments: Mapping[str,
         with suppress(psutil.NoSuchProcess):
             victim.send_signal(signal.SIGINT if done.role == "ctrl-c" else signal.SIGKILL)
         done.gone_s, left = _gone(run)
-        done.wrong += [f"left behind: {process}: {' '.join(_command(process)[-2:])}" for process in left]
+        done.wrong += [f"left behind: {process}: {_name(process)}" for process in left]
         if done.gone_s > _LIMIT_S:
             done.wrong.append(f"it took {done.gone_s:.2f} s")
-        done.wrong += _wrong_end(run, done.role, victim.pid)
+        done.wrong += _wrong_end(run, name, victim.pid)
         _read(run, done)
         if "Traceback" in run.text("complained") and done.role != "ctrl-c":
             done.wrong.append(run.text("complained"))
@@ -174,11 +183,11 @@ def _gone(run: Run) -> tuple[float, list[psutil.Process]]:
     return time.monotonic() - began, left
 
 
-def _wrong_end(run: Run, role: str, pid: int) -> list[str]:
+def _wrong_end(run: Run, name: str, pid: int) -> list[str]:
     status = run.launcher.poll()
-    if role == "launcher":
+    if name == "launcher":
         return [] if status == -signal.SIGKILL else [f"exit status {status}"]
-    if role == "ctrl-c":  # Python itself dies of the signal while it still imports
+    if name == "ctrl-c":  # Python itself dies of the signal while it still imports
         fine = status in (130, -signal.SIGINT)
         return [] if fine else [f"exit status {status}: {run.text('complained').strip()}"]
     said = run.text("said").splitlines()
@@ -188,9 +197,8 @@ def _wrong_end(run: Run, role: str, pid: int) -> list[str]:
     wrong = (
         [] if summary == json.loads((run.out / "summary.json").read_text()) else ["summary.json says something else"]
     )
-    name = {"world": "world", "netem": "netem", "agents": "agent "}[role]
     reason = summary["reasons"][0]
-    if not (reason.startswith(name) and f"(pid {pid}) was killed by SIGKILL" in reason):
+    if not reason.startswith(f"{name} (pid {pid}) was killed by SIGKILL"):
         wrong.append(f"the reason was: {reason}")
     return wrong if summary["verdict"] == "fail" else [*wrong, f"the verdict was {summary['verdict']}"]
 

@@ -153,12 +153,12 @@ def _said(process: subprocess.Popen[str]) -> str:
 
 
 def fly(plan: Plan) -> tuple[float, float, float]:
-    """Seconds of a tick, seconds to the first tick, and the largest agent's memory in MB."""
+    """Seconds of a tick, seconds to the first tick, and the largest agent's memory in MB, its share of what is shared."""
     with tempfile.TemporaryDirectory() as out:
         flight = Launcher(plan, Path(out), watch=lambda *_: None).fly()
     if flight.failure or flight.uninstructed:
         raise SystemExit(f"the run failed: {flight.failure}, {flight.uninstructed} lost")
-    memory = max(process["rss_mb"] for process in flight.processes if process["role"] == "agent")
+    memory = max(process["pss_mb"] for process in flight.processes if process["role"] == "agent")
     return flight.wall_s / plan.world.ticks, flight.start_s, memory
 
 
@@ -169,7 +169,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--swarms", nargs="+", default=["corridor", "hexa"], metavar="SCENARIO")
     options = parser.parse_args()
-    print("| swarm | floor, ms | tick, ms | ratio | x real time | recording | start, s | agent, MB |")
+    print("| swarm | floor, ms | tick, ms | ratio | x real time | recording | start, s | agent, MB (PSS) |")
     print("|---|---|---|---|---|---|---|---|")
     for name in options.swarms:
         duration = f"time.duration={options.ticks / 100:g}"

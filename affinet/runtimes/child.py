@@ -7,19 +7,56 @@ import os
 import signal
 import subprocess
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Protocol
 
 import psutil
 
 from affinet.runtimes.silence import ProcessStatus, StatusHistory
 from affinet.runtimes.told import LONGEST_LINE, Beat, Event, NotItsOwn, beat, printable, read, shown
 from netem.processes.supervised import brief_bytes, called
+from netem.wire.session import ENVIRONMENT
 
 _LAST_LINES, _LAST_BYTES = 12, 1 << 16
 _LONGEST_REASON = 4000
+
+
+class Process(Protocol):
+    """What the launcher has of a process, be it a child of its own (`subprocess.Popen`) or one that the nursery forked."""
+
+    @property
+    def pid(self) -> int:
+        """Its number among the processes of the machine."""
+
+    @property
+    def returncode(self) -> int | None:
+        """Its exit status, or minus the signal that ended it; None as long as nobody has asked, or it runs."""
+
+    @property
+    def stdin(self) -> IO[bytes] | None:
+        """The end of a pipe from which it reads."""
+
+    @property
+    def stdout(self) -> IO[bytes] | None:
+        """The end of a pipe to which it writes."""
+
+    def poll(self) -> int | None:
+        """Its exit status; None as long as it runs."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit status, once it has ended; `subprocess.TimeoutExpired` when it has not after so many seconds."""
+
+    def send_signal(self, number: int, /) -> None:
+        """Send it a signal, unless it has ended."""
+
+    def terminate(self) -> None:
+        """Ask it to leave."""
+
+    def kill(self) -> None:
+        """End it."""
 
 
 class RunFailed(RuntimeError):
@@ -28,6 +65,23 @@ class RunFailed(RuntimeError):
 
 class UserCodeFailed(RunFailed):
     """It did because a user's own code did something wrong."""
+
+
+def named(role: str, number: int | None) -> str:
+    """What a process is called among those of a run."""
+    return role if number is None else called(number)
+
+
+def started(command: Sequence[str], stdin: int, log: IO[bytes]) -> Process:
+    """A program as a process of the run, which writes its events to a pipe, and what else it says to its log."""
+    return subprocess.Popen(
+        command,
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        env=os.environ | ENVIRONMENT,
+        start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
+    )
 
 
 @dataclass
@@ -52,8 +106,8 @@ class Child:
         Whether it said why it goes down.
     is_ready, is_done
         Whether it has told so.
-    rss_mb
-        The most memory it was seen to take, in megabytes.
+    pss_mb
+        The most memory it was seen to take, in megabytes; what several share is divided among them.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
     looks
@@ -62,7 +116,7 @@ class Child:
 
     role: str
     number: int | None
-    process: subprocess.Popen[bytes]
+    process: Process
     log: Path
     trusted: bool
     expected_to_die: bool = False
@@ -70,7 +124,7 @@ class Child:
     confessed: bool = False
     is_ready: bool = False
     is_done: bool = False
-    rss_mb: float = 0.0
+    pss_mb: float = 0.0
     doing: Beat | None = None
     beat_s: float = 0.0
     looks: StatusHistory | None = None
@@ -79,7 +133,7 @@ class Child:
     @property
     def name(self) -> str:
         """For people, and for those who wait for it."""
-        return self.role if self.number is None else called(self.number)
+        return named(self.role, self.number)
 
     @property
     def who(self) -> str:
@@ -118,9 +172,11 @@ class Child:
         self.process.send_signal(signal.SIGCONT)
 
     def measure(self) -> None:
-        """Note its resident memory."""
-        with suppress(psutil.NoSuchProcess):
-            self.rss_mb = max(self.rss_mb, psutil.Process(self.process.pid).memory_info().rss / 2**20)
+        """Note its memory."""
+        if self.process.returncode is not None:
+            return
+        with suppress(psutil.NoSuchProcess, psutil.AccessDenied):  # a program with other rights keeps it to itself
+            self.pss_mb = max(self.pss_mb, psutil.Process(self.process.pid).memory_full_info().pss / 2**20)
 
     def look(self) -> ProcessStatus:
         """What the system says of it.
@@ -179,7 +235,7 @@ class Child:
             "role": self.role,
             "id": self.number,
             "pid": self.process.pid,
-            "rss_mb": round(self.rss_mb, 1),
+            "pss_mb": round(self.pss_mb, 1),
             "exit": self.process.returncode,
         }
 

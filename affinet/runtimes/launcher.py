@@ -11,16 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import agents
-import netem
-import world
 from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
-from affinet.runtimes.supervision import ProcessGroup, module
+from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
-from agents.centre import process as centre_process
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief
 from netem.medium.medium import JOURNAL
@@ -82,7 +78,7 @@ class Launcher:
         viewer
             URL of a Rerun viewer that is listening.
         programs
-            Command lines that fly some agents in place of `python -m agents` (docs/protocol.md).
+            Command lines of programs that fly some agents in place of ours (docs/protocol.md).
         interruption
             What may ask the run to end.
         """
@@ -124,18 +120,19 @@ class Launcher:
                 self._fly(group, launched)
 
     def _note(self, group: ProcessGroup) -> None:
-        self.flight.processes = [child.report() for child in group.children]
+        self.flight.processes = [child.report() for child in group.processes]
 
     def _start(self, group: ProcessGroup) -> None:
         private = self._private
         self._logins = self._make_logins(private)
-        group.start("world", module(world.__name__), self._world_brief(self._logins[WORLD]), trusted=True)
+        group.start_nursery()
+        group.fork("world", self._world_brief(self._logins[WORLD]), trusted=True)
         medium = self._medium_brief(self._logins[HUB], private / "users")
         own_losses = any(profile.own for profile in medium.profiles)
-        group.start("netem", module(netem.__name__), medium, trusted=not own_losses)
+        group.fork("netem", medium, trusted=not own_losses)
         if self._plan.centre:
             login = self._logins[CENTRE]
-            group.start("centre", module(centre_process.__name__), self._centre_brief(login))
+            group.fork("centre", self._centre_brief(login))
         for number in range(1, self._plan.world.links.agents + 1):
             self._start_agent(group, number)
         group.await_ready(group.children)
@@ -202,9 +199,11 @@ class Launcher:
 
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
-        program = self._programs.get(number) or module(agents.__name__)
-        self._agents[number] = group.start("agent", program, self._agent_brief(number, login, remembers), number)
-        return self._agents[number]
+        brief = self._agent_brief(number, login, remembers)
+        program = self._programs.get(number)
+        child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
+        self._agents[number] = child
+        return child
 
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(

@@ -6,41 +6,27 @@ end is `netem/processes/supervised.py`.
 
 from __future__ import annotations
 
-import json
-import os
 import selectors
 import subprocess
-import sys
 import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
-from affinet.runtimes.child import Child, RunFailed
+from affinet.runtimes.child import Child, RunFailed, named, started
+from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
 from netem.processes.supervised import BEAT_S
-from netem.wire.session import ENVIRONMENT
 
 _GRACE_S = 1.2
 # To start takes a second of processor time, and there may be a hundred on two cores.
 _START_S, _START_EACH_S = 30.0, 3.0
 _LATE_BEATS = 2
 _NAMED = 6
-# What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
-_RUN = """import json, runpy, sys
-path, _, package = sys.argv[1:]
-sys.path[:] = json.loads(path)
-runpy.run_module(package, run_name="__main__", alter_sys=True)"""
-
-
-def module(package: str) -> list[str]:
-    """The command line of `python -m package`, with the search path of this process."""
-    path = [os.path.abspath(entry) for entry in sys.path if entry]
-    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", package]
 
 
 class ProcessGroup:
@@ -66,6 +52,7 @@ class ProcessGroup:
         self._patience_s = patience_s
         self._interruption = interruption
         self._selector = selectors.DefaultSelector()
+        self._nursery: Nursery | None = None
         self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
 
@@ -74,23 +61,62 @@ class ProcessGroup:
 
     def __exit__(self, *_: object) -> None:
         self._end_all()
+        if self._nursery is not None:
+            self._nursery.leave(_GRACE_S)
         self._selector.close()
 
-    def start(
-        self, role: str, program: Sequence[str], brief: Any, number: int | None = None, *, trusted: bool = False
-    ) -> Child:
-        """Start a program, and give it its brief; `trusted` says that it runs no code of a user's own."""
-        log = self._logs / (f"{role}.log" if number is None else f"{role}-{number}.log")
-        with log.open("ab") as standard_error:
-            process = subprocess.Popen(
-                program,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=standard_error,
-                env=os.environ | ENVIRONMENT,
-                start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
-            )
-        child = Child(role, number, process, log, trusted)
+    @property
+    def processes(self) -> list[Child]:
+        """All of the run, the nursery too."""
+        return [*self.children, *([] if self._nursery is None else [self._nursery.child])]
+
+    def start_nursery(self) -> None:
+        """Start the nursery, and wait until it can fork.
+
+        Raises
+        ------
+        RunFailed
+            When it dies or fails, or does not get anywhere for too long; or there is no such thing on this system.
+        """
+        with self._log(NURSERY) as log:
+            self._nursery = Nursery.started(log, self._patience_s)
+        child = self._nursery.child
+        self._selector.register(child.events_fd, selectors.EVENT_READ, child)
+        self.await_ready([child])
+
+    def fork(self, role: str, brief: Any, number: int | None = None, *, trusted: bool = False) -> Child:
+        """Have the nursery fork a process.
+
+        Parameters
+        ----------
+        role, number
+            What it is to be, and of an agent which.
+        brief
+            What it is told.
+        trusted
+            Whether it runs no code of a user's own.
+
+        Raises
+        ------
+        RunFailed
+            When the nursery is gone, or does not answer.
+        """
+        assert self._nursery is not None, "start the nursery first"
+        name = named(role, number)
+        with self._log(name) as log:
+            process = self._nursery.fork(name, log)
+        return self._brief(Child(role, number, process, Path(log.name), trusted), brief)
+
+    def start(self, role: str, command: Sequence[str], brief: Any, number: int | None = None) -> Child:
+        """Start a program of somebody else's making, and give it its brief."""
+        with self._log(named(role, number)) as log:
+            process = started(command, subprocess.PIPE, log)
+        return self._brief(Child(role, number, process, Path(log.name), trusted=False), brief)
+
+    def _log(self, name: str) -> IO[bytes]:
+        return (self._logs / f"{name.replace(' ', '-')}.log").open("ab")
+
+    def _brief(self, child: Child, brief: Any) -> Child:
         self.children.append(child)
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         child.brief(brief)
@@ -253,21 +279,27 @@ class ProcessGroup:
             child.free()
 
     def _end_all(self) -> None:
+        if self._nursery is not None:
+            self._nursery.child.resume()  # stopped, it could not say how the others end
         # The world goes first: it has a recording to close.
-        alive = [child for child in self.children if child.process.poll() is None]
+        alive = [child for child in self.children if not _has_ended(child)]
         for child in sorted(alive, key=lambda child: child.role != "world"):
             if not child.confessed:  # who has is leaving, and its log is to say of what
                 child.process.terminate()
             child.resume()  # one that is stopped could not hear that it has to leave
         deadline = time.monotonic() + _GRACE_S
         for child in alive:
-            try:
-                child.process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                child.process.kill()
-                child.process.wait()
+            with suppress(RunFailed):  # it has ended, and there is no nursery any more that would say how
+                end_by(deadline, child.process)
         for child in self.children:
             child.free()
+
+
+def _has_ended(child: Child) -> bool:
+    try:
+        return child.process.poll() is not None
+    except RunFailed:  # it has, and there is no nursery any more that would say how
+        return True
 
 
 def _said_of(children: Sequence[Child]) -> str:

@@ -55,7 +55,7 @@ class _Process:
     role: str
     id: int | None
     pid: int
-    rss_mb: float
+    pss_mb: float
     exit: int | None
 
 

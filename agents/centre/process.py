@@ -150,7 +150,3 @@ def _estimate() -> None:
         supervisor.tell("ready")
         listener.run(Lockstep(brief.swarm.ticks))
         supervisor.tell("done")
-
-
-if __name__ == "__main__":
-    main()

@@ -70,7 +70,7 @@ class Supervisor:
         self._doing = _Doing(0, "", tuple)
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
-        _go_on_without_a_launcher()
+        go_on_without_a_launcher()
 
     def brief(self, kind: type[T]) -> T:
         """The child's brief; from then on the lifeline is watched, and the child beats."""
@@ -149,9 +149,9 @@ class Supervisor:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _go_on_without_a_launcher() -> None:
-    # A process that the script has stopped cannot see its lifeline close; elsewhere than on Linux nothing wakes it.
-    if sys.platform == "linux":
+def go_on_without_a_launcher() -> None:
+    """Have the system wake this process when the one that started it ends: stopped, it could not see its lifeline close."""
+    if sys.platform == "linux":  # elsewhere nothing wakes it
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
 
 

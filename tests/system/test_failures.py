@@ -54,7 +54,7 @@ class Running:
         except BaseException:  # a test that ran out of time too
             self.__exit__()
             raise
-        self.children = psutil.Process(self.launcher.pid).children()
+        self.children = psutil.Process(self.launcher.pid).children(recursive=True)
         return self
 
     def __exit__(self, *_):
@@ -67,8 +67,8 @@ class Running:
         path = self.out / name
         return path.stat().st_size if path.exists() else 0
 
-    def child(self, package):
-        return next(c for c in self.children if c.cmdline()[-2:] == ["-m", package])
+    def child(self, name):
+        return next(child for child in self.children if child.name() == name)
 
     def stopped(self):
         return [child for child in self.children if child.status() == psutil.STATUS_STOPPED]
@@ -86,17 +86,17 @@ def moments(recording):
     return sum(chunk.num_rows for chunk in chunks if str(chunk.entity_path) == "/metrics/tracking_error")
 
 
-@pytest.mark.parametrize("package", ["agents", "netem", "world"])
-def test_a_death_ends_the_run_with_its_reason(package, out):
+@pytest.mark.parametrize("name", ["agent 1", "netem", "world", "nursery"])
+def test_a_death_ends_the_run_with_its_reason(name, out):
     with Running(out) as run:
-        victim = run.child(package)
+        victim = run.child(name)
         victim.kill()
         took, said, _ = run.ends()
     summary = json.loads(said.splitlines()[-1])
     assert took < SOON
     assert run.launcher.returncode == 1
     assert summary["verdict"] == "fail"
-    assert f"(pid {victim.pid}) was killed by SIGKILL" in summary["reasons"][0]
+    assert summary["reasons"] == [f"{name} (pid {victim.pid}) was killed by SIGKILL. It had said nothing."]
     assert moments(out / "run.rrd") > 10
     # Whoever died, the accounts say what became of everything up to the last tick that was written down.
     table = journal.read(out / JOURNAL)
@@ -110,21 +110,17 @@ def test_a_death_ends_the_run_with_its_reason(package, out):
 
 
 @pytest.mark.parametrize(
-    ("package", "name"),
-    [
-        ("agents", "agent"),
-        pytest.param("netem", "netem", marks=pytest.mark.slow),
-        pytest.param("world", "world", marks=pytest.mark.slow),
-    ],
+    "name",
+    ["agent 1", pytest.param("netem", marks=pytest.mark.slow), pytest.param("world", marks=pytest.mark.slow)],
 )
-def test_who_is_frozen_ends_the_run_and_is_named_with_its_state(package, name, out):
+def test_who_is_frozen_ends_the_run_and_is_named_with_its_state(name, out):
     with Running(out) as run:
-        frozen = run.child(package)
+        frozen = run.child(name)
         frozen.suspend()
         took, said, _ = run.ends()
     reason = json.loads(said.splitlines()[-1])["reasons"][0]
     assert took < SOON  # 3 s of patience, a beat, 1.2 s of grace for a process that cannot even be asked to leave
-    assert reason.startswith(name)
+    assert reason.startswith(f"{name} (pid ")
     assert f"(pid {frozen.pid}) is stopped (state T): nothing moved for " in reason
 
 

@@ -49,7 +49,7 @@ def interrupted(number, runtime, out, private, monkeypatch, again=False):
     book, children = out / "journal.arrows", []
     try:
         await_true(lambda: rows(book), "the run never got going")
-        children = psutil.Process(launcher.pid).children()
+        children = psutil.Process(launcher.pid).children(recursive=True)
         for _ in range(3 if again else 1):
             launcher.send_signal(number)
         _, complained = launcher.communicate(timeout=PATIENCE)

@@ -17,14 +17,16 @@ def killed(role, moment, *options):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-# Seconds from the victim's start: the launcher while its children log in, the world while it imports, the others in flight.
+# Seconds from the victim's start: the launcher while its children log in, nursery and world while they import, the
+# others in flight.
 @pytest.mark.parametrize(
     ("role", "moment"),
     [
         ("launcher", "2.2"),
         ("world", "0.5"),
+        pytest.param("nursery", "0.3", marks=pytest.mark.slow),
         pytest.param("netem", "3", marks=pytest.mark.slow),
-        pytest.param("agents", "3.5", marks=pytest.mark.slow),
+        pytest.param("agent", "3.5", marks=pytest.mark.slow),
     ],
 )
 def test_a_kill_at_any_moment_leaves_nothing_but_what_can_be_read(role, moment):

@@ -78,7 +78,8 @@ def test_a_medium_with_code_of_a_users_own_is_not_trusted_to_end(tmp_path):
         with pytest.raises(RunFailed, match=r"^netem \(pid \d+\) computes \(state R\): nothing moved for "):
             blamed(crew, [medium])
     with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
-        medium = crew.start("netem", computes, {}, trusted=True)
+        medium = crew.start("netem", computes, {})
+        medium.trusted = True
         while crew.now_s < 3 * SHORT:
             crew.listen()
             crew.blame_the_silent([medium])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -15,7 +16,9 @@ from world.books.history import Moments, Reports
 from world.books.realised import GraphWatch, columns
 from world.brief import RecordOptions
 from world.physics.world import World
-from world.recording.recorder import Recorder
+
+if TYPE_CHECKING:
+    from world.recording.recorder import Recorder
 
 RECORDING, GRAPH = "run.rrd", "graph.arrows"
 GRAPH_SCHEMA = pa.schema(
@@ -58,8 +61,10 @@ class RunWriter:
         self._out = out
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
         self._watch = GraphWatch(world.formation, world.links, world.dt, books.window)
-        self._recorder = None
+        self._recorder: Recorder | None = None
         if books.record:
+            from world.recording.recorder import Recorder  # Rerun takes a second to import: for those who record
+
             self._recorder = Recorder(
                 out / RECORDING,
                 run=run,

@@ -44,7 +44,7 @@ def test_json_is_the_last_line_and_has_every_figure(out):
         "in_flight",
         "uninstructed",
     }
-    assert set(summary["processes"][0]) == {"role", "id", "pid", "rss_mb", "exit"}
+    assert set(summary["processes"][0]) == {"role", "id", "pid", "pss_mb", "exit"}
     assert (summary["verdict"], summary["ticks"], summary["messages"]["uninstructed"]) == ("pass", 100, 0)
 
 

@@ -15,6 +15,7 @@ from affinet.cli import commands
 from affinet.runtimes import launcher
 from affinet.runtimes.inject import Access
 from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.supervision import ProcessGroup
 from affinet.verdicts import outcome
 from affinet.verdicts.outcome import accounts_of
 from netem.medium import journal
@@ -63,7 +64,7 @@ def test_the_journal_and_its_accounts_outlive_the_world(out, monkeypatch):
         if batch < world.doing.tick and batch // 5 < world.doing.tick % batch < batch // 2:
             world.process.kill()
 
-    monkeypatch.setattr(launcher.ProcessGroup, "blame_the_silent", kill_the_world)
+    monkeypatch.setattr(ProcessGroup, "blame_the_silent", kill_the_world)
     out.mkdir()
     flight = launcher.Launcher(plan, out, watch=lambda *_: None).fly()
     assert flight.failure.startswith("world (pid ")
@@ -140,19 +141,24 @@ def test_what_was_lost_by_nobodys_order_fails_the_run_and_is_counted():
 # ---- over processes, one of which goes wrong
 
 
-def flies_with(monkeypatch, tmp_path, package, *program):
+def flies_with(monkeypatch, tmp_path, role, *program):
     scenario, out = tmp_path / "triangle.toml", tmp_path / "run"
     scenario.write_text(TRIANGLE)
-    honest = launcher.module
-    command = [sys.executable, "-P", str(PROGRAMS / program[0]), *program[1:]]
-    monkeypatch.setattr(launcher, "module", lambda name: command if name == package else honest(name))
+    command, honest = [sys.executable, "-P", str(PROGRAMS / program[0]), *program[1:]], ProcessGroup.fork
+
+    def fork(group, forked, brief, number=None, **trust):
+        if forked != role:
+            return honest(group, forked, brief, number, **trust)
+        return group.start(role, command, brief, number)
+
+    monkeypatch.setattr(ProcessGroup, "fork", fork)
     status = commands.main(["run", str(scenario), "--out", str(out), "--json"])
     return status, json.loads((out / "summary.json").read_text())
 
 
 @PROCESSES
 def test_a_message_that_an_agent_lost_fails_the_run(monkeypatch, tmp_path):
-    status, summary = flies_with(monkeypatch, tmp_path, "agents", "wayward_agent.py", "loses")
+    status, summary = flies_with(monkeypatch, tmp_path, "agent", "wayward_agent.py", "loses")
     assert status == 1
     assert summary["verdict"] == "fail"
     assert summary["reasons"] == ["1 messages were lost that nobody ordered"]
@@ -194,7 +200,7 @@ def test_a_medium_whose_accounts_do_not_close_fails_the_run(monkeypatch, tmp_pat
     ],
 )
 def test_an_agent_that_goes_wrong_fails_the_run_and_is_named(wrong, reason, monkeypatch, tmp_path):
-    status, summary = flies_with(monkeypatch, tmp_path, "agents", "wayward_agent.py", wrong)
+    status, summary = flies_with(monkeypatch, tmp_path, "agent", "wayward_agent.py", wrong)
     (pid,) = (process["pid"] for process in summary["processes"] if process["id"] == 2)
     assert status == 1
     assert summary["verdict"] == "fail"
