@@ -30,6 +30,7 @@ from analysis.models.information import reported, unpacked
 from netem.core.channels import PLACE
 
 _MOST_FLIGHTS = 8  # in one picture
+_NORMALISED = {"nees": "NEES", "nis": "NIS", "target_nees": "NEES of targets", "place_nees": "NEES of places"}
 
 
 def prepare(out: Path | str) -> Path:
@@ -84,8 +85,13 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
     if study.figure == "curves":
         _draw_quantity(out / "figure.png", study, results, study.quantity)
         dimension = results[0].plan.world.formation.dimension
-        normalised = {what.upper(): _curves(results, what, study.since) for what in ("nees", "nis")}
-        curves.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
+        normalised = {
+            says: _curves(results, what, study.since)
+            for what, says in _NORMALISED.items()
+            if any(np.isfinite(one.runs.quantities[what]).any() for one in results)
+        }
+        if normalised:
+            curves.consistency(out / "consistency.png", study.title, normalised, axes, dimension)
     elif study.figure == "sweep":
         _draw_quantity(out / "figure.png", study, results, study.quantity)
     elif study.figure == "map":

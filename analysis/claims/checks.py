@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -270,7 +271,15 @@ def _of_most(says: str, those: Mask, unknown: Mask, do: str) -> ClaimVerdict:
     found = intervals.share(int(those.sum()), int(unknown.sum()), len(those))
     told = f"{those.sum()} of {len(those)} runs {do}{_untold(int(unknown.sum()))}"
     reach = f"{found.low:.0%} to {found.high:.0%} of all, asked {_MOST:.0%} at least"
-    return ClaimVerdict(says, found.decide(least=_MOST), f"{told}; {reach}")
+    decision = found.decide(least=_MOST)
+    if decision is Decision.UNDECIDED and those.all():
+        reach += f", which {_enough()} such runs would show"
+    return ClaimVerdict(says, decision, f"{told}; {reach}")
+
+
+def _enough() -> int:
+    """How few runs that all do it show that most do."""
+    return next(runs for runs in itertools.count(1) if intervals.share(runs, 0, runs).low >= _MOST)
 
 
 def _of(value: float | Interval, unit: str) -> str:

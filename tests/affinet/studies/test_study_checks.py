@@ -247,6 +247,23 @@ def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, mo
     assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT], ids=lambda one: one.name)
+def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_path, monkeypatch, capsys):
+    class Ended(Done):
+        def __call__(self, work, given):
+            for place, one in enumerate(given):
+                if place == 3:
+                    signal.raise_signal(number)
+                yield work(one)
+
+    monkeypatch.setattr(study, "in_processes", Ended())
+    before, out = signal.getsignal(number), tmp_path / "out"
+    assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 128 + number
+    assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
+    assert f"interrupted by {number.name}" in capsys.readouterr().err
+    assert signal.getsignal(number) == before
+
+
 # ---- workers
 
 WAITS = """

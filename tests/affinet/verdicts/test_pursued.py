@@ -68,6 +68,13 @@ def test_what_was_not_put_to_the_test_is_vacuous(checker):
     assert checker(1.0)(nobody).verdict == "vacuous"
 
 
+def test_one_who_speaks_alone_agrees_with_nobody():
+    run = flown(ALONE, timeline({"verb": "kill", "agents": list(range(2, 11)), "at": 0.1}))
+    told = agreed(50.0)(run)
+    assert (told.verdict, told.says) == ("vacuous", "in some tick one agent alone said where it is")
+    assert found(50.0)(run).verdict == "pass"
+
+
 def test_words_name_these_checkers():
     assert invariants.parse("found(0.5, by=2)").name == "found(0.5, by=2)"
     assert invariants.parse("agreed(0.5)").name == "agreed(0.5, by=0)"

@@ -140,6 +140,10 @@ def test_runs_are_counted_and_not_called_all():
 
 
 def test_ten_runs_are_too_few():
+    told = checks.stays_below("says", SECONDS, np.full((10, 10), 0.1), 1.0, ALL, "m²").found
+    assert told.endswith("63% to 100% of all, asked 90% at least, which 44 such runs would show")
+    for runs, decision in ((43, OPEN), (44, HOLDS)):
+        assert checks.stays_below("says", SECONDS, np.full((runs, 10), 0.1), 1.0, ALL, "m²").decision is decision
     assert checks.stays_below("says", SECONDS, np.full((10, 10), 0.1), 1.0, ALL, "m²").decision is OPEN
 
 
@@ -230,6 +234,22 @@ def test_what_rises_and_falls_with_another_follows_it(shape, decision):
     assert follows(values, error).decision is OPEN
     defined[:, 4, 1] = False
     assert follows(values, error, defined).decision is not HOLDS
+
+
+def test_what_stands_still_follows_nothing():
+    rising = np.tile(SECONDS, (20, 1))
+    still, told = np.zeros((20, len(SECONDS), 1)), np.ones((20, len(SECONDS), 1), dtype=bool)
+    assert checks.follows("says", SECONDS, still, rising, told, ALL).decision is OPEN
+    half = np.where(SECONDS < 5.0, 0.0, 1.0)  # ties share their ranks
+    verdict = checks.follows("says", SECONDS, np.tile(half[:, None], (20, 1, 1)), rising, told, ALL)
+    assert verdict.decision is FAILS
+
+
+def test_what_is_higher_is_said_to_be_higher():
+    rng = np.random.default_rng(2)
+    low, high = rng.normal(1.0, 0.1, (1, 50)), rng.normal(3.0, 0.1, (1, 50))
+    assert checks.lower("says", high, low, "m", paired=True).found.startswith("higher by ")
+    assert checks.lower("says", low, high, "m", paired=True).found.startswith("lower by ")
 
 
 def test_noise_follows_nothing():
