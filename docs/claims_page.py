@@ -99,7 +99,7 @@ def page() -> str:
     ]
     for name in named:
         if full := record.full_study(name):
-            lines += ["", f"### {name}: {full.title} ({full.source})", "", *_cases(full)]
+            lines += ["", f"### {name}", "", f"{full.title} ({full.source}).", "", *_cases(full)]
     return "\n".join(lines) + "\n"
 
 

@@ -12,14 +12,13 @@ import numpy as np
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.units import LARGEST
 from affinet.scenario.words import shown
-from agents.laws.single import Static
 from analysis.models.arrays import Array
 from world.formation import layouts, stress
 from world.formation.design import design
 from world.formation.nominal import Formation, NotRigid
 
 KINDS = ("grid", "random")
-_GAIN = Static().alpha
+_GAIN = 10.0  # of the law in the scenario, per second
 _TICK = 0.05  # s: half of what the fastest mode takes, at this gain
 _SETTLED, _LONGEST = 4.0, 3600.0  # a run lasts so many times what it takes to 1/e, an hour at the most
 

@@ -112,7 +112,7 @@ def correlation_time(series: Array) -> float:
     Sokal, "Monte Carlo methods in statistical mechanics", section 3, 1996.
     """
     off = series - series.mean()
-    power = np.abs(np.fft.rfft(off, 2 * len(off))) ** 2
+    power = whole_power(np.abs(np.fft.rfft(off, 2 * len(off))), 2)
     covariance = np.fft.irfft(power)[: len(off)]
     if covariance[0] <= 0.0:
         return 1.0

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from affinet.cli import progress, show
-from affinet.runtimes import directories, supervision
+from affinet.runtimes import directories, forked
 from affinet.runtimes.run import fly
 from analysis.figures import curves
 from analysis.models.finding import Finding
@@ -86,8 +86,8 @@ def test_where_no_folder_will_do_it_is_said_what_would(monkeypatch):
 
 def test_a_child_searches_where_its_launcher_does(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path / "a:b"), ""])
-    *_, path, dash_m, package = supervision.module("world")
-    assert (dash_m, package) == ("-m", "world")
+    *_, path, dash_m, package = forked.program()
+    assert (dash_m, package) == ("-m", "affinet.runtimes.nursery")
     assert json.loads(path) == [os.path.abspath(entry) for entry in sys.path if entry]
 
 

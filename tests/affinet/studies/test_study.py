@@ -376,7 +376,7 @@ def claim(check, *says):
     return "\n".join(["[[claims]]", 'says = "something"', f'check = "{check}"', *says])
 
 
-TO, LEVEL, BETWEEN = 'to = { estimator = "MLE" }', "level = 1.0", "between = [0.5, 1.5]"
+TO, LEVEL, BETWEEN = 'to = { estimator = "MLE" }', "level = 2.0", "between = [0.5, 1.5]"
 COMPARED = {
     "flat": {LEVEL},
     "approaches": {TO, LEVEL},

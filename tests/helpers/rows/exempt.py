@@ -80,7 +80,7 @@ EXEMPT = {
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
         world.books.history.digest world.books.history.one_nan
-        analysis.metrics.consistency.averaged world.books.history.form
+        analysis.metrics.consistency.averaged analysis.metrics.consistency.correlation_time world.books.history.form
         world.books.history.refuse_those_of_another
         world.books.localized.FirstMeasurements.of
         world.books.localized.FirstMeasurements.tick world.books.localized.FirstMeasurements.take
