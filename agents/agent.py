@@ -17,7 +17,7 @@ from agents.laws.base import Law
 from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
 from agents.loading import returned
 from analysis.models.affine import Manoeuvre
-from analysis.models.arrays import Array, Mask, chosen
+from analysis.models.arrays import Array, Mask
 from analysis.models.pursuit import Sighting
 from netem.core.channels import INPUT
 from netem.loading.calling import Calling
@@ -187,10 +187,3 @@ class Agent:
         if self.law.order == 1:
             return pilot(self.brief, mission, self.leader_gain, tick, position)
         return pilot_of_accelerations(self.brief, mission, self.leader_gain, tick, position, velocity)
-
-
-def renew(state: Any, fresh: Any, which: Mask) -> Any:
-    """The state with the agents in `which` (batch axes) replaced by fresh ones."""
-    if isinstance(state, tuple):
-        return type(state)(*(renew(old, new, which) for old, new in zip(state, fresh, strict=True)))
-    return chosen(which, fresh, state)

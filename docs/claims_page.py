@@ -126,15 +126,17 @@ def verdicts(one: PaperClaim, study: Study) -> Iterator[Found]:
         if not matching:
             raise KeyError(f"{one.study} makes no claim {says!r}")
         for spelled in (spelled for claim in matching for spelled in judging.spelled_out(study, claim)):
-            case = " ".join(spelled.says.replace(says, "").strip(" :").split()).replace(": ", " ").lstrip(", ")
-            yield Found(says, f"{case}{_window(spelled)}".lstrip(", "), found.get(record.asked(study, spelled)))
+            labels, _, level = spelled.says.rpartition(says)
+            case = f"{labels.removesuffix(': ')}{level}".strip()
+            when = ", ".join(filter(None, (case, _window(spelled))))
+            yield Found(says, when, found.get(record.asked(study, spelled)))
 
 
 def _window(claim: Claim) -> str:
     """When it is judged."""
     if claim.until is not None:
-        return f", {claim.since:g} to {claim.until:g} s"
-    return f", from {claim.since:g} s on" if claim.since else ""
+        return f"{claim.since:g} to {claim.until:g} s"
+    return f"from {claim.since:g} s on" if claim.since else ""
 
 
 def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from affinet.planning.plan import Plan
-from agents.agent import AgentAction, AgentState, renew
+from agents.agent import AgentAction, AgentState
 from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
@@ -99,14 +99,15 @@ class ArrayCarrier:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, self._steered(said))
         sighting = self._world.sighting(tick, scene)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
-        self._state = renew(state, before, idle) if idle.any() else state
+        self._state = chosen(idle, before, state) if idle.any() else state
         self._relay.finish(tick)
         return BatchActed(np.where(idle[:, None], 0.0, action.input), action, relayed)
 
     def _welcomed_back(self, tick: int) -> AgentState:
         timeline = self.timeline
         if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
-            return renew(self._state, self._fresh, np.isin(self._numbers, [*cold]))
+            state: AgentState = chosen(np.isin(self._numbers, [*cold]), self._fresh, self._state)
+            return state
         return self._state
 
     def _from_the_centre(self, centre: CheckedCentre, measured: Array, seen: Mask, inputs: Array) -> Heard:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -61,37 +61,34 @@ class Interruption:
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
     """Signals that ask to end raise `Interrupted` where the block is, so that what it has is kept."""
-    if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
-        yield
-        return
 
     def end(number: int, _frame: FrameType | None) -> None:
         raise Interrupted(number)
 
-    before = {number: signal.getsignal(number) for number in _HEEDED}
-    heeded = [number for number, handler in before.items() if handler in _BY_DEFAULT]
-    for number in heeded:
-        signal.signal(number, end)
-    try:
+    with _heeded(end):
         yield
-    finally:
-        for number in heeded:
-            signal.signal(number, before[number])
 
 
 @contextmanager
 def interruptible() -> Iterator[Interruption]:
-    """Note the signals that come while the block runs; those that are ignored, as under nohup, stay ignored."""
+    """Note the signals that come while the block runs."""
     interruption = Interruption()
-    if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
+    with _heeded(interruption.note):
         yield interruption
+
+
+@contextmanager
+def _heeded(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Give the signals that ask to end to a handler; those that are ignored, as under nohup, stay ignored."""
+    if threading.current_thread() is not threading.main_thread():  # Python gives signals to that alone
+        yield
         return
     before = {number: signal.getsignal(number) for number in _HEEDED}
-    heeded = [number for number, handler in before.items() if handler in _BY_DEFAULT]
+    heeded = [number for number, found in before.items() if found in _BY_DEFAULT]
     for number in heeded:
-        signal.signal(number, interruption.note)
+        signal.signal(number, handler)
     try:
-        yield interruption
+        yield
     finally:
         for number in heeded:
             signal.signal(number, before[number])

@@ -81,7 +81,7 @@ def grid(study: Study, *, quick: bool) -> str:
     flies = study.model_dump(mode="json", include={"scenario", "set", "axes", "skip"})
     flies |= {
         "size": study.size(quick=quick).model_dump(mode="json"),
-        "of": study.loaded(study.set).model_dump(mode="json"),
+        "of": study.loaded(study.set).model_dump(mode="json", exclude_defaults=True),
     }
     return _digest(flies)
 

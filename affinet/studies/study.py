@@ -104,14 +104,15 @@ class Claim(Section):
             raise ValueError(f"the check {self.check!r} has no use for {' and '.join(useless)}")
         if self.to_quantity is not None and self.to is None:
             raise ValueError("to_quantity is that of what is compared with: give to")
-        if self.check == "value" and 0.0 in (self.level, *(self.levels or {}).values()):
+        levels = [one for one in (self.level, *(self.levels or {}).values()) if one is not None]
+        if self.check == "value" and 0.0 in levels:
             raise ValueError("a value is between multiples of its level: give one that is not 0")
         if self.between is not None and self.between[0] >= self.between[1]:
             raise ValueError(
                 f"between is from a smaller to a larger number, got {self.between[0]:g} and {self.between[1]:g}"
             )
         least = _LEAST_LEVEL.get(self.check, -math.inf)
-        if any(level <= least for level in (self.level, *(self.levels or {}).values()) if level is not None):
+        if any(one <= least for one in levels):
             raise ValueError(f"the level of {self.check!r} must be above {least:g}, below which nothing is")
         if self.levels is not None and (len(self.each) != 1 or self.level is not None):
             raise ValueError("levels are for the labels of one axis: name it in each, and give no level beside them")

@@ -184,21 +184,17 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
         if not np.isfinite(mean[ticks]).all():
             tick = int(np.argmin(np.isfinite(mean[ticks])))
             return CheckResult(name, "fail", span.start + int(ticks[tick]), "the NEES is not a number any more")
-        found, dimension = consistency.averaged(mean[ticks], level), evidence.plan.world.formation.dimension
+        series, dimension = mean[ticks], evidence.plan.world.formation.dimension
+        found = consistency.averaged(series, level)
         says = f"mean NEES {found.mean:.3g} +- {found.half:.2g} for {dimension} dimensions"
         off = found.mean - dimension
-        wanted = math.ceil(_CORRELATION_TIMES * consistency.correlation_time(mean[ticks]))
+        wanted = math.ceil(_CORRELATION_TIMES * consistency.correlation_time(series))
+        # However correlated they are, their mean spreads no more than a single draw.
         low, high = consistency.band(level, dimension, 1)
-        explicable = (
-            low <= found.mean <= high
-        )  # by correlation, however much there is: one draw is the most it can leave
+        explicable = low <= found.mean <= high
         if len(ticks) < wanted and explicable:
-            return CheckResult(
-                name,
-                "vacuous",
-                None,
-                f"{says} in {len(ticks)} ticks, of which {wanted} are needed, as they are correlated",
-            )
+            few = f"in {len(ticks)} ticks, of which {wanted} are needed, as they are correlated"
+            return CheckResult(name, "vacuous", None, f"{says} {few}")
         if abs(off) > found.half or not explicable:
             worst = int(np.argmax(np.sign(off) * (found.batches - dimension) >= abs(off)))
             first = ticks[worst * len(ticks) // consistency.BATCHES]

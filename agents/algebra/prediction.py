@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.models import jets
 from analysis.models.algebra import product, sum_over
-from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.arrays import Array, Integers
 from analysis.models.pursuit import Sighting, Target, diffusion, transition
 
 
@@ -79,12 +79,3 @@ def detected(target: Target, last: Prediction, now: Integers, sighting: Sighting
         product(closed, P, np.swapaxes(closed, -1, -2)) + R[..., None, None] * product(L, np.swapaxes(L, -1, -2)) + W
     )
     return Prediction(corrected, covariance, now)
-
-
-def chosen(where: Mask, one: Prediction, other: Prediction) -> Prediction:
-    """The one where a mask (...) says so, the other elsewhere."""
-    return Prediction(
-        mean=np.where(where[..., None, None], one.mean, other.mean),
-        covariance=np.where(where[..., None, None], one.covariance, other.covariance),
-        made=np.where(where, one.made, other.made),
-    )

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from agents.algebra import smoothing, starts
-from agents.algebra.prediction import Prediction, chosen, detected, predicted
+from agents.algebra.prediction import Prediction, detected, predicted
 from agents.algebra.redcho import Consensus
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_edges
@@ -23,7 +24,7 @@ from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
 from agents.swarm import SwarmBrief
 from analysis.models.algebra import sum_over
-from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 from analysis.models.finding import Finding
 from analysis.models.information import numbers, packed, position_jet, unpacked
 from analysis.models.pursuit import Sighting, Target
@@ -187,9 +188,7 @@ class TargetEstimator(Estimator[Track]):
         if self.fusion == "none":
             return state, {}
         own = packed(*self._information(brief, state))
-        told = (
-            np.moveaxis(own, 0, -2) if self.fusion == "mean" else self._consensus(brief).outputs(own, state.internal)[0]
-        )
+        told = np.moveaxis(own, 0, -2) if self.fusion == "mean" else self._consensus.outputs(own, state.internal)[0]
         return state, {TARGET: {"information": told}}
 
     def fuse(self, brief: Brief, state: Track, heard: Mapping[str, Heard], own: Own) -> tuple[Track, Estimate]:
@@ -229,8 +228,7 @@ class TargetEstimator(Estimator[Track]):
             )
             found.append(Finding("information", "note", says))
         if self.fusion == "redcho":
-            consensus = Consensus(len(self.k) - 1, self.theta, tuple(self.k), tuple(self.gamma))
-            found += consensus.findings(swarm.dt, aided=self.derivatives == "own")
+            found += self._consensus.findings(swarm.dt, aided=self.derivatives == "own")
         return found
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
@@ -240,7 +238,7 @@ class TargetEstimator(Estimator[Track]):
         if self.fusion == "mean":
             counted = sum_over(np.where(fresh[..., None, None], theirs, 0.0), -3)
             return state, (own + np.moveaxis(counted, -2, 0)) / (1 + fresh.sum(axis=-1))[..., None]
-        consensus = self._consensus(brief)
+        consensus = self._consensus
         agreed = consensus.outputs(own, state.internal)
         # Both ends of an edge have to pull alike, or the mean drifts: what was said last counts for a while.
         held, silent = np.where(fresh[..., None], theirs, state.theirs), np.where(fresh, 0, state.silent + 1)
@@ -267,23 +265,19 @@ class TargetEstimator(Estimator[Track]):
     def _information(self, brief: Brief, state: Track) -> tuple[Array, Array]:
         """Jets of information matrix (m + 1, ..., m, m) and vectors (m + 1, ..., m, D)."""
         target = _target(brief)
-        match self.output:
-            case "optimal":
-                return predicted(target, state.last, state.now, brief.dt)
-            case "smooth":
-                share = self._share(target, state, brief.dt)
-                older, newer = (predicted(target, one, state.now, brief.dt) for one in (state.before, state.last))
-                return smoothing.mixed(older[0], newer[0], share), smoothing.mixed(older[1], newer[1], share)
-            case "spline":
-                passed, seconds = _passed(target, state, brief.dt)
-                older, newer = (predicted(target, one, one.made, brief.dt) for one in (state.before, state.last))
-                return (
-                    smoothing.splined(older[0], newer[0], passed, seconds),
-                    smoothing.splined(older[1], newer[1], passed, seconds),
-                )
-            case "low-pass":
-                leaving = smoothing.last_of(state.stages, 1.0 / self.lag)
-                return unpacked(leaving, brief.dimension, target.order)
+        if self.output == "optimal":
+            return predicted(target, state.last, state.now, brief.dt)
+        if self.output == "low-pass":
+            leaving = smoothing.last_of(state.stages, 1.0 / self.lag)
+            return unpacked(leaving, brief.dimension, target.order)
+        both = Prediction(*(np.stack(pair) for pair in zip(state.before, state.last, strict=True)))
+        if self.output == "smooth":
+            share = self._share(target, state, brief.dt)
+            Q, y = (smoothing.mixed(*_pair(jet), share) for jet in predicted(target, both, state.now, brief.dt))
+        else:
+            way = _passed(target, state, brief.dt)
+            Q, y = (smoothing.splined(*_pair(jet), *way) for jet in predicted(target, both, both.made, brief.dt))
+        return Q, y
 
     def _share(self, target: Target, state: Track, dt: float) -> Array:
         """The jet of eta, shape (m + 1, ...); all of the only estimate there is, before the first detection."""
@@ -292,14 +286,20 @@ class TargetEstimator(Estimator[Track]):
         alone = np.concatenate([np.ones((1, *passed.shape)), np.zeros((target.order, *passed.shape))])
         return np.where(state.settled, share, alone)
 
-    def _consensus(self, brief: Brief) -> Consensus:
-        return Consensus(_target(brief).order, self.theta, tuple(self.k), tuple(self.gamma))
+    @cached_property
+    def _consensus(self) -> Consensus:
+        return Consensus(len(self.k) - 1, self.theta, tuple(self.k), tuple(self.gamma))
 
 
 def _target(brief: Brief) -> Target:
     if brief.target is None:
         raise Unsuited("this estimator needs a target: give the scenario a [target]")
     return brief.target
+
+
+def _pair(of_both: Array) -> tuple[Array, Array]:
+    """The jets of the older and of the newer prediction, of those of both (m + 1, 2, ...)."""
+    return of_both[:, 0], of_both[:, 1]
 
 
 def _passed(target: Target, state: Track, dt: float) -> tuple[Array, Array]:

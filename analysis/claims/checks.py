@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import rankdata
 
 from analysis.claims import intervals
 from analysis.claims.intervals import Decision, Interval, all_of
@@ -251,6 +250,8 @@ def follows(says: str, seconds: Array, values: Array, others: Array, defined: Ma
 
 def _rank_correlation(values: Array, others: Array) -> Array:
     """Spearman's, of series (P, T), shape (P,); NaN where a value is none."""
+    from scipy.stats import rankdata  # takes half a second, in every process that flies cases
+
     ranks = [rankdata(each, axis=1) for each in (values, others)]  # what is equal shares its ranks
     one, other = (each - each.mean(axis=1, keepdims=True) for each in ranks)
     with np.errstate(invalid="ignore"):  # what is the same all the time rises and falls with nothing

@@ -9,7 +9,7 @@ import pytest
 
 from affinet.planning import making
 from affinet.scenario import loading
-from agents.agent import Agent, renew
+from agents.agent import Agent
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
@@ -24,6 +24,7 @@ from agents.estimators.silent import SilentEdgeFilter
 from agents.exchange import Heard
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.single import ConstantVelocity, Rest, Static, VaryingVelocity
+from analysis.models.arrays import chosen
 
 TICKS, RUNS, LATE = 10, 3, 3
 
@@ -230,6 +231,6 @@ def test_a_restarted_agent_is_a_fresh_one_and_the_others_go_on(estimator, plans)
     agent, links = agent_of(plans[2], estimator, "constant-velocity"), plans[2].world.links
     *_, (_, _, _, flown) = fly_together(agent, links, *draw(agent, links, 1, ()))
     restarted, new = np.arange(10) == 4, agent.init((10,))
-    for now, fresh, before in zip(leaves(renew(flown, new, restarted)), leaves(new), leaves(flown), strict=True):
+    for now, fresh, before in zip(leaves(chosen(restarted, new, flown)), leaves(new), leaves(flown), strict=True):
         assert now[restarted].tobytes() == fresh[restarted].tobytes()
         assert now[~restarted].tobytes() == before[~restarted].tobytes()

@@ -95,12 +95,17 @@ def test_a_grid_is_what_flies_and_not_what_is_said_of_it(two):
 
 
 def test_a_grid_is_of_the_scenario_as_it_is(tmp_path):
-    def grid(sigma):
-        (tmp_path / "own.toml").write_text(ROOT_OF_RIGID.replace("samples = 10", f"samples = {sigma}"))
+    def grid(old, new):
+        assert old in ROOT_OF_RIGID
+        (tmp_path / "own.toml").write_text(ROOT_OF_RIGID.replace(old, new))
         (tmp_path / "two.toml").write_text(STUDY.replace('"rigid"', '"own.toml"'))
         return record.grid(study.load(str(tmp_path / "two.toml")), quick=True)
 
-    assert grid(10) == grid(10) != grid(11)
+    asked = grid("samples = 10", "samples = 10")
+    assert grid("samples = 10", "samples = 11") != asked
+    # What it leaves out, as it does keys to come, is the same as the default of it.
+    assert grid('preset = "hexa10"', 'preset = "hexa10"\nscale = 1.0') == asked
+    assert grid('preset = "hexa10"', 'preset = "hexa10"\nscale = 2.0') != asked
 
 
 @pytest.mark.parametrize(

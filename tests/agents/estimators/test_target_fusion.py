@@ -93,7 +93,7 @@ def test_what_was_lost_counts_in_redcho_as_what_was_said_last_and_before_that_fo
     held, _, mine = hearing(redcho, once, np.full((3, 2), nan), ~all_heard, tick=1)
     last = np.where(np.array(PARTLY)[..., None], once.theirs, mine[:, None])
     agents = replace(brief(np.ones((3, 2, 2))), target=target_of())
-    expected = redcho._consensus(agents).step(once.internal, mine, last, agents.dt)
+    expected = redcho._consensus.step(once.internal, mine, last, agents.dt)
     np.testing.assert_allclose(held.internal, expected, rtol=1e-12, atol=1e-12)
     assert np.abs(held.internal - once.internal).max() > 1e-3
 
@@ -109,7 +109,7 @@ def test_what_was_said_last_counts_in_redcho_for_as_many_ticks_as_it_is_held_and
         before = state
         state, _, mine = hearing(redcho, state, np.full((3, 2), np.nan), nobody, tick=silent)
         counted = np.where(heard & (silent <= hold), said, mine[:, None])
-        expected = redcho._consensus(agents).step(before.internal, mine, counted, agents.dt)
+        expected = redcho._consensus.step(before.internal, mine, counted, agents.dt)
         np.testing.assert_allclose(state.internal, expected, rtol=1e-12, atol=1e-12)
         # Of those whom it has never heard, an agent holds nothing.
         pulled = np.abs(counted - mine[:, None]).max(axis=(1, 2)) > 1e-3
@@ -117,7 +117,7 @@ def test_what_was_said_last_counts_in_redcho_for_as_many_ticks_as_it_is_held_and
     # Who is heard again counts again, and is held again.
     again, *_ = hearing(redcho, state, shares, PARTLY, tick=6)
     after, _, mine = hearing(redcho, again, np.full((3, 2), np.nan), nobody, tick=7)
-    alone = redcho._consensus(agents).step(again.internal, mine, mine[:, None], agents.dt)
+    alone = redcho._consensus.step(again.internal, mine, mine[:, None], agents.dt)
     assert (np.abs(after.internal - alone).max(axis=(1, 2)) > 1e-3).tolist() == [hold > 0, False, hold > 0]
 
 

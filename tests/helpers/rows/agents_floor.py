@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from briefs import BRIEF, of_all
 
-from agents import agent, estimate
+from agents import estimate
 from agents.algebra import (
     blocks,
     completion,
@@ -29,7 +29,6 @@ from agents.estimate import Estimate
 from agents.estimators import edge_kf, joint_kf, ral
 from agents.estimators.centralized import SwarmFilter, Whole
 from agents.estimators.conral import Indicator
-from agents.estimators.none import LastMeasured
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Heard
 from agents.laws import base, leaders
@@ -101,12 +100,6 @@ def _completed(relative, known, measured, seen, theta, spread):
 
 
 CASES = {
-    "agents.agent.renew": of(
-        lambda new, one, other: agent.renew(LastMeasured(one, one), LastMeasured(other, one), new),
-        truth(),
-        real(9),
-        real(9),
-    ),
     "agents.brief.Brief.degree": of(lambda stress: replace(BRIEF, stress=stress).degree, real(NEIGHBOURS)),
     **{
         name: of(
@@ -224,10 +217,6 @@ CASES = {
             TARGET, Prediction(mean, spread, made), now + 50, Sighting(where, done, method, method), 2.0, 0.013
         ),
         *(real(3, 2), covariance(3, 3), whole(50), whole(99), real(2), truth(), whole(2)),
-    ),
-    "agents.algebra.prediction.chosen": of(
-        lambda where, *both: prediction.chosen(where, Prediction(*both[:3]), Prediction(*both[3:])),
-        *(truth(), real(3, 2), covariance(3, 3), whole(50), real(3, 2), covariance(3, 3), whole(50)),
     ),
     "agents.algebra.smoothing.passed_over": of(
         lambda passed, seconds: smoothing.passed_over(passed, 1.0 / seconds, 0.3, 3), share(), share(), out=1

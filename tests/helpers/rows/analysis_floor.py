@@ -31,6 +31,9 @@ def _of_edges(function):
 
 CASES = {
     "analysis.models.arrays.chosen": of(arrays.chosen, truth(), real(9, 2), real(9, 2)),
+    "analysis.models.arrays.chosen (tuples)": of(
+        lambda which, one, other: arrays.chosen(which, (one, (one,)), (other, (other,))), truth(), real(9), real(9)
+    ),
     "analysis.models.elementary.whole_power": of(lambda x: elementary.whole_power(x, 3), real(), rows=MANY),
     "analysis.models.elementary.whole_powers": of(lambda x: elementary.whole_powers(x, 4), real(), rows=MANY),
     "analysis.models.elementary.power": of(elementary.power, share(), real(), rows=MANY),
