@@ -76,7 +76,7 @@ class Affine:
         """Least squares (10)."""
         gram = geometry.gram(relative, seen)
         feasible = self.feasible(gram)
-        theta = product(_cross(relative, measured), geometry.inverse_gram(gram, feasible))
+        theta = product(geometry.cross(relative, measured, seen), geometry.inverse_gram(gram, feasible))
         return _fitted(theta, feasible, gram)
 
     def nearest(self, theta: Array) -> Array:
@@ -86,8 +86,7 @@ class Affine:
     def covariance(self, shape: Fit, relative: Array, R: Array) -> Array:
         """(p_ij^T (H H^T)^-1 p_ij) R, which is (12) with one R for all edges and an identity of size N_i,k (errata)."""
         inverse_gram = geometry.inverse_gram(shape.gram, self.feasible(shape.gram))
-        leverage = (product(relative, inverse_gram) * relative).sum(axis=-1)
-        return leverage[..., None, None] * R
+        return geometry.leverage(inverse_gram, relative)[..., None, None] * R
 
 
 class Scaling:
@@ -102,7 +101,9 @@ class Scaling:
         """Least squares, coordinate by coordinate."""
         gram = geometry.gram(relative, seen)
         feasible = self.feasible(gram)
-        factors = _diagonal(_cross(relative, measured)) / np.where(feasible[..., None], _diagonal(gram), 1.0)
+        factors = _diagonal(geometry.cross(relative, measured, seen)) / np.where(
+            feasible[..., None], _diagonal(gram), 1.0
+        )
         return _fitted(factors[..., None] * geometry.identity(relative.shape[-1]), feasible, gram)
 
     def nearest(self, theta: Array) -> Array:
@@ -131,7 +132,7 @@ class Rotation:
     def fit(self, relative: Array, measured: Array, seen: Mask) -> Fit:
         """U V^T of Y H^T, with the determinant fixed to +1 (Table III and errata)."""
         gram = geometry.gram(relative, seen)
-        return _fitted(rotation(_cross(relative, measured)), self.feasible(gram), gram)
+        return _fitted(rotation(geometry.cross(relative, measured, seen)), self.feasible(gram), gram)
 
     def nearest(self, theta: Array) -> Array:
         """The rotation in it."""
@@ -193,10 +194,6 @@ MAPS: Mapping[Constraint, Maps] = {
     "rotation": Rotation(),
     "similarity": Similarity(),
 }
-
-
-def _cross(relative: Array, measured: Array) -> Array:
-    return product(np.swapaxes(measured, -1, -2), relative)
 
 
 def _fitted(theta: Array, feasible: Mask, gram: Array) -> Fit:

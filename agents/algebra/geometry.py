@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.algebra.small import determinant, inverse
-from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import whole_power
+from analysis.models.kernels import Plain, kernel
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 SINGULAR = 1e-9
@@ -44,8 +44,27 @@ def gram(relative: Array, seen: Mask) -> Array:
     seen
         Shape (..., n).
     """
-    H = np.where(seen[..., None], relative, 0.0)
-    return product(np.swapaxes(H, -1, -2), H)
+    return cross(relative, relative, seen)
+
+
+def cross(relative: Array, measured: Array, seen: Mask) -> Array:
+    """Y H^T over the edges seen, shape (..., D, D), in square metres; both (..., n, D), and seen (..., n)."""
+    crossed: Array = _crossed(relative, measured, seen)
+    return crossed
+
+
+@kernel("(n,D),(n,D),(n)->(D,D)", "dd?->d")
+def _crossed(D: int) -> Plain:
+    def plain(relative: Array, measured: Array, seen: Mask, crossed: Array) -> None:
+        for i in range(D):
+            for j in range(D):
+                summed = 0.0
+                for edge in range(len(seen)):
+                    if seen[edge]:
+                        summed += measured[edge, i] * relative[edge, j]
+                crossed[i, j] = summed
+
+    return plain
 
 
 def regular(gram: Array) -> Mask:
@@ -63,7 +82,40 @@ def inverse_gram(gram: Array, feasible: Mask) -> Array:
 
 def apply(theta: Array, relative: Array) -> Array:
     """Relative positions Theta p_ij under a map (..., D, D), shape (..., n, D) (eq. 11)."""
-    return product(relative, np.swapaxes(theta, -1, -2))
+    placed: Array = _placed(theta, relative)
+    return placed
+
+
+@kernel("(D,D),(n,D)->(n,D)", "dd->d")
+def _placed(D: int) -> Plain:
+    def plain(theta: Array, relative: Array, placed: Array) -> None:
+        for edge in range(len(relative)):
+            for i in range(D):
+                summed = 0.0
+                for j in range(D):
+                    summed += theta[i, j] * relative[edge, j]
+                placed[edge, i] = summed
+
+    return plain
+
+
+def leverage(inverse_gram: Array, relative: Array) -> Array:
+    """p_ij^T (H H^T)^-1 p_ij of each edge, shape (..., n)."""
+    found: Array = _levered(inverse_gram, relative)
+    return found
+
+
+@kernel("(D,D),(n,D)->(n)", "dd->d")
+def _levered(D: int) -> Plain:
+    def plain(inverse_gram: Array, relative: Array, found: Array) -> None:
+        for edge in range(len(relative)):
+            summed = 0.0
+            for i in range(D):
+                for j in range(D):
+                    summed += relative[edge, i] * inverse_gram[i, j] * relative[edge, j]
+            found[edge] = summed
+
+    return plain
 
 
 def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
@@ -80,17 +132,43 @@ def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
     counts
         Which of them count, shape (..., n).
     """
-    difference = theirs - own.theta[..., None, :, :]
-    number = counts.sum(axis=-1)
-    mean = sum_over(total(counts, difference * difference), (-2, -1)) / np.maximum(number, 1)
-    return np.where(own.feasible & (number > 0), mean, np.nan)
+    found: Array = _indicated(own.theta, own.feasible, theirs, counts)
+    return found
+
+
+@kernel("(D,D),(),(n,D,D),(n)->()", "d?d?->d")
+def _indicated(D: int) -> Plain:
+    def plain(own: Array, feasible: bool, theirs: Array, counts: Mask, found: Array) -> None:
+        number, summed = 0, 0.0
+        for edge in range(len(counts)):
+            if counts[edge]:
+                number += 1
+                for i in range(D):
+                    for j in range(D):
+                        difference = theirs[edge, i, j] - own[i, j]
+                        summed += difference * difference
+        found[0] = summed / number if feasible and number > 0 else np.nan
+
+    return plain
 
 
 def total(counts: Mask, maps: Array) -> Array:
     """Sum of the maps (..., n, D, D) that count, shape (..., D, D)."""
-    flat = maps.reshape(*maps.shape[:-2], -1)
-    summed = product(counts[..., None, :].astype(np.float64), flat)
-    return summed.reshape(*maps.shape[:-3], *maps.shape[-2:])
+    summed: Array = _summed(counts, maps)
+    return summed
+
+
+@kernel("(n),(n,D,D)->(D,D)", "?d->d")
+def _summed(D: int) -> Plain:
+    def plain(counts: Mask, maps: Array, summed: Array) -> None:
+        for i in range(D):
+            for j in range(D):
+                summed[i, j] = 0.0
+                for edge in range(len(counts)):
+                    if counts[edge]:
+                        summed[i, j] += maps[edge, i, j]
+
+    return plain
 
 
 @cache

@@ -1,8 +1,7 @@
 """The Kalman core: predict and correct, over stacks of independent filters.
 
 The state of one relative edge stacks position, velocity and acceleration, D numbers each, as far as the model of motion has
-them, so that the observed position is its first D entries. Sums run in `matmul`, matrix by matrix: a stack of filters gives
-the bits of each alone.
+them, so that the observed position is its first D entries.
 """
 
 from __future__ import annotations
@@ -13,9 +12,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import inverse
+from agents.algebra.small import invert
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
+from analysis.models.kernels import Plain, kernel, scratch
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 
@@ -24,7 +24,7 @@ ORDER: Mapping[Model, int] = {"random-walk": 1, "constant-velocity": 2, "constan
 
 
 @cache
-def motion(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
+def motion(model: Model, dt: float, sigma_w: float) -> tuple[Array, Array]:
     """Transition F and process covariance Q of a model of motion.
 
     The model of paper 000, (20)-(21), is "constant-acceleration". The others end the Taylor series earlier: what drives them is
@@ -34,8 +34,6 @@ def motion(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Arr
     ----------
     model
         Which.
-    dimension
-        D.
     dt
         Tick, in seconds.
     sigma_w
@@ -45,16 +43,16 @@ def motion(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Arr
     Returns
     -------
     tuple of Array
-        Both (S, S), with S = 3 D, 2 D or D; ordered (position, velocity, acceleration).
+        Both (O, O), of the O derivatives of one axis: all axes are alike, and independent.
     """
-    F, Q = embedded(model, dimension, dt, sigma_w)
-    size = ORDER[model] * dimension
-    return F[:size, :size], Q[:size, :size]
+    F, Q = embedded(model, dt, sigma_w)
+    order = ORDER[model]
+    return F[:order, :order], Q[:order, :order]
 
 
 @cache
-def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[Array, Array]:
-    """A model of motion in a state of three derivatives, whichever it has itself: F and Q, both (3 D, 3 D).
+def embedded(model: Model, dt: float, sigma_w: float) -> tuple[Array, Array]:
+    """A model of motion in a state of three derivatives, whichever it has itself: F and Q, both (3, 3), of one axis.
 
     The first derivative that the model leaves out is the noise that drives it, a fresh one in every tick; those beyond are 0.
     The rest moves exactly as in `motion`.
@@ -63,18 +61,15 @@ def embedded(model: Model, dimension: int, dt: float, sigma_w: float) -> tuple[A
     ----------
     model
         Of motion.
-    dimension, dt
-        D, and the tick, in seconds.
+    dt
+        Tick, in seconds.
     sigma_w
         Deviation of the noise that drives it.
     """
     order = ORDER[model]
     taylor = np.array([[1.0, dt, dt * dt / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-    transition = np.where(np.arange(3) < order, taylor, 0.0)
     deflection = np.array([dt, 1.0, 0.0]) if model == "random-walk" else np.array([dt * dt / 2, dt, 1.0])
-    axes = np.eye(dimension)
-    F, Q = np.kron(transition, axes), sigma_w * sigma_w * np.kron(np.outer(deflection, deflection), axes)
-    return np.asarray(F, dtype=np.float64), np.asarray(Q, dtype=np.float64)
+    return np.where(np.arange(3) < order, taylor, 0.0), sigma_w * sigma_w * np.outer(deflection, deflection)
 
 
 def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float]) -> tuple[Array, Array]:
@@ -95,8 +90,46 @@ def unknown(shape: tuple[int, ...], dimension: int, deviations: Sequence[float])
 
 
 def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, Array]:
-    """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S)."""
-    return product(mean, F.T), product(F, covariance, F.T) + Q
+    """One step ahead (Algorithm 1, lines 4-5): mean (..., S), covariance (..., S, S).
+
+    Parameters
+    ----------
+    mean, covariance
+        Of filters, shapes (..., S) and (..., S, S).
+    F, Q
+        Of a model of motion, by derivatives, shape (..., O, O); the former upper triangular.
+    """
+    ahead: tuple[Array, Array] = _ahead(mean, covariance, F, Q)
+    return ahead
+
+
+@kernel("(S),(S,S),(O,O),(O,O)->(S),(S,S)", "dddd->dd")
+def _ahead(S: int, O: int) -> Plain:  # noqa: E741
+    D = S // O
+
+    def plain(mean: Array, P: Array, F: Array, Q: Array, ahead: Array, spread: Array) -> None:
+        FP = scratch(O, O)
+        for one in range(D):
+            for order in range(O):
+                moved = 0.0
+                for higher in range(order, O):
+                    moved += F[order, higher] * mean[higher * D + one]
+                ahead[order * D + one] = moved
+            for other in range(D):
+                for order in range(O):
+                    for column in range(O):
+                        moved = 0.0
+                        for higher in range(order, O):
+                            moved += F[order, higher] * P[higher * D + one, column * D + other]
+                        FP[order, column] = moved
+                for order in range(O):
+                    for column in range(O):
+                        moved = Q[order, column] if one == other else 0.0
+                        for higher in range(column, O):
+                            moved += FP[order, higher] * F[column, higher]
+                        spread[order * D + one, column * D + other] = moved
+
+    return plain
 
 
 class Corrected(NamedTuple):
@@ -124,13 +157,48 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     usable
         Where there is an observation, shape (...); the others are left as predicted.
     """
-    dimension = observed.shape[-1]
-    innovation = observed - mean[..., :dimension]
-    precision = inverse(covariance[..., :dimension, :dimension] + R)
-    gain = np.where(usable[..., None, None], product(covariance[..., :dimension], precision), 0.0)
-    corrected = mean + product(gain, innovation[..., None])[..., 0]
-    left = covariance - product(gain, covariance[..., :dimension, :])
-    return Corrected(corrected, left, normalised(innovation, precision, usable))
+    return Corrected(*_corrected(mean, covariance, observed, R, usable))
+
+
+@kernel("(S),(S,S),(D),(D,D),()->(S),(S,S),()", "dddd?->ddd")
+def _corrected(S: int, D: int) -> Plain:
+    def plain(
+        mean: Array, P: Array, observed: Array, R: Array, usable: bool, corrected: Array, left: Array, nis: Array
+    ) -> None:
+        if not usable:
+            for row in range(S):
+                corrected[row] = mean[row]
+                for column in range(S):
+                    left[row, column] = P[row, column]
+            nis[0] = np.nan
+            return
+        doubt, precision, pull, gain = scratch(D, D), scratch(D, D), scratch(D, 1), scratch(D, 1)
+        for i in range(D):
+            for j in range(D):
+                doubt[i, j] = P[i, j] + R[i, j]
+        invert(doubt, precision)
+        surprise = 0.0
+        for i in range(D):
+            pull[i, 0] = 0.0
+            for j in range(D):
+                pull[i, 0] += precision[i, j] * (observed[j] - mean[j])
+            surprise += (observed[i] - mean[i]) * pull[i, 0]
+        nis[0] = surprise
+        for row in range(S):
+            moved = mean[row]
+            for i in range(D):
+                moved += P[row, i] * pull[i, 0]
+                gain[i, 0] = 0.0
+                for j in range(D):
+                    gain[i, 0] += P[row, j] * precision[j, i]
+            corrected[row] = moved
+            for column in range(S):
+                known = P[row, column]
+                for i in range(D):
+                    known -= gain[i, 0] * P[i, column]
+                left[row, column] = known
+
+    return plain
 
 
 def normalised(innovation: Array, precision: Array, made: Mask) -> Array:

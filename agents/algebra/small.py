@@ -1,6 +1,6 @@
-"""Determinant, inverse and nearest rotation of stacks of D x D matrices: closed form in two dimensions, LAPACK in three.
+"""Determinant, inverse and nearest rotation of stacks of D x D matrices: closed forms where there are any, or LAPACK.
 
-At this size a call into LAPACK is mostly preparation; an agent makes two of each in every tick.
+At this size a call into LAPACK is mostly preparation.
 """
 
 from __future__ import annotations
@@ -13,24 +13,23 @@ from numpy.typing import NDArray
 from analysis.models.algebra import product
 from analysis.models.arrays import Array
 from analysis.models.elementary import hypot
+from analysis.models.kernels import Part, Plain, kernel, scratch
 
-_CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
+_CLOSED = 3  # the largest size for which there is a closed form
 
 
 def determinant(matrix: Array) -> Array:
     """Determinants, shape (...), of matrices (..., D, D)."""
-    if matrix.shape[-1] != 2:
-        return np.asarray(np.linalg.det(matrix), dtype=np.float64)
-    product: Array = matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
-    return product
+    found: Array = _determinants(matrix)
+    return found
 
 
 def inverse(matrix: Array) -> Array:
     """Inverses of regular matrices (..., D, D)."""
-    if matrix.shape[-1] != 2:
+    if matrix.shape[-1] > _CLOSED:
         return _inverted(matrix)
-    adjugate = np.swapaxes(matrix[..., ::-1, ::-1], -1, -2) * _CHECKERED
-    return np.asarray(adjugate / determinant(matrix)[..., None, None], dtype=np.float64)
+    inverted: Array = _inverses(matrix)
+    return inverted
 
 
 def _inverted(matrix: Array) -> Array:
@@ -42,6 +41,44 @@ def _inverted(matrix: Array) -> Array:
         regular = (np.linalg.slogdet(matrix).sign != 0.0)[..., None, None]
         inverted = np.linalg.inv(np.where(regular, matrix, np.eye(matrix.shape[-1])))
         return np.where(regular, inverted, np.nan)
+
+
+@Part
+def invert(matrix: Array, inverse: Array) -> float:
+    """Fill in the inverse of a matrix (D, D) by its adjugate, and give its determinant."""
+    if len(matrix) == 1:
+        determinant = matrix[0, 0]
+        inverse[0, 0] = 1.0
+    elif len(matrix) == 2:
+        determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+        inverse[0, 0], inverse[1, 1] = matrix[1, 1], matrix[0, 0]
+        inverse[0, 1], inverse[1, 0] = -matrix[0, 1], -matrix[1, 0]
+    else:
+        for row in range(3):
+            for column in range(3):
+                up, down, left, right = (column + 1) % 3, (column + 2) % 3, (row + 1) % 3, (row + 2) % 3
+                inverse[row, column] = matrix[up, left] * matrix[down, right] - matrix[up, right] * matrix[down, left]
+        determinant = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[1, 0] + matrix[0, 2] * inverse[2, 0]
+    for row in range(len(matrix)):
+        for column in range(len(matrix)):
+            inverse[row, column] /= determinant
+    return determinant
+
+
+@kernel("(D,D)->(D,D)", "d->d")
+def _inverses(_: int) -> Plain:
+    def plain(matrix: Array, inverse: Array) -> None:
+        invert(matrix, inverse)
+
+    return plain
+
+
+@kernel("(D,D)->()", "d->d")
+def _determinants(D: int) -> Plain:
+    def plain(matrix: Array, found: Array) -> None:
+        found[0] = invert(matrix, scratch(D, D))
+
+    return plain
 
 
 def rotation(matrix: Array) -> Array:

@@ -83,11 +83,11 @@ class InteractingMultipleModel(Estimator[Modes]):
 
     def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
         """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""
-        F, Q, chain = self._models(brief.dimension, brief.dt)
+        F, Q, chain = self._models(brief.dt)
         expected = product(state.probability[..., None, :], chain)[..., 0, :]
         weights = chain * state.probability[..., :, None] / expected[..., None, :]
         mean, covariance = _mix(state.mean, state.covariance, weights)
-        mean, covariance = product(F, mean[..., None])[..., 0], product(F, covariance, np.swapaxes(F, -1, -2)) + Q
+        mean, covariance = kalman.predict(mean, covariance, F, Q)
         place, doubt = self._predicted(mean, covariance, expected, brief.dimension)
         R = brief.sensor.weight(measured, place, doubt)
         nis = kalman.normalised(measured - place, inverse(doubt + R), seen)
@@ -123,16 +123,16 @@ class InteractingMultipleModel(Estimator[Modes]):
         mixed = _mix(place, doubt, probability[..., :, None])
         return mixed[0][..., 0, :], mixed[1][..., 0, :, :]
 
-    def _models(self, dimension: int, dt: float) -> tuple[Array, Array, Array]:
+    def _models(self, dt: float) -> tuple[Array, Array, Array]:
         sigmas = (self.sigma_constant_acceleration, self.sigma_constant_velocity, self.sigma_random_walk)
-        return _stacked(dimension, dt, sigmas, self.stay)
+        return _stacked(dt, sigmas, self.stay)
 
 
 @cache
-def _stacked(dimension: int, dt: float, sigmas: tuple[float, float, float], stay: float) -> tuple[Array, Array, Array]:
-    """F and Q of all models, (3, S, S) each, and the Markov chain (3, 3) between them, from the row to the column."""
+def _stacked(dt: float, sigmas: tuple[float, float, float], stay: float) -> tuple[Array, Array, Array]:
+    """F and Q of all models, (3, O, O) each, and the Markov chain (3, 3) between them, from the row to the column."""
     names: tuple[kalman.Model, ...] = ("constant-acceleration", "constant-velocity", "random-walk")
-    pairs = [kalman.embedded(name, dimension, dt, sigma) for name, sigma in zip(names, sigmas, strict=True)]
+    pairs = [kalman.embedded(name, dt, sigma) for name, sigma in zip(names, sigmas, strict=True)]
     chain = np.full((3, 3), (1.0 - stay) / 2) + (stay - (1.0 - stay) / 2) * np.eye(3)
     return np.stack([F for F, _ in pairs]), np.stack([Q for _, Q in pairs]), chain
 

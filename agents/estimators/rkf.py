@@ -63,7 +63,7 @@ class EdgeFilters:
 
     def ahead(self, brief: Brief, tracks: Tracks) -> tuple[Array, Array]:
         """Mean and covariance of all filters one tick ahead."""
-        F, Q = kalman.motion(self.model, brief.dimension, brief.dt, self.sigma_w)
+        F, Q = kalman.motion(self.model, brief.dt, self.sigma_w)
         return kalman.predict(tracks.mean, tracks.covariance, F, Q)
 
     def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
