@@ -13,6 +13,7 @@ from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
 from analysis.models.arrays import Array, Integers, Mask, chosen
+from netem.medium.picking import picked
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks
@@ -131,18 +132,23 @@ class ArrayCarrier:
         row, links = self._channels.index(channel), self._links
         content = np.where(links.present, delivery.newest[row, links.slots], -1)
         fresh = content >= 0
-        spoken = np.unique(content[fresh]).tolist() or [tick]
-        gathered = {name: self._gather(channel, name, content, spoken) for name in self._fields[channel]}
-        mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
-        fields = self._changed(gathered, row, content, mark) if mark.any() else gathered
+        fields = self._gathered(tick, channel, content, fresh)
+        if delivery.mark.any():
+            mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
+            fields = self._changed(fields, row, content, mark) if mark.any() else fields
         return Heard(fields, fresh, np.where(fresh, tick - content, 0))
 
-    def _gather(self, channel: str, field: str, content: Integers, spoken: list[int]) -> Any:
-        gathered = np.zeros(0)
-        for number, tick in enumerate(spoken):
-            values = self._relay.said(tick)[channel][field][self._links.neighbours]
-            gathered = chosen(content == tick, values, np.zeros_like(values) if number == 0 else gathered)
-        return gathered
+    def _gathered(self, tick: int, channel: str, content: Integers, fresh: Mask) -> dict[str, Any]:
+        """What arrives of what was said, in one tick or in several."""
+        spoken, said = [tick], np.where(fresh, 0, -1)
+        if content.min(where=fresh, initial=tick) < tick:
+            spoken = np.unique(content[fresh]).tolist()
+            said = np.where(fresh, np.searchsorted(spoken, content), -1)
+        broadcasts = [self._relay.said(one)[channel] for one in spoken]
+        return {
+            name: picked([one[name] for one in broadcasts], said, self._links.neighbours)
+            for name in self._fields[channel]
+        }
 
     def _changed(self, fields: dict[str, Any], row: int, content: Integers, mark: Marks) -> dict[str, Any]:
         struck = np.nonzero(changed_on_the_way(mark))

@@ -7,6 +7,7 @@ import numpy as np
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import log, whole_power
+from analysis.models.kernels import Plain, kernel
 
 
 def tracking_error(position: Array, target: Array, present: Mask) -> Array:
@@ -24,15 +25,28 @@ def tracking_error(position: Array, target: Array, present: Mask) -> Array:
     Array
         Shape (...); NaN where nobody is present.
     """
-    squared = sum_over(whole_power(position - target, 2), -1)
-    number = present.sum(axis=-1)
-    total = sum_over(np.where(present, squared, 0.0), -1)
-    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    error: Array = _mean_squares(position, target, present)
+    return error
+
+
+@kernel("(n,D),(n,D),(n)->()", "dd?->d")
+def _mean_squares(D: int) -> Plain:
+    def plain(position: Array, target: Array, present: Mask, error: Array) -> None:
+        number, total = 0, 0.0
+        for agent in range(len(present)):
+            if present[agent]:
+                number += 1
+                for axis in range(D):
+                    astray = position[agent, axis] - target[agent, axis]
+                    total += astray * astray
+        error[0] = total / number if number else np.nan
+
+    return plain
 
 
 def root_mean_square(vectors: Array, present: Mask) -> Array:
     """Of vectors (..., N, D) over the agents present (..., N), shape (...), in their unit; NaN where nobody is present."""
-    return np.sqrt(tracking_error(vectors, np.zeros_like(vectors), present))
+    return np.sqrt(tracking_error(vectors, np.zeros(vectors.shape[-2:]), present))
 
 
 def procrustes_error(position: Array, nominal: Array, present: Mask) -> Array:
@@ -73,8 +87,8 @@ def change_of_step(position: Array, present: Mask) -> Array:
     present
         Agents that take part, shape (..., N).
     """
-    steps = np.diff(position, axis=-3)
-    return root_mean_square(steps[..., 1, :, :] - steps[..., 0, :, :], present)
+    last, step = position[..., 2, :, :], position[..., 1, :, :] - position[..., 0, :, :]
+    return np.sqrt(tracking_error(last - position[..., 1, :, :], step, present))
 
 
 def rate_of_fall(seconds: Array, error: Array) -> Array:

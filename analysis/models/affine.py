@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.models.algebra import product
 from analysis.models.arrays import Array, Integers
+from analysis.models.kernels import Plain, kernel
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Manoeuvre:
 
         Ticks and agents broadcast against each other; before its first and after its last tick the manoeuvre rests.
         """
-        reached = np.clip(tick, 0, len(self.theta) - 1)
-        return product(self.theta[reached], nominal[..., None])[..., 0] + self.offset[reached]
+        target: Array = _targets(self.theta, self.offset, np.asarray(tick), nominal)
+        return target
 
     def velocity(self, tick: int | Integers, nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
@@ -42,3 +42,16 @@ class Manoeuvre:
         """Second difference of the target about this tick, shape (..., D), in metres per second squared."""
         gained: Array = self.velocity(tick, nominal, dt) - self.velocity(np.asarray(tick) - 1, nominal, dt)
         return gained / dt
+
+
+@kernel("(t,D,D),(t,D),(),(D)->(D)", "ddld->d")
+def _targets(D: int) -> Plain:
+    def plain(theta: Array, offset: Array, tick: int, nominal: Array, target: Array) -> None:
+        reached = min(max(tick, 0), len(theta) - 1)
+        for i in range(D):
+            placed = 0.0
+            for j in range(D):
+                placed += theta[reached, i, j] * nominal[j]
+            target[i] = placed + offset[reached, i]
+
+    return plain

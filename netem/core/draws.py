@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.models.arrays import Array, Integers
+from analysis.models.kernels import Part, Plain, kernel
 
 Words = NDArray[np.uint64]
 Seed = int | Words  # of one run, or of the run that each row of a batch belongs to
@@ -61,43 +62,57 @@ class Purpose(IntEnum):
     LAYOUT = 28
 
 
-def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:
-    """Philox-4x32-10 over arrays of 32-bit words held in 64-bit integers.
+@Part
+def philox(
+    counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]
+) -> tuple[Words, Words, Words, Words]:
+    """Philox-4x32-10 over 32-bit words held in 64-bit integers, or over arrays of them.
 
     Parameters
     ----------
     counter, key
-        Words below 2**32, broadcast against each other.
+        Words below 2**32.
 
     Returns
     -------
-    tuple of arrays
+    tuple
         Four 32-bit words per counter.
 
     References
     ----------
     Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
     """
-    shape = np.broadcast_shapes(*(word.shape for word in (*counter, *key)))
-    x0, x1, x2, x3 = (np.broadcast_to(word, shape).copy() for word in counter)
+    x0, x1, x2, x3 = counter
     k0, k1 = key
-    product0, product1 = np.empty_like(x0), np.empty_like(x0)
-    for _ in range(_ROUNDS):  # in place: three times faster than with an array for each step
-        np.multiply(x0, _MULTIPLIERS[0], out=product0)
-        np.multiply(x2, _MULTIPLIERS[1], out=product1)
-        x0 = _mixed(product1, x1, k0, out=x0)
-        x2 = _mixed(product0, x3, k1, out=x2)
-        np.bitwise_and(product1, _WORD, out=x1)
-        np.bitwise_and(product0, _WORD, out=x3)
+    for _ in range(_ROUNDS):
+        product0, product1 = x0 * _MULTIPLIERS[0], x2 * _MULTIPLIERS[1]
+        x0, x1 = (product1 >> _HALF) ^ x1 ^ k0, product1 & _WORD
+        x2, x3 = (product0 >> _HALF) ^ x3 ^ k1, product0 & _WORD
         k0, k1 = (k0 + _WEYL[0]) & _WORD, (k1 + _WEYL[1]) & _WORD
     return x0, x1, x2, x3
 
 
-def _mixed(product: Words, word: Words, key: Words, *, out: Words) -> Words:
-    """The high word of a product, mixed with another and the key."""
-    np.right_shift(product, _HALF, out=out)
-    np.bitwise_xor(out, word, out=out)
-    return np.bitwise_xor(out, key, out=out)
+@Part
+def unit(high: Words, low: Words) -> Array:
+    """The number in (0, 1) that two 32-bit words stand for, or arrays of them.
+
+    Of 52 bits, and centred in its cell: neither 0 nor 1 can come out, so an inverse distribution function stays finite.
+    """
+    bits = (high << np.uint64(20)) | (low >> np.uint64(12))
+    return (bits * 1.0 + 0.5) * 2.0**-52
+
+
+@kernel("(),(),(),(),(),(l)->(l)", "LLLLLL->d")
+def _drawn() -> Plain:
+    def plain(key: int, tick: int, ends: int, channel: int, purpose: int, lanes: Words, drawn: Array) -> None:
+        for block in range((len(lanes) + 1) // 2):
+            counter = (tick, ends, channel, purpose | np.uint64(block))
+            x0, x1, x2, x3 = philox(counter, (key & _WORD, key >> _HALF))
+            drawn[2 * block] = unit(x0, x1)
+            if 2 * block + 1 < len(lanes):
+                drawn[2 * block + 1] = unit(x2, x3)
+
+    return plain
 
 
 def uniform(
@@ -139,27 +154,16 @@ def uniform(
         raise ValueError(f"lanes must lie in [1, 2**17], got {lanes}")
     if isinstance(seed, int) and not 0 <= seed < 2**64:
         raise ValueError(f"seed {seed} is outside [0, 2**64)")
-    ticks, sources, targets, channels = np.broadcast_arrays(
-        _words("tick", tick, 32),
-        _words("src", src, 16),
-        _words("dst", dst, 16),
-        _words("channel", channel, 32),
-    )
-    keys, word = np.asarray(seed, dtype=np.uint64)[..., None], Purpose.NAMED
+    ticks, channels = _words("tick", tick, 32), _words("channel", channel, 32)
+    sources, targets = _words("src", src, 16), _words("dst", dst, 16)
+    keys, word = np.asarray(seed, dtype=np.uint64), Purpose.NAMED
     if isinstance(purpose, Purpose):
         word = purpose
     else:  # names have no number in the counter: each has a key of its own
         keys = keys ^ np.uint64(int.from_bytes(blake2b(purpose.encode(), digest_size=8).digest(), "little"))
-    blocks = np.arange((lanes + 1) // 2, dtype=np.uint64)
-    counter = (
-        ticks[..., None],
-        (sources << np.uint64(16) | targets)[..., None],
-        channels[..., None],
-        np.uint64(int(word) << 16) | blocks,
-    )
-    x0, x1, x2, x3 = philox(counter, (keys & _WORD, keys >> _HALF))
-    pairs = np.stack([_unit(x0, x1), _unit(x2, x3)], axis=-1)
-    return np.ascontiguousarray(pairs.reshape(*pairs.shape[:-2], 2 * len(blocks))[..., :lanes])
+    ends = sources << np.uint64(16) | targets
+    drawn: Array = _drawn(keys, ticks, ends, channels, np.uint64(int(word) << 16), np.empty(lanes, dtype=np.uint64))
+    return drawn
 
 
 def _words(name: str, value: ArrayLike, bits: int) -> Words:
@@ -167,12 +171,6 @@ def _words(name: str, value: ArrayLike, bits: int) -> Words:
     if array.size and (array.min() < 0 or int(array.max()) >> bits):
         raise ValueError(f"{name} must lie in [0, 2**{bits}) to index a draw, got {array.min()} to {array.max()}")
     return array.astype(np.uint64)
-
-
-def _unit(high: Words, low: Words) -> Array:
-    # 52 bits, centred in their cells: neither 0 nor 1 can come out, so an inverse distribution function stays finite.
-    bits = (high << np.uint64(20)) | (low >> np.uint64(12))
-    return (bits.astype(np.float64) + 0.5) * 2.0**-52
 
 
 class DrawnAhead:

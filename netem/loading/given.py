@@ -12,11 +12,10 @@ import numpy as np
 def readonly(given: Any) -> Any:
     """The same value, with views that cannot be written to in place of its arrays; tuples and maps are gone through."""
     if isinstance(given, np.ndarray):
-        if not given.flags.writeable:
-            return given
-        view = given.view()
-        view.flags.writeable = False
-        return view
+        if given.flags.writeable:
+            given = given.view()
+            given.setflags(write=False)
+        return given
     if isinstance(given, tuple):
         parts = map(readonly, given)
         return type(given)(*parts) if hasattr(given, "_fields") else tuple(parts)

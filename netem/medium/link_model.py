@@ -130,7 +130,8 @@ class LinkModel:
         reason = np.full(self._shape, PASSED)
         for kind, held in self._layers(state, tick, impairments, packets, position):
             np.copyto(reason, kind, where=held)
-        reason = stronger(reason, imposed)
+        if (imposed != PASSED).any():
+            reason = stronger(reason, imposed)
         passed = offered & (reason == PASSED)
         extra_s = packets.extra_s if delay_s is None else packets.extra_s + delay_s
         by_message = delay_s is not None or bool(self._packet_layers)
