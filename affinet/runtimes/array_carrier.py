@@ -13,12 +13,12 @@ from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
 from analysis.models.arrays import Array, Integers, Mask, chosen
-from netem.medium.picking import picked
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks
 from netem.medium.in_flight import Delivery
 from netem.medium.medium import Medium
+from netem.medium.picking import picked
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
 from netem.processes.user_code import UserCodeError
 from world.physics.world import Scene

@@ -11,10 +11,11 @@ from typing import Literal, Protocol
 import numpy as np
 
 from agents.algebra import geometry
-from agents.algebra.geometry import SINGULAR, Fit
+from agents.algebra.geometry import SINGULAR, Fit, spans
 from agents.algebra.small import inverse, rotation
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
+from analysis.models.kernels import Plain, kernel, scratch
 
 Constraint = Literal["affine", "scaling", "rotation", "similarity"]
 
@@ -74,10 +75,7 @@ class Affine:
 
     def fit(self, relative: Array, measured: Array, seen: Mask) -> Fit:
         """Least squares (10)."""
-        gram = geometry.gram(relative, seen)
-        feasible = self.feasible(gram)
-        theta = product(geometry.cross(relative, measured, seen), geometry.inverse_gram(gram, feasible))
-        return _fitted(theta, feasible, gram)
+        return Fit(*_affine(relative, measured, seen))
 
     def nearest(self, theta: Array) -> Array:
         """Every map is one."""
@@ -85,8 +83,49 @@ class Affine:
 
     def covariance(self, shape: Fit, relative: Array, R: Array) -> Array:
         """(p_ij^T (H H^T)^-1 p_ij) R, which is (12) with one R for all edges and an identity of size N_i,k (errata)."""
-        inverse_gram = geometry.inverse_gram(shape.gram, self.feasible(shape.gram))
-        return geometry.leverage(inverse_gram, relative)[..., None, None] * R
+        covariance: Array = _affine_covariance(shape.gram, relative, R)
+        return covariance
+
+
+@kernel("(n,D),(n,D),(n)->(D,D),(),(D,D)", "dd?->d?d")
+def _affine(D: int) -> Plain:
+    def plain(relative: Array, measured: Array, seen: Mask, theta: Array, feasible: Mask, gram: Array) -> None:
+        crossed, inverse = scratch(D, D), scratch(D, D)
+        for i in range(D):
+            for j in range(D):
+                crossed[i, j] = gram[i, j] = 0.0
+        for edge in range(len(seen)):
+            if seen[edge]:
+                for i in range(D):
+                    for j in range(D):
+                        crossed[i, j] += measured[edge, i] * relative[edge, j]
+                        gram[i, j] += relative[edge, i] * relative[edge, j]
+        feasible[0] = spans(gram, inverse)
+        for i in range(D):
+            for j in range(D):
+                theta[i, j] = 0.0
+                if feasible[0]:
+                    for k in range(D):
+                        theta[i, j] += crossed[i, k] * inverse[k, j]
+
+    return plain
+
+
+@kernel("(D,D),(n,D),(D,D)->(n,D,D)", "ddd->d")
+def _affine_covariance(D: int) -> Plain:
+    def plain(gram: Array, relative: Array, R: Array, covariance: Array) -> None:
+        inverse = scratch(D, D)
+        spans(gram, inverse)
+        for edge in range(len(relative)):
+            leverage = 0.0
+            for i in range(D):
+                for j in range(D):
+                    leverage += relative[edge, i] * inverse[i, j] * relative[edge, j]
+            for i in range(D):
+                for j in range(D):
+                    covariance[edge, i, j] = leverage * R[i, j]
+
+    return plain
 
 
 class Scaling:

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import determinant, inverse
+from agents.algebra.small import inverse, invert
 from analysis.models.arrays import Array, Mask
-from analysis.models.elementary import whole_power
-from analysis.models.kernels import Plain, kernel
+from analysis.models.kernels import Part, Plain, kernel, scratch
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 SINGULAR = 1e-9
@@ -69,15 +68,39 @@ def _crossed(D: int) -> Plain:
 
 def regular(gram: Array) -> Mask:
     """Whether rank H = D (Remark 1), shape (...): the test is on the nominal H, never on Y."""
-    dimension = gram.shape[-1]
-    scale = np.einsum("...ii", gram) / dimension
-    spans: Mask = determinant(gram) > SINGULAR * whole_power(scale, dimension)
+    spans: Mask = _regular(gram)
     return spans
+
+
+@Part
+def spans(gram: Array, inverse: Array) -> bool:
+    """Whether a gram (D, D) is regular; its inverse, or the identity where it is not, is filled in."""
+    D = len(gram)
+    trace = 0.0
+    for i in range(D):
+        trace += gram[i, i]
+    bound = SINGULAR
+    for _ in range(D):
+        bound *= trace / D
+    if invert(gram, inverse) > bound:
+        return True
+    for i in range(D):
+        for j in range(D):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    return False
 
 
 def inverse_gram(gram: Array, feasible: Mask) -> Array:
     """(H H^T)^-1, shape (..., D, D); the identity where not feasible."""
     return inverse(np.where(feasible[..., None, None], gram, identity(gram.shape[-1])))
+
+
+@kernel("(D,D)->()", "d->?")
+def _regular(D: int) -> Plain:
+    def plain(gram: Array, found: Mask) -> None:
+        found[0] = spans(gram, scratch(D, D))
+
+    return plain
 
 
 def apply(theta: Array, relative: Array) -> Array:
@@ -95,25 +118,6 @@ def _placed(D: int) -> Plain:
                 for j in range(D):
                     summed += theta[i, j] * relative[edge, j]
                 placed[edge, i] = summed
-
-    return plain
-
-
-def leverage(inverse_gram: Array, relative: Array) -> Array:
-    """p_ij^T (H H^T)^-1 p_ij of each edge, shape (..., n)."""
-    found: Array = _levered(inverse_gram, relative)
-    return found
-
-
-@kernel("(D,D),(n,D)->(n)", "dd->d")
-def _levered(D: int) -> Plain:
-    def plain(inverse_gram: Array, relative: Array, found: Array) -> None:
-        for edge in range(len(relative)):
-            summed = 0.0
-            for i in range(D):
-                for j in range(D):
-                    summed += relative[edge, i] * inverse_gram[i, j] * relative[edge, j]
-            found[edge] = summed
 
     return plain
 
@@ -136,18 +140,24 @@ def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
     return found
 
 
+@Part
+def disagreement(own: Array, theirs: Array, counts: Mask) -> float:
+    """Mean |Theta_i - Theta_j|_F^2 over the maps (n, D, D) that count, NaN where none does."""
+    number, summed = 0, 0.0
+    for edge in range(len(counts)):
+        if counts[edge]:
+            number += 1
+            for i in range(len(own)):
+                for j in range(len(own)):
+                    difference = theirs[edge, i, j] - own[i, j]
+                    summed += difference * difference
+    return summed / number if number else np.nan
+
+
 @kernel("(D,D),(),(n,D,D),(n)->()", "d?d?->d")
-def _indicated(D: int) -> Plain:
+def _indicated(_: int) -> Plain:
     def plain(own: Array, feasible: bool, theirs: Array, counts: Mask, found: Array) -> None:
-        number, summed = 0, 0.0
-        for edge in range(len(counts)):
-            if counts[edge]:
-                number += 1
-                for i in range(D):
-                    for j in range(D):
-                        difference = theirs[edge, i, j] - own[i, j]
-                        summed += difference * difference
-        found[0] = summed / number if feasible and number > 0 else np.nan
+        found[0] = disagreement(own, theirs, counts) if feasible else np.nan
 
     return plain
 

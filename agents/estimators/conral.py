@@ -13,6 +13,7 @@ of rotations is none; the map in use is the nearest that keeps to the constraint
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,6 +22,7 @@ import numpy as np
 
 from agents.algebra import geometry
 from agents.algebra.constraints import MAPS, Constraint
+from agents.algebra.geometry import disagreement
 from agents.brief import Brief, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
@@ -29,6 +31,7 @@ from agents.exchange import Channels, Field, Fields, Heard
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.kernels import Plain, kernel
 from netem.core.channels import THETA
 
 
@@ -128,15 +131,10 @@ class ConsensusLocalization(Estimator[Agreement]):
         return [Finding("consensus", "error", says)]
 
     def _indicated(self, state: Agreement, theirs: Array, fits: Mask) -> Indicator:
-        now = geometry.indicator(self._held_against(state), theirs, fits)
-        new, before = np.isfinite(now), state.indicator
-        return Indicator(np.where(new, now, before.heard), np.where(new, 0.0, before.age + 1.0))
-
-    def _held_against(self, state: Agreement) -> geometry.Fit:
-        """The map that the neighbours' fits are held against: the agent's own fit, or the consensus where it has none."""
-        local, agreed = state.perceived.local, self._in_use(state.consensus)
-        theta = np.where(local.feasible[..., None, None], local.theta, agreed.theta)
-        return local._replace(theta=theta, feasible=local.feasible | agreed.feasible)
+        """Against the agent's own fit, or the consensus where it has none."""
+        local, agreed, before = state.perceived.local, self._in_use(state.consensus), state.indicator
+        held_against = (local.theta, local.feasible, agreed.theta, agreed.feasible)
+        return Indicator(*_indicated(*held_against, theirs, fits, before.heard, before.age))
 
     def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
         nearest = MAPS[self.constraint].nearest(consensus.theta)
@@ -145,12 +143,72 @@ class ConsensusLocalization(Estimator[Agreement]):
     def _step(self, state: Agreement, said: Heard, voices: Mask) -> geometry.Fit:
         own, local = state.consensus, state.perceived.local
         fits = said.fresh & said.fields["feasible"]
-        agreed, number = geometry.total(voices, said.fields["consensus"]), voices.sum(axis=-1)
-        drawn = agreed + geometry.total(fits, said.fields["local"]) + local.theta
-        weight = number + fits.sum(axis=-1) + local.feasible
-        pull = drawn - weight[..., None, None] * own.theta
-        stepped = own._replace(theta=own.theta + self.epsilon * pull)
-        return _start(stepped, agreed / np.maximum(number, 1)[..., None, None], number > 0)
+        heard = (said.fields["consensus"], voices, said.fields["local"], fits)
+        theta, started = _stepped(own.theta, own.feasible, local.theta, local.feasible, *heard, self.epsilon)
+        return own._replace(theta=theta, feasible=started)
+
+
+@kernel("(D,D),(),(D,D),(),(n,D,D),(n),(),()->(),()", "d?d?d?dd->dd")
+def _indicated(_: int) -> Plain:
+    def plain(
+        local: Array,
+        feasible: bool,
+        agreed: Array,
+        started: bool,
+        theirs: Array,
+        fits: Mask,
+        heard: float,
+        age: float,
+        heard_now: Array,
+        age_now: Array,
+    ) -> None:
+        now = np.nan
+        if feasible:
+            now = disagreement(local, theirs, fits)
+        elif started:
+            now = disagreement(agreed, theirs, fits)
+        new = math.isfinite(now)
+        heard_now[0] = now if new else heard
+        age_now[0] = 0.0 if new else age + 1.0
+
+    return plain
+
+
+@kernel("(D,D),(),(D,D),(),(n,D,D),(n),(n,D,D),(n),()->(D,D),()", "d?d?d?d?d->d?")
+def _stepped(D: int) -> Plain:
+    """Equation (14); who has not started takes the mean of what the others agree on."""
+
+    def plain(
+        own: Array,
+        started: bool,
+        local: Array,
+        feasible: bool,
+        consensus: Array,
+        voices: Mask,
+        fitted: Array,
+        fits: Mask,
+        epsilon: float,
+        theta: Array,
+        running: Mask,
+    ) -> None:
+        number, weight = 0, 1 if feasible else 0
+        for edge in range(len(voices)):
+            number += voices[edge]
+            weight += fits[edge]
+        weight += number
+        running[0] = started or number > 0
+        for i in range(D):
+            for j in range(D):
+                agreed, drawn = 0.0, local[i, j]
+                for edge in range(len(voices)):
+                    if voices[edge]:
+                        agreed += consensus[edge, i, j]
+                    if fits[edge]:
+                        drawn += fitted[edge, i, j]
+                stepped = own[i, j] + epsilon * (drawn + agreed - weight * own[i, j])
+                theta[i, j] = stepped if started else agreed / max(number, 1)
+
+    return plain
 
 
 def _start(running: geometry.Fit, first: Array, given: Mask) -> geometry.Fit:

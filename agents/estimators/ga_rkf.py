@@ -6,6 +6,7 @@ neighbours' perceived shapes disagree.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +16,6 @@ import numpy as np
 
 from agents.algebra import kalman
 from agents.algebra.constraints import Constraint
-from agents.algebra.geometry import identity
 from agents.brief import Brief, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
@@ -26,6 +26,7 @@ from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.kernels import Plain, kernel
 
 
 class Fusion(NamedTuple):
@@ -74,15 +75,9 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
         """Correct every edge by its measurement, or else by its place in the perceived shape."""
         seen = _perceived(state.shape).seen
         shape, observed = self._shaper.fuse(brief, state.shape, heard, own)
-        trusted = np.isfinite(observed.psi)
-        R = observed.covariance
-        if self.constraint != "affine":
-            # What lies outside its class a constrained map cannot see: alone it would be believed absolutely there.
-            R = R + np.where(seen[..., None, None], 0.0, brief.sensor.common)
-        if self.penalty:
-            doubt = np.where(seen, 0.0, np.where(trusted, observed.psi, 0.0)[..., None])
-            R = R + doubt[..., None, None] * identity(brief.dimension)
-        usable = seen | (observed.known & trusted[..., None])
+        # What lies outside its class a constrained map cannot see: alone it would be believed absolutely there.
+        unseen = np.zeros_like(brief.sensor.common) if self.constraint == "affine" else brief.sensor.common
+        R, usable = _doubted(observed.covariance, seen, observed.known, observed.psi, unseen, self.penalty)
         corrected = kalman.correct(*self.ahead(brief, state.tracks), observed.relative, R, usable)
         nis = np.where(seen, corrected.nis, np.nan)  # what the shape says is no measurement
         tracks = Tracks(*corrected._replace(nis=nis), state.tracks.known | usable)
@@ -103,3 +98,31 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
 
 def _perceived(shape: Perceived | Agreement) -> Perceived:
     return shape.perceived if isinstance(shape, Agreement) else shape
+
+
+@kernel("(n,D,D),(n),(n),(),(D,D),()->(n,D,D),(n)", "d??dd?->d?")
+def _doubted(D: int) -> Plain:
+    """The covariances of what is observed, and where it may be used: (6)."""
+
+    def plain(
+        covariance: Array,
+        seen: Mask,
+        known: Mask,
+        psi: float,
+        unseen: Array,
+        penalty: bool,
+        R: Array,
+        usable: Mask,
+    ) -> None:
+        trusted = math.isfinite(psi)
+        for edge in range(len(seen)):
+            usable[edge] = seen[edge] or (known[edge] and trusted)
+            for i in range(D):
+                for j in range(D):
+                    R[edge, i, j] = covariance[edge, i, j]
+                    if not seen[edge]:
+                        R[edge, i, j] += unseen[i, j]
+                        if penalty and trusted and i == j:
+                            R[edge, i, j] += psi
+
+    return plain

@@ -15,6 +15,7 @@ from agents.estimate import Estimate
 from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
 from analysis.models.arrays import Array, Mask
+from analysis.models.kernels import Plain, kernel
 from netem.core.channels import THETA
 
 
@@ -91,9 +92,42 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
     psi
         Its convergence indicator, shape (...).
     """
-    seen = perceived.seen
-    relative = np.where(seen[..., None], perceived.measured, geometry.apply(shape.theta, brief.relative))
-    covariance = np.where(seen[..., None, None], brief.sensor.common, geometric)
-    known = brief.present & (seen | shape.feasible[..., None])
+    relative, covariance, known = _completed(
+        perceived.measured,
+        perceived.seen,
+        brief.sensor.common,
+        shape.theta,
+        shape.feasible,
+        geometric,
+        brief.relative,
+        brief.present,
+    )
     theta = np.where(shape.feasible[..., None, None], shape.theta, np.nan)
     return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible, reports={THETA: theta})
+
+
+@kernel("(n,D),(n),(D,D),(D,D),(),(n,D,D),(n,D),(n)->(n,D),(n,D,D),(n)", "d?dd?dd?->dd?")
+def _completed(D: int) -> Plain:
+    def plain(
+        measured: Array,
+        seen: Mask,
+        common: Array,
+        theta: Array,
+        feasible: bool,
+        geometric: Array,
+        nominal: Array,
+        present: Mask,
+        relative: Array,
+        covariance: Array,
+        known: Mask,
+    ) -> None:
+        for edge in range(len(seen)):
+            known[edge] = present[edge] and (seen[edge] or feasible)
+            for i in range(D):
+                placed = 0.0
+                for j in range(D):
+                    placed += theta[i, j] * nominal[edge, j]
+                    covariance[edge, i, j] = common[i, j] if seen[edge] else geometric[edge, i, j]
+                relative[edge, i] = measured[edge, i] if seen[edge] else placed
+
+    return plain

@@ -16,9 +16,9 @@ from agents.estimate import Estimate
 from agents.exchange import Heard
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
-from analysis.models.algebra import sum_over
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.kernels import Plain, kernel
 
 State = TypeVar("State")
 
@@ -98,12 +98,26 @@ class Nothing(NamedTuple):
 
 def stress_force(brief: Brief, estimate: Estimate) -> Array:
     """sum_j l_ij zhat_ij over the edges with an estimate, shape (..., D), in metres."""
-    return weighted(np.where(estimate.known, brief.stress, 0.0), estimate.relative)
+    force: Array = _weighted(brief.stress, estimate.known, estimate.relative)
+    return force
 
 
 def weighted(stress: Array, of_neighbours: Array) -> Array:
     """Sum over the neighbours of their weights (..., n) by what is known of each (..., n, D), shape (..., D)."""
-    return sum_over(stress[..., None] * of_neighbours, -2)
+    summed: Array = _weighted(stress, np.ones(stress.shape[-1], dtype=bool), of_neighbours)
+    return summed
+
+
+@kernel("(n),(n),(n,D)->(D)", "d?d->d")
+def _weighted(D: int) -> Plain:
+    def plain(stress: Array, known: Mask, of_neighbours: Array, summed: Array) -> None:
+        for axis in range(D):
+            summed[axis] = 0.0
+            for edge in range(len(known)):
+                if known[edge]:
+                    summed[axis] += stress[edge] * of_neighbours[edge, axis]
+
+    return plain
 
 
 def by_degree(summed: Array, degree: Array) -> Array:

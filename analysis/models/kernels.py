@@ -113,27 +113,32 @@ class Kernel:
         self.factory, self.layout, self.types = factory, layout, types
         self._arguments, self._cores = len(_cores(arguments)), [*_cores(arguments), *_cores(results)]
         self._sizes = tuple(_capitals(self._cores[: self._arguments]))
-        self._compiled = cache(self._compile)
+        self._axes = tuple(map(len, self._cores[: self._arguments]))
+        self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}
 
     def __call__(self, *given: Any) -> Any:
         """What comes of arrays, their leading axes broadcast against each other: an array, or as many as there are results."""
-        arrays = [_compact(one, len(core)) for one, core in zip(given, self._cores, strict=False)]
-        compiled = self._compiled(*(arrays[place].shape[axis] for _, place, axis in self._sizes))
+        for axes, array in zip(self._axes, given, strict=True):
+            if axes and not array.flags.c_contiguous:
+                given = tuple(map(_compact, given, self._axes))
+                break
+        sizes = tuple([given[place].shape[axis] for place, axis in self._sizes])
+        compiled = self._compiled.get(sizes) or self._compile(sizes)
         with np.errstate(all="ignore"):  # compilers also compute what is not chosen then
-            return compiled(*arrays)
+            return compiled(*given)
 
     def plain(self, *sizes: int) -> Plain:
         """What is compiled for these sizes, in the order in which their axes first appear."""
         return self.factory(*sizes)
 
-    def _compile(self, *sizes: int) -> Callable[..., Any]:
+    def _compile(self, sizes: tuple[int, ...]) -> Callable[..., Any]:
         numba = _numba()
         numba.config.CACHE_DIR = str(_kept())
         make = numba.guvectorize([self._signature()], self.layout, nopython=True, cache=True)
         compiled = make(_bound(self.factory(*sizes)))
         compiled.build_ufunc()
-        universal: Callable[..., Any] = compiled.ufunc  # what Numba wraps it in takes as long to call as a small kernel
-        return universal
+        self._compiled[sizes] = compiled.ufunc  # what Numba wraps it in takes as long to call as a small kernel
+        return self._compiled[sizes]
 
     def _signature(self) -> Any:
         numba, arguments = _numba(), []
@@ -171,14 +176,14 @@ def _cores(side: str) -> list[list[str]]:
     return [[name.strip() for name in core.split(",") if name.strip()] for core in re.findall(r"\(([^)]*)\)", side)]
 
 
-def _capitals(cores: list[list[str]]) -> Iterator[tuple[str, int, int]]:
-    """Each axis in capitals where it first appears: its name, of which argument it is, and which of its last axes."""
+def _capitals(cores: list[list[str]]) -> Iterator[tuple[int, int]]:
+    """Each axis in capitals where it first appears: of which argument it is, and which of its last axes."""
     found = set[str]()
     for place, core in enumerate(cores):
         for axis, name in enumerate(core, start=-len(core)):
             if name.isupper() and name not in found:
                 found.add(name)
-                yield name, place, axis
+                yield place, axis
 
 
 def _bound(plain: Any) -> FunctionType:

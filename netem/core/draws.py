@@ -63,9 +63,7 @@ class Purpose(IntEnum):
 
 
 @Part
-def philox(
-    counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]
-) -> tuple[Words, Words, Words, Words]:
+def philox(counter: tuple[Words, Words, Words, Words], key: tuple[Words, Words]) -> tuple[Words, Words, Words, Words]:
     """Philox-4x32-10 over 32-bit words held in 64-bit integers, or over arrays of them.
 
     Parameters

@@ -25,16 +25,18 @@ def picked(said: Sequence[NDArray[Any]], which: Integers, speaker: Integers) -> 
         Rows of those who said it, shape (..., n).
     """
     shape = said[0].shape[1:]
-    whole = np.stack([one.reshape(len(one), -1) for one in said])
+    whole = (
+        said[0].reshape(1, len(said[0]), -1)
+        if len(said) == 1
+        else np.stack([one.reshape(len(one), -1) for one in said])
+    )
     pick = _of_truths if whole.dtype == np.bool_ else _of_numbers
     heard: NDArray[Any] = pick(whole, which, speaker)
     return heard.reshape(*which.shape, *shape)
 
 
 def _picked() -> Plain:
-    def plain(
-        said: NDArray[Any], which: Integers, speaker: Integers, heard: NDArray[Any]
-    ) -> None:
+    def plain(said: NDArray[Any], which: Integers, speaker: Integers, heard: NDArray[Any]) -> None:
         for place in range(len(which)):
             for number in range(said.shape[2]):
                 if which[place] < 0:
