@@ -59,20 +59,28 @@ class Scratch(Part):
     def compiled(self) -> Any:
         """On the stack: memory of its own would take as long as the work of a small kernel."""
         numba = _numba()
+        number, size = numba.types.float64, numba.types.intp
 
         @numba.extending.intrinsic  # type: ignore[untyped-decorator]
-        def taken(_: Any) -> Any:
-            def generate(context: Any, builder: Any, *_: Any) -> Any:
-                number = context.get_value_type(numba.types.float64)
-                return numba.core.cgutils.alloca_once(builder, number, size=_ROOM)
+        def room(_: Any, rows: Any, columns: Any) -> Any:
+            array = numba.types.Array(number, 2, "C")
 
-            return numba.types.CPointer(numba.types.float64)(), generate
+            def generate(context: Any, builder: Any, signature: Any, sizes: Any) -> Any:
+                whole = zip(sizes, signature.args, strict=True)
+                shape = [context.cast(builder, each, kind, size) for each, kind in whole]
+                width = context.get_constant(size, 8)
+                room = context.make_array(array)(context, builder)
+                numba.np.arrayobj.populate_array(
+                    room,
+                    data=numba.core.cgutils.alloca_once(builder, context.get_value_type(number), size=_ROOM),
+                    shape=shape,
+                    strides=[builder.mul(shape[1], width), width],
+                    itemsize=width,
+                    meminfo=None,
+                )
+                return room._getvalue()
 
-        carray = numba.carray
-
-        @numba.njit  # type: ignore[untyped-decorator]
-        def room(rows: int, columns: int) -> Any:
-            return carray(taken(), (rows, columns))
+            return array(rows, columns), generate
 
         return room
 
@@ -81,6 +89,7 @@ def _numba() -> Any:
     import numba  # takes half a second, which who only reads a help text need not wait for
     import numba.core.cgutils
     import numba.extending
+    import numba.np.arrayobj
 
     return numba
 
