@@ -55,6 +55,7 @@ $(READY): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv
 	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
 	$(UV) sync --locked --quiet --compile-bytecode
+	$(BIN)/python packaging/compiled.py
 	touch $@
 
 clean: ## without environments and runs

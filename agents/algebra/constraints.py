@@ -13,9 +13,9 @@ import numpy as np
 from agents.algebra import geometry
 from agents.algebra.geometry import SINGULAR, Fit, spans
 from agents.algebra.small import inverse, rotation
+from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
-from analysis.models.kernels import Plain, kernel, scratch
 
 Constraint = Literal["affine", "scaling", "rotation", "similarity"]
 

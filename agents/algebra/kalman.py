@@ -13,9 +13,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from agents.algebra.small import invert
+from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
-from analysis.models.kernels import Plain, kernel, scratch
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 

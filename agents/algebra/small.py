@@ -10,10 +10,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.kernels.kernel import Part, Plain, kernel, scratch
 from analysis.models.algebra import product
 from analysis.models.arrays import Array
 from analysis.models.elementary import hypot
-from analysis.models.kernels import Part, Plain, kernel, scratch
 
 _CLOSED = 3  # the largest size for which there is a closed form
 

@@ -29,9 +29,9 @@ from agents.estimators.base import Estimator
 from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
 from agents.exchange import Channels, Field, Fields, Heard
 from agents.swarm import SwarmBrief
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
-from analysis.models.kernels import Plain, kernel
 from netem.core.channels import THETA
 
 

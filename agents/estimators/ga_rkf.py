@@ -24,9 +24,9 @@ from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
-from analysis.models.kernels import Plain, kernel
 
 
 class Fusion(NamedTuple):

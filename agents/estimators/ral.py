@@ -14,8 +14,8 @@ from agents.brief import Brief, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Mask
-from analysis.models.kernels import Plain, kernel
 from netem.core.channels import THETA
 
 

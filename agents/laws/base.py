@@ -16,9 +16,9 @@ from agents.estimate import Estimate
 from agents.exchange import Heard
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
-from analysis.models.kernels import Plain, kernel
 
 State = TypeVar("State")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import log, whole_power
-from analysis.models.kernels import Plain, kernel
 
 
 def tracking_error(position: Array, target: Array, present: Mask) -> Array:

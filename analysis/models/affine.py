@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers
-from analysis.models.kernels import Plain, kernel
 
 
 @dataclass(frozen=True)

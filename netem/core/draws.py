@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.kernels.kernel import Part, Plain, kernel
 from analysis.models.arrays import Array, Integers
-from analysis.models.kernels import Part, Plain, kernel
 
 Words = NDArray[np.uint64]
 Seed = int | Words  # of one run, or of the run that each row of a batch belongs to

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Integers
-from analysis.models.kernels import Plain, kernel
 
 
 def picked(said: Sequence[NDArray[Any]], which: Integers, speaker: Integers) -> NDArray[Any]:

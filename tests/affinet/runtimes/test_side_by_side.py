@@ -153,7 +153,7 @@ def test_normalised_errors_and_innovations_of_a_study_are_those_of_the_filters_t
     links, sensor, dt = plan.world.links, plan.world.sensor, plan.world.dt
     seeds = (4, 9)
     runs = fly_all(plan, seeds, every=3)
-    F, Q = kalman.motion("constant-acceleration", 2, dt, RelativeKalmanFilter().sigma_w)
+    F, Q = kalman.motion("constant-acceleration", dt, RelativeKalmanFilter().sigma_w)
     for row, seed in enumerate(seeds):
         arrays = rehearse(plan_of(*lossy, f"seed={seed}")).arrays
         heard = arrays["verdicts"][:, 0] == Verdict.DELIVERED

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from axes import of_axes
 from briefs import HEXA4, OCTAHEDRON, REST, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -308,7 +309,7 @@ def test_rkf_is_the_textbook_filter(dimension):
 
 
 def test_transition_and_process_noise_are_those_of_eqs_20_and_21_axis_by_axis():
-    F, Q = kalman.motion("constant-acceleration", 2, 0.1, 3.0)
+    F, Q = of_axes(2, *kalman.motion("constant-acceleration", 0.1, 3.0))
     x = [0, 2, 4]  # of the first axis: position, velocity, acceleration
     np.testing.assert_allclose(F[np.ix_(x, x)], [[1, 0.1, 0.005], [0, 1, 0.1], [0, 0, 1]])
     np.testing.assert_allclose(Q[np.ix_(x, x)], 9 * np.array([[25e-6, 5e-4, 5e-3], [5e-4, 0.01, 0.1], [5e-3, 0.1, 1]]))

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from axes import of_axes
 from briefs import REST, brief, silence
 from filterpy.common import kinematic_kf
 from filterpy.kalman import IMMEstimator, KalmanFilter
@@ -77,7 +78,7 @@ def test_rkf_is_filterpys_filter_on_the_same_measurements_and_losses(model, dime
 
 @pytest.mark.parametrize(("model", "order"), [("constant-velocity", 1), ("constant-acceleration", 2)])
 def test_transitions_are_those_of_filterpy(model, order):
-    F, _ = kalman.motion(model, 2, DT, 1.0)
+    F, _ = of_axes(2, *kalman.motion(model, DT, 1.0))
     theirs = kinematic_kf(dim=2, order=order, dt=DT).F
     axis_first = np.arange(2 * (order + 1)).reshape(order + 1, 2).T.ravel()
     np.testing.assert_allclose(F[np.ix_(axis_first, axis_first)], theirs, atol=1e-15)
@@ -87,7 +88,7 @@ def test_transitions_are_those_of_filterpy(model, order):
 @pytest.mark.parametrize("filters", [RelativeKalmanFilter, GeometryAwareFilter])
 def test_a_filter_tells_the_truth_of_what_moves_by_its_model(model, filters):
     edges, rng, R, order = 400, np.random.default_rng(1), covariance(2), kalman.ORDER[model]
-    F, Q = kalman.motion(model, 2, DT, 0.7)
+    F, Q = of_axes(2, *kalman.motion(model, DT, 0.7))
     agent = brief(np.ones((edges, 2)), R)
     edge_filter = filters(sigma_w=0.7, prior_position=5.0, prior_velocity=3.0, prior_acceleration=2.0, model=model)
     state, quiet = edge_filter.init(agent, ()), silence(edges)
@@ -110,8 +111,8 @@ def test_a_model_in_a_state_of_three_derivatives_moves_as_it_does_alone(model):
     prior = np.broadcast_to(np.diag([25.0, 25, 9, 9, 4, 4]), (4, 6, 6))
     alone, three = (np.zeros((4, size)), prior[:, :size, :size]), (np.zeros((4, 6)), prior)
     for y, here in zip(measured, seen, strict=True):
-        alone = kalman.predict(*alone, *kalman.motion(model, 2, DT, 0.7))
-        three = kalman.predict(*three, *kalman.embedded(model, 2, DT, 0.7))
+        alone = kalman.predict(*alone, *kalman.motion(model, DT, 0.7))
+        three = kalman.predict(*three, *kalman.embedded(model, DT, 0.7))
         alone, three = (kalman.correct(*tracks, y, R, here)[:2] for tracks in (alone, three))
         np.testing.assert_allclose(three[0][:, :size], alone[0], atol=1e-10)
         np.testing.assert_allclose(three[1][:, :size, :size], alone[1], atol=1e-10)
@@ -122,7 +123,7 @@ def test_a_model_in_a_state_of_three_derivatives_moves_as_it_does_alone(model):
 
 def their_imm(dimension, R, prior, sigmas, stay):
     filters = [
-        reference(*kalman.embedded(name, dimension, DT, sigma), R, prior)
+        reference(*of_axes(dimension, *kalman.embedded(name, DT, sigma)), R, prior)
         for name, sigma in zip(NAMES, sigmas, strict=True)
     ]
     chain = np.where(np.eye(3, dtype=bool), stay, (1 - stay) / 2)
@@ -223,4 +224,4 @@ def test_imm_refuses_a_probability_that_makes_no_chain(stay):
 
 def test_models_and_sigmas_are_told_apart():
     pairs = list(product(MODELS, (0.5, 1.0)))
-    assert len({kalman.motion(model, 2, DT, sigma)[1].tobytes() for model, sigma in pairs}) == len(pairs)
+    assert len({kalman.motion(model, DT, sigma)[1].tobytes() for model, sigma in pairs}) == len(pairs)

@@ -65,7 +65,7 @@ REMEMBERED = (
     real(3, NEIGHBOURS, 2),
     truth(3, NEIGHBOURS),
 )
-F, Q = kalman.motion("constant-velocity", 2, 0.013, 0.7)
+F, Q = kalman.motion("constant-velocity", 0.013, 0.7)
 
 
 def _brief(**held):

@@ -1,0 +1,1 @@
+"""Functions of one agent, link or edge, compiled, which broadcast over any leading axes."""

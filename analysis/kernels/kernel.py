@@ -1,0 +1,125 @@
+"""Kernels: what is computed for one row, as a plain function, and called with arrays of rows.
+
+A kernel is a plain function that fills its last arguments. It is compiled when it is first called, and what comes of that is
+kept on disk for the processes to come. Its bits are those of the plain function, number by number: sums are taken in the order
+that is written, and no product is fused with a sum, so that they do not depend on the CPU. A row alone and the same row in a
+batch go through the same code.
+
+Sizes that are few and small, as the number of dimensions, are constants of what is compiled: loops over them unroll.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from functools import update_wrapper
+from typing import Any
+
+import numpy as np
+
+Plain = Callable[..., None]
+Factory = Callable[..., Plain]
+
+
+class Part:
+    """A function that kernels call, of numbers and arrays, with or without a result."""
+
+    def __init__(self, plain: Callable[..., Any]) -> None:
+        update_wrapper(self, plain)
+        self.plain = plain
+
+    def __call__(self, *given: Any) -> Any:
+        """As it is written."""
+        return self.plain(*given)
+
+
+@Part
+def scratch(rows: int, columns: int) -> Any:
+    """Room for at most 81 numbers that a kernel needs while it works, shape (rows, columns), with anything in it."""
+    return np.empty((rows, columns))
+
+
+class Kernel:
+    """A compiled function over arrays.
+
+    Parameters
+    ----------
+    factory
+        From the sizes that it is compiled for to what it computes for one row: a function that fills its last arguments, as
+        many as there are results.
+    layout
+        The core axes of arguments and results, as those of NumPy's generalised universal functions: "(n,D),(n)->(D,D)". It is
+        compiled for each size of the axes in capitals, `sizes`.
+    types
+        Their types, by NumPy's letters: "d" float64, "?" bool, "l" int64, "L" uint64; "d?->d".
+    """
+
+    def __init__(self, factory: Factory, layout: str, types: str) -> None:
+        update_wrapper(self, factory)
+        self.name = f"{factory.__module__}.{factory.__qualname__}"
+        arguments, _, results = layout.partition("->")
+        self.factory, self.layout, self.types = factory, layout, types.replace("->", "")
+        self.cores = [*_cores(arguments), *_cores(results)]
+        self.arguments = len(_cores(arguments))
+        self._axes = tuple(map(len, self.cores[: self.arguments]))
+        self._sizes = tuple(_capitals(self.cores[: self.arguments]))
+        self.sizes = tuple(name for name, _, _ in self._sizes)
+        self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}
+
+    def __call__(self, *given: Any) -> Any:
+        """What comes of arrays, their leading axes broadcast against each other: an array, or as many as there are results."""
+        for axes, array in zip(self._axes, given, strict=True):
+            if axes and not array.flags.c_contiguous:
+                given = tuple(map(_compact, given, self._axes))
+                break
+        sizes = tuple([given[place].shape[axis] for _, place, axis in self._sizes])
+        compiled = self._compiled.get(sizes) or self._made(sizes)
+        return compiled(*given)
+
+    def plain(self, *sizes: int) -> Plain:
+        """What is compiled for these sizes, in the order in which their axes first appear."""
+        return self.factory(*sizes)
+
+    def _made(self, sizes: tuple[int, ...]) -> Callable[..., Any]:
+        from analysis.kernels.kept import (
+            universal,  # which loads a compiler's library: who computes nothing need not wait
+        )
+
+        self._compiled[sizes] = universal(self, sizes)
+        return self._compiled[sizes]
+
+
+def kernel(layout: str, types: str) -> Callable[[Factory], Kernel]:
+    """Make a factory of plain functions a `Kernel`."""
+
+    def made(factory: Factory) -> Kernel:
+        return Kernel(factory, layout, types)
+
+    return made
+
+
+def _compact(array: Any, axes: int) -> Any:
+    """The array, with its last axes as close together as they can be."""
+    if not axes or array.flags.c_contiguous:
+        return array
+    step = array.itemsize
+    for size, stride in zip(array.shape[: -axes - 1 : -1], array.strides[: -axes - 1 : -1], strict=True):
+        if stride != step:
+            return np.ascontiguousarray(array)
+        step *= size
+    return array
+
+
+def _cores(side: str) -> list[list[str]]:
+    """The names of the axes of each core of a side of a layout."""
+    return [[name.strip() for name in core.split(",") if name.strip()] for core in re.findall(r"\(([^)]*)\)", side)]
+
+
+def _capitals(cores: list[list[str]]) -> Iterator[tuple[str, int, int]]:
+    """Each axis in capitals where it first appears: its name, of which argument it is, and which of its last axes."""
+    found = set[str]()
+    for place, core in enumerate(cores):
+        for axis, name in enumerate(core, start=-len(core)):
+            if name.isupper() and name not in found:
+                found.add(name)
+                yield name, place, axis
