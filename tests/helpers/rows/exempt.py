@@ -93,6 +93,7 @@ EXEMPT = {
         analysis.claims.checks.follows analysis.claims.intervals.mean analysis.claims.intervals.difference
         analysis.claims.intervals.ratio analysis.claims.intervals.student analysis.figures.curves.evolution
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
+        analysis.claims.falling.Fall.exceeds analysis.claims.falling.fall
     """,
     SHAPES: """
         agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.unknowns.EdgeModel.begin
