@@ -98,12 +98,34 @@ def page() -> str:
         "## Means of all cases",
         "",
         "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own,",
-        "which are with them.",
+        "which are with them. Verdicts on claims that no paper makes are beneath the means.",
     ]
+    of_papers = _asked_by_papers(rows, named)
     for name in named:
         if full := record.full_study(name):
             lines += ["", f"### {name}", "", *_whence(name, full), "", *_cases(full)]
+            lines += _own([claim for claim in full.claims if (name, claim.asked) not in of_papers])
     return "\n".join(lines) + "\n"
+
+
+def _asked_by_papers(rows: Iterable[PaperClaim], named: dict[str, Study]) -> set[tuple[str, str]]:
+    """Studies, and the digests of what papers' claims ask of them."""
+    return {
+        (one.study, found.judged.asked)
+        for one in rows
+        if one.study
+        for found in verdicts(one, named[one.study])
+        if found.judged
+    }
+
+
+def _own(judged: Sequence[JudgedClaim]) -> Iterator[str]:
+    if judged:
+        yield ""
+        yield "| our own claim | what was found |"
+        yield "|---|---|"
+    for claim in judged:
+        yield f"| {claim.says} | {_said('', claim)} |"
 
 
 class Found(NamedTuple):
@@ -242,8 +264,11 @@ def _more(study: str) -> str:
 
 
 def _whence(name: str, full: StudyRecord) -> Iterator[str]:
-    yield f"{full.title} ({full.source}): {full.runs} runs of each case, intervals of {full.confidence:.0%}."
-    yield f"From [{name}.json](../affinet/shipped/results/{name}.json), which `affinet study {name}` flies again."
+    yield f"{full.title} ({full.source})."
+    yield ""
+    yield f"{full.runs} runs of each case, intervals of {full.confidence:.0%}, from"
+    yield f"[{name}.json](../affinet/shipped/results/{name}.json);"
+    yield f"`affinet study {name}` flies it again."
 
 
 def _cases(full: StudyRecord) -> Iterator[str]:

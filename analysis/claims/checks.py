@@ -156,6 +156,13 @@ def exponential(says: str, seconds: Array, error: Array, span: Span) -> ClaimVer
 
     Over a short span that of any power law does too: its curvature must tell it from those up to the tenth order, whenever they
     began.
+
+    Parameters
+    ----------
+    says, seconds, error
+        The claim, the moments, shape (T,), and the error, shape (R, T).
+    span
+        In seconds.
     """
     inside = within(seconds, span)
     if inside.sum() < _FEWEST_MOMENTS:
