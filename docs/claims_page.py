@@ -266,7 +266,7 @@ def _more(study: str) -> str:
 def _whence(name: str, full: StudyRecord) -> Iterator[str]:
     yield f"{full.title} ({full.source})."
     yield ""
-    yield f"{full.runs} runs of each case, intervals of {full.confidence:.0%}, from"
+    yield f"{full.runs} runs of each case, intervals of {100 * full.confidence:.0f} %, from"
     yield f"[{name}.json](../affinet/shipped/results/{name}.json);"
     yield f"`affinet study {name}` flies it again."
 

@@ -306,7 +306,7 @@ def _planned(study: Study, case: Case) -> Plan:
             return planning.make(study.loaded(case.overrides))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
-        said = str(error).removeprefix("--set: ")  # which nobody typed
+        said = str(error).removeprefix("override: ")  # which nobody typed
         raise ScenarioError(f"{where}case {checks.named(case.labels)}: {said}") from error
 
 

@@ -171,7 +171,7 @@ NOT_FLOWN = [
     ),
     pytest.param(
         [("zhao7 = []", 'zhao7 = ["time.dt"]')],
-        "small.toml: case graph=zhao7, law=static, loss=0: --set time.dt: write it as key=value",
+        "small.toml: case graph=zhao7, law=static, loss=0: override time.dt: write it as key=value",
         id="no override",
     ),
     pytest.param(
