@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -21,13 +21,15 @@ from affinet.studies import judging, record
 from affinet.studies import study as studies
 from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
 from affinet.studies.study import Claim, Study
-from analysis.claims.intervals import Decision
+from analysis.claims.intervals import Decision, all_of
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "claims.md"
 PICTURES = DOCS / "pictures"
 _MANY = 4  # cases that come out alike are counted
 _NOT_FLOWN = "not flown in full yet"
+NOT_ALL_FLOWN, NOT_JUDGED = "not all flown in full yet", "not judged"
+OUTCOMES = (*Decision, NOT_ALL_FLOWN, NOT_JUDGED)
 RESULTS = DOCS.parent / "affinet" / "shipped" / "results"
 PAPERS = {
     "000": "Robust affine formation control of multiagent systems",
@@ -74,8 +76,9 @@ def page() -> str:
         "# What becomes of the papers' claims",
         "",
         "`python docs/claims_page.py` writes this page from `docs/claims.toml` and from the `claims.json` of full",
-        "studies, which are in `affinet/shipped/results/`. Intervals are of 99 % confidence; a claim holds where all of",
-        "its interval is inside what is asked, and is undecided where only a part is",
+        "studies, which are in `affinet/shipped/results/`. Whoever wants a verdict again flies the study that is beside",
+        "it: as many runs of the same draws, and the same bits. Intervals are of 99 % confidence; a claim holds where",
+        "all of its interval is inside what is asked, and is undecided where only a part is",
         "([decision 22](decisions/0022-claims-hold-fail-or-are-undecided.md)). What is proved in a paper and computed",
         "exactly is judged by tests, against the formulas, other implementations, or the definition.",
         "",
@@ -95,12 +98,34 @@ def page() -> str:
         "## Means of all cases",
         "",
         "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own,",
-        "which are with them.",
+        "which are with them. Verdicts on claims that no paper makes are beneath the means.",
     ]
+    of_papers = _asked_by_papers(rows, named)
     for name in named:
         if full := record.full_study(name):
-            lines += ["", f"### {name}", "", f"{full.title} ({full.source}).", "", *_cases(full)]
+            lines += ["", f"### {name}", "", *_whence(name, full), "", *_cases(full)]
+            lines += _own([claim for claim in full.claims if (name, claim.asked) not in of_papers])
     return "\n".join(lines) + "\n"
+
+
+def _asked_by_papers(rows: Iterable[PaperClaim], named: dict[str, Study]) -> set[tuple[str, str]]:
+    """Studies, and the digests of what papers' claims ask of them."""
+    return {
+        (one.study, found.judged.asked)
+        for one in rows
+        if one.study
+        for found in verdicts(one, named[one.study])
+        if found.judged
+    }
+
+
+def _own(judged: Sequence[JudgedClaim]) -> Iterator[str]:
+    if judged:
+        yield ""
+        yield "| our own claim | what was found |"
+        yield "|---|---|"
+    for claim in judged:
+        yield f"| {claim.says} | {_said('', claim)} |"
 
 
 class Found(NamedTuple):
@@ -139,17 +164,53 @@ def _window(claim: Claim) -> str:
     return f"from {claim.since:g} s on" if claim.since else ""
 
 
-def _tally(rows: Iterable[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
-    yield "| paper | claims | hold | do not hold | undecided | by tests | not flown yet | not judged |"
-    yield "|---|---|---|---|---|---|---|---|"
+def outcome(one: PaperClaim, study: Study | None) -> str:
+    """What became of a claim of a paper in all of its cases, and all that judges it; one of `OUTCOMES`."""
+    judged = [] if study is None else [found.judged for found in verdicts(one, study)]
+    if not (judged or one.tests):
+        return NOT_JUDGED
+    decided = all_of(each.decision for each in judged if each is not None) if any(judged) else Decision.HOLDS
+    if decided != Decision.DOES_NOT_HOLD and None in judged:
+        return NOT_ALL_FLOWN
+    return decided
+
+
+def _tally(rows: Sequence[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
+    """What became of claims, and what of verdicts, of which a claim has one for each case."""
+    yield "A claim of a paper holds where it does in all of its cases, and by all that judges it:"
+    yield ""
+    yield from _table(["paper", "claims", *OUTCOMES], _by_paper(rows, lambda ours: _outcomes(ours, named)))
+    yield ""
+    yield "Studies give one verdict for each case of such a claim; of these:"
+    yield ""
+    decided = [*map(str, Decision), _NOT_FLOWN]
+    yield from _table(["paper", "verdicts", *decided], _by_paper(rows, lambda ours: _decisions(ours, named)))
+
+
+def _by_paper(
+    rows: Sequence[PaperClaim], count: Callable[[Sequence[PaperClaim]], list[int]]
+) -> Iterator[tuple[str, list[int]]]:
     for paper in PAPERS:
-        ours = [one for one in rows if one.paper == paper]
-        flown = [judged for one in ours if one.study for *_, judged in verdicts(one, named[one.study])]
-        decided = [sum(judged is not None and judged.decision == what for judged in flown) for what in Decision]
-        tested = sum(bool(one.tests) for one in ours)
-        left = sum(not one.tests and not one.study for one in ours)
-        numbers = [len(ours), *decided, tested, sum(judged is None for judged in flown), left]
-        yield f"| {paper} | " + " | ".join(map(str, numbers)) + " |"
+        numbers = count([one for one in rows if one.paper == paper])
+        yield paper, [sum(numbers), *numbers]
+
+
+def _outcomes(ours: Sequence[PaperClaim], named: dict[str, Study]) -> list[int]:
+    came = [outcome(one, named[one.study] if one.study else None) for one in ours]
+    return [came.count(what) for what in OUTCOMES]
+
+
+def _decisions(ours: Sequence[PaperClaim], named: dict[str, Study]) -> list[int]:
+    judged = [found.judged for one in ours if one.study for found in verdicts(one, named[one.study])]
+    flown = [one.decision for one in judged if one is not None]
+    return [*(flown.count(what) for what in Decision), judged.count(None)]
+
+
+def _table(head: Sequence[str], rows: Iterable[tuple[str, Sequence[int]]]) -> Iterator[str]:
+    yield "| " + " | ".join(head) + " |"
+    yield "|---" * len(head) + "|"
+    for name, numbers in rows:
+        yield f"| {name} | " + " | ".join(map(str, numbers)) + " |"
 
 
 def _row(one: PaperClaim, named: dict[str, Study]) -> str:
@@ -157,7 +218,7 @@ def _row(one: PaperClaim, named: dict[str, Study]) -> str:
     if one.study:
         for says, all_found in groupby(verdicts(one, named[one.study]), key=attrgetter("says")):
             said += _summed_up(says if len(one.claims) > 1 else "", list(all_found))
-        by.append(f"`{one.study}`" + _picture(one.study))
+        by.append(f"`affinet study {one.study}`" + _more(one.study))
     if one.tests:
         said.append("holds, by tests")
         by += [f"`{test.partition('::')[2]}`" for test in one.tests]
@@ -194,17 +255,26 @@ def _said(where: str, judged: JudgedClaim | None) -> str:
     return f"{where}{decision}: {judged.found}"
 
 
-def _picture(study: str) -> str:
+def _more(study: str) -> str:
+    """Where the means of its cases are, and its picture, as far as it was flown."""
+    links = [f"[means](#{study})"] if record.full_study(study) else []
     file = PICTURES / f"{study}.png"
-    return f" ([picture](pictures/{file.name}))" if file.exists() else ""
+    links += [f"[picture](pictures/{file.name})"] if file.exists() else []
+    return f" ({', '.join(links)})" if links else ""
+
+
+def _whence(name: str, full: StudyRecord) -> Iterator[str]:
+    yield f"{full.title} ({full.source})."
+    yield ""
+    yield f"{full.runs} runs of each case, intervals of {100 * full.confidence:.0f} %, from"
+    yield f"[{name}.json](../affinet/shipped/results/{name}.json);"
+    yield f"`affinet study {name}` flies it again."
 
 
 def _cases(full: StudyRecord) -> Iterator[str]:
     quantities = list(dict.fromkeys(case.quantity for case in full.cases))
     units = {case.quantity: f", {case.unit}" if case.unit else "" for case in full.cases}
     names = list(full.cases[0].labels)
-    yield f"{full.runs} runs of each case."
-    yield ""
     yield "| " + " | ".join([*names, *(f"{name}{units[name]}" for name in quantities)]) + " |"
     yield "|---" * (len(names) + len(quantities)) + "|"
     for labels in dict.fromkeys(tuple(case.labels.values()) for case in full.cases):

@@ -215,8 +215,8 @@ def _study(parsed: argparse.Namespace) -> int:
     results: list[Result] = []
     with directories.unless_empty(out), ended_by_signals():
         try:
-            with show.Grid(study.title, len(planned)) as grid:
-                for result in studies.fly(planned, study.size(quick=parsed.quick).runs):
+            with show.Grid(study.title, [plan.world.ticks for _, plan in planned]) as grid:
+                for result in studies.fly(planned, study.size(quick=parsed.quick).runs, grid.look):
                     results.append(result)
                     grid.see(result)
         except BrokenExecutor:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from affinet.cli.progress import Bar
+from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
@@ -89,11 +90,23 @@ class HuntProgress:
 
 
 class Grid:
-    """How far a study is, on standard error."""
+    """How far a study is, and about how long it takes on, on standard error: a bar, or a line for each case.
 
-    def __init__(self, title: str, cases: int) -> None:
-        self._cases, self._done = cases, 0
-        self._bar = Bar(title, cases, bar.BarColumn(), bar.TextColumn(_SAYS), bar.TimeRemainingColumn())
+    Parameters
+    ----------
+    title
+        Of the study.
+    ticks
+        Of each case, by which it takes its part of the time.
+    now
+        The time, in seconds.
+    """
+
+    def __init__(self, title: str, ticks: Sequence[int], now: Callable[[], float] = time.perf_counter) -> None:
+        self._title, self._ticks, self._now = title, ticks, now
+        self._shares, self._done = [0.0] * len(ticks), 0
+        self._began = now()
+        self._bar = Bar(title, sum(ticks), bar.BarColumn(), bar.TextColumn(_SAYS), says=self._says(), every_s=math.inf)
 
     def __enter__(self) -> Grid:
         self._bar.__enter__()
@@ -102,10 +115,31 @@ class Grid:
     def __exit__(self, *failure: object) -> None:
         self._bar.__exit__(*failure)
 
+    def look(self, shares: Sequence[float]) -> None:
+        """Show which share of each case has flown."""
+        self._shares = [*([1.0] * self._done), *shares[self._done :]]
+        self._bar.see(self._flown, self._says())
+
     def see(self, result: Result) -> None:
         """Show that a case is done."""
         self._done += 1
-        self._bar.see(self._done, f"{self._done}/{self._cases} cases  {', '.join(result.labels.values())}")
+        self._shares[self._done - 1] = 1.0
+        self._bar.see(self._flown, self._says())
+        if not self._bar.is_at_a_terminal:
+            self._bar.tell(f"{self._title}: {self._says()}  {', '.join(result.labels.values())}")
+
+    @property
+    def _flown(self) -> float:
+        return sum(share * ticks for share, ticks in zip(self._shares, self._ticks, strict=True))
+
+    def _says(self) -> str:
+        share = self._flown / sum(self._ticks)
+        said = (
+            f"{self._done}/{len(self._ticks)} cases",
+            f"{int(100 * share)} %",
+            left(self._now() - self._began, share),
+        )
+        return "  ".join(filter(None, said))
 
 
 def claims(judged: StudyRecord, full: StudyRecord | None, out: Path) -> None:

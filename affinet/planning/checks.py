@@ -12,9 +12,10 @@ import numpy as np
 from agents.algebra import stability
 from agents.loading import capabilities
 from agents.swarm import SwarmBrief
-from analysis.models.arrays import Array, Integers
+from analysis.models.arrays import Array
 from analysis.models.finding import Finding
 from analysis.models.graph import reached
+from netem.core.listing import listed
 from netem.faults.fault import Fault
 from world.formation import manoeuvre as manoeuvres
 from world.formation import stress
@@ -112,12 +113,12 @@ def own_weights(formation: Formation, L: Array) -> list[Finding]:
     unbalanced = off > _BALANCED * (np.abs(rows) * apart).sum(axis=1)
     if unbalanced.any():
         agents, by = followers[unbalanced] + 1, off[unbalanced][0]
-        says = f"the weights of agent {agents[0]} do not balance: sum l_ij p_ij is {by:.3g} m off"
-        return [Finding("weights", "error", f"{says}{_others(agents)}; give more digits, or other weights")]
+        says = f"the weights of agent {listed(agents, most=1)} do not balance: sum l_ij p_ij is {by:.3g} m off"
+        return [Finding("weights", "error", f"{says}; give more digits, or other weights")]
     idle = followers[np.diag(L)[followers] <= 0.0] + 1
     if len(idle):
-        says = f"the weights of agent {idle[0]} do not sum to more than 0, and laws divide by their sum"
-        return [Finding("weights", "error", f"{says}{_others(idle)}; give all of its weights the other sign")]
+        says = f"the weights of agent {listed(idle, most=1)} do not sum to more than 0, and laws divide by their sum"
+        return [Finding("weights", "error", f"{says}; give all of its weights the other sign")]
     real = np.sort(np.linalg.eigvals(rows[:, followers]).real)
     if real[0] <= _POSITIVE * real[-1]:
         says = f"follower block has an eigenvalue with a real part of {real[0]:.4g}, not above 0: it does not settle"
@@ -127,10 +128,6 @@ def own_weights(formation: Formation, L: Array) -> list[Finding]:
         Finding("weights", "ok", f"of its own, {kind}: followers balance where they stand"),
         Finding("followers", "ok", f"follower block eigenvalues {real[0]:.4f} to {real[-1]:.4f}"),
     ]
-
-
-def _others(agents: Integers) -> str:
-    return f", and {len(agents) - 1} more" if len(agents) > 1 else ""
 
 
 def step(law: Any, swarm: SwarmBrief) -> Finding:

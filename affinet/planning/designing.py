@@ -13,7 +13,7 @@ from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.units import LARGEST
 from affinet.scenario.words import shown
 from analysis.models.arrays import Array
-from world.formation import layouts, stress
+from world.formation import layouts
 from world.formation.design import design
 from world.formation.nominal import Formation, NotRigid
 
@@ -52,7 +52,7 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
     if len(nominal) < least:
         raise ScenarioError(f"{len(nominal)} nodes: a stress in {least - 2} dimensions needs {least} at least")
     try:
-        formation = design(nominal, reach, 1.0 / (_GAIN * settle))
+        formation, smallest = design(nominal, reach, 1.0 / (_GAIN * settle))
     except NotRigid as error:
         raise ScenarioError(f"--range {reach:g}: {error}; give a longer range") from error
     except ValueError as error:
@@ -72,10 +72,7 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
         "sensing": {"sigma": 0.1},
         "agents": {"estimator": "none", "law": "static", "parameters": {"static": {"alpha": _GAIN}}},
     }
-    L = stress.own(formation, formation.weights)
-    followers = ~formation.is_leader
-    slow = float(np.linalg.eigvalsh(L[np.ix_(followers, followers)])[0])
-    return Designed(Scenario.model_validate(said), formation, 1.0 / (_GAIN * slow))
+    return Designed(Scenario.model_validate(said), formation, 1.0 / (_GAIN * smallest))
 
 
 def nodes(kind: str, agents: int | None, dimension: int | None, seed: int) -> Array:

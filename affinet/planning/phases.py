@@ -12,12 +12,12 @@ from agents.swarm import SwarmBrief
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 from netem.core.links import Links
+from netem.core.listing import listed
 from netem.faults.fault import Fault
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import PASSED, standing
 
 _ZERO = 1e-6  # of eigenvalues, as a share of the largest where nothing is missing
-_MOST_NAMED = 6  # links
 
 
 class Graph(NamedTuple):
@@ -124,11 +124,10 @@ def _without(links: Links, graph: Graph, whole: Graph) -> str:
     deaf = (np.flatnonzero(whole.steered & graph.present & ~graph.steered) + 1).tolist()
     hearing = graph.steered[links.dst - 1] & graph.present[links.src - 1]
     missing = np.flatnonzero(hearing & ~graph.measured)
-    named = [f"{links.src[row]}->{links.dst[row]}" for row in missing[:_MOST_NAMED]]
-    more = [f"{len(missing) - _MOST_NAMED} more"] if len(missing) > _MOST_NAMED else []
+    named = listed(f"{links.src[row]}->{links.dst[row]}" for row in missing)
     words = [
         *([f"without agents {absent}"] if absent else []),
         *([f"with agents {deaf} paused"] if deaf else []),
-        *([f"without {', '.join([*named, *more])}"] if named else []),
+        *([f"without {named}"] if named else []),
     ]
     return ", ".join(words)

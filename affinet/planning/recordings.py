@@ -13,13 +13,12 @@ from affinet.scenario import loading
 from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
 from analysis.models.arrays import Mask
 from netem.core.links import Links
+from netem.core.listing import listed
 from netem.impairments.trace import MeasuredAvailability
 from netem.medium.medium import JOURNAL
 
 if TYPE_CHECKING:
     from netem.medium.journal import Carried
-
-_NAMED = 6
 
 
 def refuse_to_judge(before: Scenario, given: Scenario) -> None:
@@ -107,5 +106,4 @@ def _links(given: Scenario) -> Links:
 
 
 def _pairs(pairs: Sequence[tuple[int, int]]) -> str:
-    named = ", ".join(f"{src}->{dst}" for src, dst in pairs[:_NAMED])
-    return f"{named} and {len(pairs) - _NAMED} more" if len(pairs) > _NAMED else named
+    return listed(f"{src}->{dst}" for src, dst in pairs)

@@ -11,7 +11,6 @@ import subprocess
 import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,13 +19,13 @@ from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
+from netem.core.listing import listed
 from netem.processes.supervised import BEAT_S
 
 _GRACE_S = 1.2
 # To start takes a second of processor time, and there may be a hundred on two cores.
 _START_S, _START_EACH_S = 30.0, 3.0
 _LATE_BEATS = 2
-_NAMED = 6
 
 
 class ProcessGroup:
@@ -303,19 +302,14 @@ def _has_ended(child: Child) -> bool:
 
 
 def _said_of(children: Sequence[Child]) -> str:
-    said = ", ".join(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children[:_NAMED])
-    return f"{said} and {len(children) - _NAMED} more" if len(children) > _NAMED else said
+    return listed(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children)
 
 
 def _who_waits(beats: Mapping[str, Beat | None], whom: Collection[str]) -> str:
     waiting = {name: beat for name, beat in beats.items() if beat and not set(whom).isdisjoint(beat.waits)}
-    said = [f"{name} waits for {_of_whom(beat)}" for name, beat in islice(waiting.items(), _NAMED)]
-    more = [f"and {len(waiting) - _NAMED} more"] if len(waiting) > _NAMED else []
-    return "; ".join([*said, *more]) or "the launcher waits for it"
+    said = (f"{name} waits for {_of_whom(beat)}" for name, beat in waiting.items())
+    return listed(said, between="; ") or "the launcher waits for it"
 
 
 def _of_whom(beat: Beat) -> str:
-    whom = ", ".join(beat.waits[:_NAMED]) + (
-        f" and {len(beat.waits) - _NAMED} more" if len(beat.waits) > _NAMED else ""
-    )
-    return f"{whom} ({beat.what}, tick {beat.tick})"
+    return f"{listed(beat.waits)} ({beat.what}, tick {beat.tick})"

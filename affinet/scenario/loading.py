@@ -23,6 +23,7 @@ from netem.core.plain import shown
 
 FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
+_WAYS = "behind --set, or among the overrides in Python"
 
 
 def shipped() -> list[str]:
@@ -177,12 +178,12 @@ def _value(override: str, text: str) -> Any:
         text.encode()
         said = tomllib.loads(f"value = {text}")
     except UnicodeEncodeError as error:
-        raise ScenarioError(f"--set {one_line(override)}: not UTF-8, as TOML must be") from error
+        raise ScenarioError(f"override {one_line(override)}: not UTF-8, as TOML must be") from error
     except (ValueError, RecursionError):
         return text.strip()
     if said.keys() != {"value"}:
         raise ScenarioError(
-            f"--set {one_line(override)}: it says more than one value; give each key a --set of its own"
+            f"override {one_line(override)}: it says more than one value; give each key an override of its own"
         )
     return said["value"]
 
@@ -191,13 +192,15 @@ def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
     key, equals, text = override.partition("=")
     *tables, name = source.parts(key)
     if not equals or not name:
-        raise ScenarioError(f"--set {one_line(override)}: write it as key=value, like network.availability=0.5")
+        raise ScenarioError(
+            f"override {one_line(override)}: write it as key=value, like network.availability=0.5, {_WAYS}"
+        )
     value = _value(override, text)
     table: Any = raw
     for step in tables:
         table = table.setdefault(step, {})
         if not isinstance(table, dict):
-            raise ScenarioError(f"--set {one_line(override)}: {step} is not a table")
+            raise ScenarioError(f"override {one_line(override)}: {step} is not a table")
     if tables == ["sensing"]:
         _make_room(table, name)
     said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)

@@ -18,15 +18,15 @@ class Source:
     overrides: tuple[str, ...]
 
     def place(self, key: str) -> str:
-        """Where a key was given: --set, or the file with the line of the key."""
+        """Where a key was given: an override, or the file with the line of the key."""
         if self.overrides_say(key):
-            return "--set"
+            return "override"
         steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
         line = _line_of(self.text, steps)
         return f"{self.file}:{line}" if line else self.file
 
     def overrides_say(self, key: str) -> bool:
-        """Whether a key was given by --set, or a part of it, or a table that it is part of."""
+        """Whether a key was given by an override, or a part of it, or a table that it is part of."""
         given = [".".join(parts(override.partition("=")[0])) for override in self.overrides]
         return any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given)
 

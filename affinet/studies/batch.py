@@ -106,7 +106,7 @@ class Runs:
         )
 
 
-def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
+def fly_all(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float], None] = lambda _: None) -> Runs:
     """The runs of a plan with each of these seeds.
 
     Parameters
@@ -115,17 +115,27 @@ def fly_all(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
         What to fly, and with which draws.
     every
         Ticks from one that is kept to the next.
+    tell
+        Told which share of it is done, tick by tick.
 
     Raises
     ------
     NotABatch
         When the plan cannot be flown side by side.
     """
-    parts = [_fly(plan, seeds[first : first + _AT_ONCE], every) for first in range(0, len(seeds), _AT_ONCE)]
+    firsts = range(0, len(seeds), _AT_ONCE)
+    parts = [
+        _fly(plan, seeds[first : first + _AT_ONCE], every, _of_all(tell, number, len(firsts)))
+        for number, first in enumerate(firsts)
+    ]
     return reduce(Runs.together, parts)
 
 
-def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
+def _of_all(tell: Callable[[float], None], number: int, parts: int) -> Callable[[float], None]:
+    return lambda share: tell((number + share) / parts)
+
+
+def _fly(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float], None]) -> Runs:
     together, size = side_by_side(plan, seeds), plan.world.formation.agents
     swarm = InProcessSwarm(together)
     tracking: list[Array] = []
@@ -164,6 +174,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int) -> Runs:
                 first.append(_shown(plan, moment))
                 places.keep(moment)
                 peak = np.zeros(len(seeds))
+            tell((instant.tick + 1) / plan.world.ticks)
         error = np.stack(tracking, axis=1)
         mean_error = error.mean(axis=1)
         seconds = np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt

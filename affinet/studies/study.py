@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ from affinet.scenario.units import Finite, NotNegative
 from affinet.studies import checks
 from affinet.studies.batch import Runs, fly_all
 from affinet.studies.checks import Wrong
-from affinet.studies.pool import in_processes
+from affinet.studies.pool import in_processes, tell
 from affinet.studies.quantities import Quantity
 from analysis.models.arrays import Mask
 from netem.processes.user_code import UserCodeError
@@ -264,9 +264,19 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
             yield case
 
 
-def fly(planned: Sequence[tuple[Case, Plan]], runs: int) -> Iterator[Result]:
-    """So many runs of each case, as many cases at a time as there are processors; each as it is done."""
-    with closing(in_processes(_fly, [(plan, runs) for _, plan in planned])) as flown:
+def fly(
+    planned: Sequence[tuple[Case, Plan]], runs: int, watch: Callable[[Sequence[float]], None] = lambda _: None
+) -> Iterator[Result]:
+    """So many runs of each case, as many cases at a time as there are processors; each as it is done.
+
+    Parameters
+    ----------
+    planned, runs
+        The cases, and how many runs of each.
+    watch
+        Told from time to time which share of each case has flown.
+    """
+    with closing(in_processes(_fly, [(plan, runs) for _, plan in planned], watch)) as flown:
         for case, plan in planned:
             with _in_case(case):
                 done = next(flown)
@@ -296,7 +306,7 @@ def _planned(study: Study, case: Case) -> Plan:
             return planning.make(study.loaded(case.overrides))
     except (ScenarioError, PlanError) as error:
         where = f"{study._source.file}: " if study._source else ""
-        said = str(error).removeprefix("--set: ")  # which nobody typed
+        said = str(error).removeprefix("override: ")  # which nobody typed
         raise ScenarioError(f"{where}case {checks.named(case.labels)}: {said}") from error
 
 
@@ -317,7 +327,7 @@ def _every(plan: Plan) -> int:
 def _fly(given: tuple[Plan, int]) -> Runs:
     plan, runs = given
     first = plan.scenario.seed
-    return fly_all(plan, range(first, first + runs), _every(plan))
+    return fly_all(plan, range(first, first + runs), _every(plan), tell)
 
 
 def selected(one: Case | Result, labels: Mapping[str, str]) -> bool:

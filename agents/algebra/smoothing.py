@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from functools import reduce
 from math import comb, factorial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,30 +42,53 @@ def mixed(older: Array, newer: Array, share: Array) -> Array:
     return jets.scaled(rest, older) + jets.scaled(share, newer)
 
 
-def splined(older: Array, newer: Array, passed: Array, seconds: Array) -> Array:
-    """The jet of the polynomial from one sample to the next, with m derivatives alike at both (remark 3).
+class Counts(NamedTuple):
+    """By how much derivative number k of a sample counts in the jet of the spline: (m + 1, m + 1, ...), by k and by order."""
+
+    older: Array
+    newer: Array
+
+
+def counts(passed: Array, seconds: Array, order: int) -> Counts:
+    """What counts for how much in the polynomial from one sample to the next, with m derivatives alike at both (remark 3).
 
     Parameters
     ----------
-    older, newer
-        Jets of information where the samples were taken, shape (m + 1, ..., r, c).
     passed
         How much of the way has passed, shape (...).
     seconds
         How long the way takes, shape (...).
+    order
+        m.
     """
-    orders, rate = len(older), 1.0 / seconds
+    orders, rate = order + 1, 1.0 / seconds
     begun = [jets.power(passed, exponent, rate, orders) for exponent in range(orders)]
     left = [jets.power(1.0 - passed, exponent, -rate, orders) for exponent in range(orders)]
     begins, ends = (
         _at_one_end(from_it, jets.power(to_it, orders, way, orders))
         for from_it, to_it, way in ((begun, 1.0 - passed, -rate), (left, passed, rate))
     )
+    units = [whole_power(seconds, held) / factorial(held) for held in range(orders)]
+    return Counts(
+        older=np.stack([begins[held] * unit for held, unit in enumerate(units)]),
+        newer=np.stack([ends[held] * (-unit if held % 2 else unit) for held, unit in enumerate(units)]),
+    )
+
+
+def splined(older: Array, newer: Array, by: Counts) -> Array:
+    """The jet of the spline from one sample to the next.
+
+    Parameters
+    ----------
+    older, newer
+        Jets of information where the samples were taken, shape (m + 1, ..., r, c).
+    by
+        What counts for how much.
+    """
     terms = []
-    for held in range(orders):
-        unit = whole_power(seconds, held) / factorial(held)
-        terms.append((begins[held] * unit)[..., None, None] * older[held])
-        terms.append((ends[held] * (-unit if held % 2 else unit))[..., None, None] * newer[held])
+    for held in range(len(older)):
+        terms.append(by.older[held][..., None, None] * older[held])
+        terms.append(by.newer[held][..., None, None] * newer[held])
     return reduce(np.add, terms)
 
 

@@ -275,8 +275,8 @@ class TargetEstimator(Estimator[Track]):
             share = self._share(target, state, brief.dt)
             Q, y = (smoothing.mixed(*_pair(jet), share) for jet in predicted(target, both, state.now, brief.dt))
         else:
-            way = _passed(target, state, brief.dt)
-            Q, y = (smoothing.splined(*_pair(jet), *way) for jet in predicted(target, both, both.made, brief.dt))
+            by = smoothing.counts(*_passed(target, state, brief.dt), target.order)
+            Q, y = (smoothing.splined(*_pair(jet), by) for jet in predicted(target, both, both.made, brief.dt))
         return Q, y
 
     def _share(self, target: Target, state: Track, dt: float) -> Array:

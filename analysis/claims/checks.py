@@ -9,16 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.claims import intervals
+from analysis.claims.falling import fall
 from analysis.claims.intervals import Decision, Interval, all_of
-from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
-from analysis.models.elementary import log, whole_power
+from analysis.models.elementary import whole_power
 
 Span = tuple[float, float | None]
 
 _MOST = 0.9  # of the runs
 _DOUBLE = 2.0
 _STRAIGHT = 0.99
+_HIGHEST_ORDER = 10.0  # of the power laws that an exponential is told from
 _FEWEST_MOMENTS = 5  # of a line that is found, not drawn
 _PARTS = 10  # of the runs, for what only means over runs show
 _HIGH = 0.9  # a correlation
@@ -151,26 +152,30 @@ def leaves(says: str, seconds: Array, error: Array, level: float, span: Span, un
 
 
 def exponential(says: str, seconds: Array, error: Array, span: Span) -> ClaimVerdict:
-    """In most runs (R, T) the logarithm of the error falls along a straight line over a span of seconds, by one at least."""
+    """In most runs (R, T) the logarithm of the error falls along a line over a span of seconds, by one at least.
+
+    Over a short span that of any power law does too: its curvature must tell it from those up to the tenth order, whenever they
+    began.
+
+    Parameters
+    ----------
+    says, seconds, error
+        The claim, the moments, shape (T,), and the error, shape (R, T).
+    span
+        In seconds.
+    """
     inside = within(seconds, span)
     if inside.sum() < _FEWEST_MOMENTS:
         return ClaimVerdict(says, Decision.UNDECIDED, f"{inside.sum()} moments are no line: {_FEWEST_MOMENTS} are")
-    # Runs may diverge, stand still, or end at 0.
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        time, logarithm = seconds[inside] - seconds[inside].mean(), log(error[:, inside])
-        slope = product(logarithm, time) / product(time, time)
-        total = logarithm - logarithm.mean(axis=1, keepdims=True)
-        explained = 1.0 - whole_power(total - slope[:, None] * time, 2).sum(axis=1) / whole_power(total, 2).sum(axis=1)
-        straight = (explained >= _STRAIGHT) & (slope < 0.0)
-        short = straight & (-slope * (time[-1] - time[0]) < 1.0)
+    falls = fall(seconds[inside], error[:, inside])
+    above, unsure = falls.exceeds(_HIGHEST_ORDER)
+    straight = (falls.explained >= _STRAIGHT) & (falls.rate > 0.0)
+    those = straight & above & (falls.times >= 1.0)
+    open_still = straight & (above | unsure) & ~those
     nowhere = np.isnan(error[:, inside]).any(axis=1)
-    rate = f", by {-slope[straight].mean():.3g} 1/s" if straight.any() else ""
-    return _of_most(
-        says,
-        straight & ~short,
-        short | nowhere,
-        f"fall along a line (R² at least {_STRAIGHT:g}), to 1/e at least{rate}",
-    )
+    rate = f", by {falls.rate[those].mean():.3g} 1/s" if those.any() else ""
+    do = f"fall along a line (R² at least {_STRAIGHT:g}), to 1/e at least, by no power law below order {_HIGHEST_ORDER:g}{rate}"
+    return _of_most(says, those, open_still | nowhere, do)
 
 
 def never_above(says: str, values: Array, bounds: Array) -> ClaimVerdict:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from netem.core.listing import listed
+
 
 class Verb(StrEnum):
     """What a fault does while it lasts."""
@@ -148,8 +150,7 @@ class Fault:
 
     def links(self) -> str:
         """The links that it names, for people."""
-        shown = ", ".join(f"{src}->{dst}" for src, dst in self.pairs[:12])
-        return f"{shown} and {len(self.pairs) - 12} more" if len(self.pairs) > 12 else shown
+        return listed((f"{src}->{dst}" for src, dst in self.pairs), most=12)
 
 
 def _numbers(vector: tuple[float, ...]) -> str:

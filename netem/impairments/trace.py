@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core.links import Links
+from netem.core.listing import listed
 from netem.impairments.measured import Lines, MeasuredError, read, shown
 
 _COLUMNS = ("time", "src", "dst", "availability")
@@ -156,8 +157,8 @@ def table(measured: MeasuredAvailability, links: Links, rows: Mask, dt: float, t
     if not len(changes) or changes[0] != 0:
         raise TraceError("the trace must begin at time 0")
     if (gaps := np.flatnonzero(np.isnan(availability[0]) & rows)).size:
-        missing = ", ".join(f"{links.src[row]}->{links.dst[row]}" for row in gaps[:6])
-        raise TraceError(f"no availability at time 0 for {missing}{' and more' if len(gaps) > 6 else ''}")
+        missing = listed(f"{links.src[row]}->{links.dst[row]}" for row in gaps)
+        raise TraceError(f"no availability at time 0 for {missing}")
     return changes, np.where(rows, availability, 1.0)
 
 

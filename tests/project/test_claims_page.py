@@ -68,3 +68,68 @@ def test_cases_that_come_out_alike_are_counted_and_the_others_named():
         "late: it flies: not flown in full yet",
     ]
     assert list(claims_page._summed_up("", cases[:1])) == ["case 0: holds: 1 (0 to 2)"]
+
+
+STUDIES = {name: study.load(name) for name in study.shipped()}
+
+
+def judged_as(monkeypatch, *decisions):
+    """A claim of a paper on a study in as many cases, and what came of each; None is of one that was not flown."""
+    found = [
+        claims_page.Found("s", "", each and record.JudgedClaim(says="s", asked="a", decision=Decision(each), found=""))
+        for each in decisions
+    ]
+    monkeypatch.setattr(claims_page, "verdicts", lambda *_: iter(found))
+    return next(one for one in ROWS if one.study and not one.tests)
+
+
+@pytest.mark.parametrize(
+    ("decisions", "came"),
+    [
+        (["holds", "holds"], "holds"),
+        (["holds", "undecided"], "undecided"),
+        (["holds", None], claims_page.NOT_ALL_FLOWN),
+        (["undecided", None], claims_page.NOT_ALL_FLOWN),
+        ([None], claims_page.NOT_ALL_FLOWN),
+        (["does not hold", None, "holds"], "does not hold"),
+    ],
+)
+def test_a_claim_holds_where_it_does_in_all_of_its_cases(decisions, came, monkeypatch):
+    one = judged_as(monkeypatch, *decisions)
+    assert claims_page.outcome(one, STUDIES[one.study]) == came
+
+
+def test_a_claim_by_tests_holds_and_one_by_nothing_is_not_judged():
+    tested = next(one for one in ROWS if one.tests and not one.study)
+    assert claims_page.outcome(tested, None) == "holds"
+    assert claims_page.outcome(tested.model_copy(update={"tests": []}), None) == "not judged"
+
+
+def test_claims_are_counted_once_and_verdicts_once():
+    """Before: one table had claims in a column and their cases in the next."""
+    lines = [line.strip("| ").split(" | ") for line in claims_page._tally(ROWS, STUDIES) if line.startswith("| 0")]
+    of_claims, of_verdicts = lines[: len(claims_page.PAPERS)], lines[len(claims_page.PAPERS) :]
+    for paper, all_of_them, *numbers in of_claims + of_verdicts:
+        assert int(all_of_them) == sum(map(int, numbers)), paper
+    assert sum(int(line[1]) for line in of_claims) == len(ROWS)
+    asked = [each for one in ROWS if one.study for each in claims_page.verdicts(one, STUDIES[one.study])]
+    assert sum(int(line[1]) for line in of_verdicts) == len(asked)
+
+
+@pytest.mark.parametrize("name", sorted({one.study for one in ROWS if one.study}))
+def test_the_page_says_how_to_fly_a_study_again_and_which_file_its_figures_are_from(name):
+    written = claims_page.page()
+    assert f"`affinet study {name}`" in written
+    file = f"(../affinet/shipped/results/{name}.json)"
+    assert (file in written) == (record.full_study(name) is not None)
+    assert (f"[means](#{name})" in written) == (file in written)
+
+
+@pytest.mark.parametrize("name", ["noise-of-bearings", "localization-network"])
+def test_verdicts_on_our_own_claims_are_beneath_the_means(name):
+    written = claims_page.page().partition(f"### {name}\n")[2].partition("\n### ")[0]
+    assert all(f"| {claim.says} | " in written for claim in record.full_study(name).claims)
+
+
+def test_verdicts_on_claims_of_papers_are_not_said_again():
+    assert claims_page.page().partition("## Means of all cases")[2].count("| our own claim |") == 2

@@ -16,12 +16,12 @@ import numpy as np
 from scipy import sparse
 
 from analysis.models.arrays import Array, Integers
+from netem.core.listing import listed
 from world.formation import spectrum
 from world.formation.cliques import affine_basis, cliques
 from world.formation.leading import corners
 from world.formation.nominal import Formation, NotRigid
 
-_MOST_NAMED = 6  # agents
 _SINGULAR = 1e-9  # of the largest eigenvalue: what no leaders hold
 _DIGITS = 3
 ROUNDS = 3  # of evening out: more bring little (docs/decisions/0025)
@@ -39,8 +39,7 @@ def compose(formation: Formation) -> Array:
     L = summed(formation)
     if alone := (np.flatnonzero(L.diagonal() == 0.0) + 1).tolist():
         least = formation.dimension + 2
-        more = f", and {len(alone) - _MOST_NAMED} more," if len(alone) > _MOST_NAMED else ""
-        raise NotRigid(f"agents {alone[:_MOST_NAMED]}{more} are in no clique of {least} or more that spans")
+        raise NotRigid(f"agents {listed(alone)} are in no clique of {least} or more that spans")
     top = spectrum.largest(L)
     held = corners(formation.nominal)
     followers = np.setdiff1d(np.arange(formation.agents), held)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy import sparse
 
@@ -9,11 +11,18 @@ from analysis.models.arrays import Array
 from world.formation import stress
 from world.formation.cliques import within
 from world.formation.composed import compose
-from world.formation.leading import leaders
+from world.formation.leading import led
 from world.formation.nominal import Formation
 
 
-def design(nominal: Array, reach: float, least: float) -> Formation:
+class Design(NamedTuple):
+    """A formation, and the smallest eigenvalue of its followers' block."""
+
+    formation: Formation
+    smallest: float
+
+
+def design(nominal: Array, reach: float, least: float) -> Design:
     """A formation with weights of its own, symmetric and of largest eigenvalue 1, that settles as fast as is asked.
 
     Parameters
@@ -34,5 +43,5 @@ def design(nominal: Array, reach: float, least: float) -> Formation:
     """
     bare = Formation(nominal, within(nominal, reach), ())
     weights = compose(bare)
-    chosen = leaders(nominal, sparse.csr_array(stress.laplacian(bare, weights)), least)
-    return Formation(nominal, bare.edges, chosen, np.column_stack([weights, weights]))
+    chosen, smallest = led(nominal, sparse.csr_array(stress.laplacian(bare, weights)), least)
+    return Design(Formation(nominal, bare.edges, chosen, np.column_stack([weights, weights])), smallest)

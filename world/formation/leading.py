@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy import sparse
 
@@ -25,8 +27,15 @@ def corners(nominal: Array) -> list[int]:
     return found
 
 
-def leaders(nominal: Array, stress: sparse.csr_array, least: float) -> tuple[int, ...]:
-    """Agents, numbered from 1, who hold a formation so that its followers settle.
+class Led(NamedTuple):
+    """Who leads, agents numbered from 1, and the smallest eigenvalue of the followers' block that they leave."""
+
+    leaders: tuple[int, ...]
+    smallest: float
+
+
+def led(nominal: Array, stress: sparse.csr_array, least: float) -> Led:
+    """Who holds a formation so that its followers settle.
 
     First the corners; then, one by one, who moves most in the slowest mode of the followers, which is what a leader there
     takes away (docs/decisions/0025 has what else was tried).
@@ -48,6 +57,6 @@ def leaders(nominal: Array, stress: sparse.csr_array, least: float) -> tuple[int
         followers = np.setdiff1d(np.arange(len(nominal)), found)
         smallest, mode = spectrum.slowest(stress[followers][:, followers], scale)
         if smallest >= least:
-            return tuple(row + 1 for row in sorted(found))
+            return Led(tuple(row + 1 for row in sorted(found)), smallest)
         found.append(int(followers[np.argmax(np.abs(mode))]))
     raise ValueError(f"no leaders make the smallest eigenvalue {least:g}, where the largest is {scale:g}")

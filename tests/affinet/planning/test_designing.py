@@ -157,7 +157,7 @@ def test_leaders_that_weigh_nobody_fly_their_manoeuvre(law):
 def test_rows_that_do_not_balance_are_refused_by_agent():
     weights = list(WEIGHTS)
     weights[-1] += 0.01  # 6-7, two metres apart each way
-    with pytest.raises(PlanError, match=r"weights: the weights of agent 6 do not balance: .* 0\.04 m off, and 1 more"):
+    with pytest.raises(PlanError, match=r"weights: the weights of agent 6 and 1 more do not balance: .* 0\.04 m off"):
         making.make(weighed(weights))
 
 

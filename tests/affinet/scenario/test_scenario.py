@@ -283,7 +283,7 @@ WRONG_OVERRIDES = [
     ("network.=3", "network.=3", "write it as key=value"),
     ("time.dt.x=3", "time.dt.x=3", "dt is not a table"),
     # The second line was read as another key, and dropped.
-    ("seed=1\nnetwork.availability=7", "seed=1", "it says more than one value; give each key a --set of its own"),
+    ("seed=1\nnetwork.availability=7", "seed=1", "it says more than one value; give each key an override of its own"),
     ("seed=1\n[network]\navailability=7", "seed=1", "it says more than one value"),
     ("description=\udcff", "description=", "not UTF-8, as TOML must be"),
     ("timeline.1.at=3", "timeline.1.at=3", "timeline is not a table"),
@@ -291,12 +291,12 @@ WRONG_OVERRIDES = [
 
 
 @pytest.mark.parametrize(("override", "key", "remedy"), WRONG_OVERRIDES, ids=[row[0] for row in WRONG_OVERRIDES])
-def test_a_wrong_override_is_one_line_that_says_set_the_key_and_what_would_be_right(file, override, key, remedy):
+def test_a_wrong_override_is_one_line_that_says_so_the_key_and_what_would_be_right(file, override, key, remedy):
     file.write_text(GOOD)
     with pytest.raises(ScenarioError) as error:
         making.make(loading.load(str(file), [override]))
     (line,) = str(error.value).splitlines()
-    assert line.startswith("--set")
+    assert line.startswith("override")
     assert key in line
     assert remedy in line
 

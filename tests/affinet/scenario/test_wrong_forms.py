@@ -26,7 +26,7 @@ def refused(*overrides):
         making.make(loading.load(flown, overrides))
     (line,) = str(error.value).splitlines()
     assert not RAW.search(line)
-    return line.removeprefix("--set: ")
+    return line.removeprefix("override: ")
 
 
 # ---- types: each of these was told in pydantic's own words, and a list of wrong elements in a line for each
@@ -111,7 +111,7 @@ WRONG_FORMS = [
     pytest.param(
         "manoeuvre={ keyframes = [{ time = 0 }, { time = 1 }] }",
         "manoeuvre.keyframes.1.theta: is missing; it has no default: give a list, like [[1.0, 0.0], [0.0, 1.0]] "
-        "(1 more like it in manoeuvre.keyframes.theta); 1 more mistake: manoeuvre.keyframes.1.offset (--set)",
+        "(1 more like it in manoeuvre.keyframes.theta); 1 more mistake: manoeuvre.keyframes.1.offset (override)",
         id="missing in every element",
     ),
 ]  # fmt: skip

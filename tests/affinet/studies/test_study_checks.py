@@ -8,11 +8,12 @@ import sys
 import psutil
 import pyarrow.parquet as pq
 import pytest
-from flying import PROCESSES
+from flying import PROCESSES, plan_of
 
 from affinet.cli import commands
 from affinet.scenario.sections import ScenarioError
 from affinet.studies import study
+from affinet.studies.batch import fly_all
 from analysis.figures import curves
 
 pytestmark = PROCESSES
@@ -170,7 +171,7 @@ NOT_FLOWN = [
     ),
     pytest.param(
         [("zhao7 = []", 'zhao7 = ["time.dt"]')],
-        "small.toml: case graph=zhao7, law=static, loss=0: --set time.dt: write it as key=value",
+        "small.toml: case graph=zhao7, law=static, loss=0: override time.dt: write it as key=value",
         id="no override",
     ),
     pytest.param(
@@ -218,7 +219,7 @@ class Done:
     def __init__(self, fail_after=None):
         self.fail_after = fail_after
 
-    def __call__(self, work, given):
+    def __call__(self, work, given, _watch):
         for number, one in enumerate(given):
             if number == self.fail_after:
                 raise KeyboardInterrupt
@@ -232,7 +233,10 @@ def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monk
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 1
     assert len(pq.read_table(out / "runs.parquet")) == 4 * 2
     assert (out / "claims.json").exists()
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line]
+    *cases, line = [line for line in capsys.readouterr().err.splitlines() if line]
+    assert [case.partition(" cases")[0] for case in cases] == [
+        f"{study.load(str(small(tmp_path))).title}: {n}/4" for n in (1, 2, 3, 4)
+    ]
     assert (
         line
         == f"{out} has the data, but not all of the report: IndexError('list index out of range'); {out}/report.log says where"
@@ -250,7 +254,7 @@ def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, mo
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT], ids=lambda one: one.name)
 def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_path, monkeypatch, capsys):
     class Ended(Done):
-        def __call__(self, work, given):
+        def __call__(self, work, given, _watch):
             for place, one in enumerate(given):
                 if place == 3:
                     signal.raise_signal(number)
@@ -316,6 +320,45 @@ def test_work_that_fails_ends_all_that_is_under_way(tmp_path):
     assert done.stdout == "[1, 1]\n"
     assert done.returncode == 1
     assert "ZeroDivisionError" in done.stderr.splitlines()[-1]
+
+
+TELLS = """
+import os, sys
+from affinet.studies.pool import in_processes, tell
+
+def work(given):
+    share, told, go_on = given
+    tell(share)
+    os.close(os.open(told, os.O_WRONLY))
+    os.close(os.open(go_on, os.O_RDONLY))
+    return share
+
+if __name__ == "__main__":
+    seen = []
+    def watch(shares):
+        if not seen:
+            os.close(os.open(sys.argv[1], os.O_RDONLY))  # it has told by now
+        seen.append(shares)
+        if len(seen) == 2:
+            os.close(os.open(sys.argv[2], os.O_WRONLY))
+    print(list(in_processes(work, [(0.25, *sys.argv[1:])], watch)), seen[1])
+"""
+
+
+def test_work_says_how_far_it_is_to_whom_waits_for_it(tmp_path):
+    script, told, go_on = tmp_path / "tells.py", tmp_path / "told", tmp_path / "go_on"
+    script.write_text(TELLS)
+    for fifo in (told, go_on):
+        os.mkfifo(fifo)
+    command = [sys.executable, str(script), str(told), str(go_on)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert done.stdout == "[0.25] [0.25]\n", done.stderr
+
+
+def test_a_flight_tells_which_share_of_it_is_done():
+    plan, told = plan_of("corridor", "time.dt=0.05", "time.duration=0.2"), []
+    fly_all(plan, range(1, 52), 1, told.append)  # in two parts
+    assert told == [each / 8 for each in range(1, 9)]
 
 
 def test_a_study_in_a_file_is_named_with_it(tmp_path):

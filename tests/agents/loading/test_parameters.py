@@ -188,7 +188,7 @@ REFUSED = [
 def test_what_does_not_fit_is_one_line_with_its_key(values, says, folder):
     name = f"{write(folder, FUTURE)}:Own"
     line = refusal(name, values)
-    assert line.startswith(f"--set: agents.parameters.{name}")
+    assert line.startswith(f"override: agents.parameters.{name}")
     assert says in line
     assert "\n" not in line
 

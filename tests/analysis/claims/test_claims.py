@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.claims import checks
+from analysis.claims.falling import fall
 from analysis.claims.intervals import Decision
 
 HOLDS, FAILS, OPEN = Decision.HOLDS, Decision.DOES_NOT_HOLD, Decision.UNDECIDED
@@ -290,7 +291,8 @@ def test_an_exponential_falls_along_a_line_at_its_rate():
     assert verdict.says == "says"
     assert verdict.decision is HOLDS
     assert verdict.found.startswith(
-        "100 of 100 runs fall along a line (R² at least 0.99), to 1/e at least, by 0.7 1/s;"
+        "100 of 100 runs fall along a line (R² at least 0.99), to 1/e at least, "
+        "by no power law below order 10, by 0.7 1/s;"
     )
 
 
@@ -312,6 +314,46 @@ def test_an_exponential_under_a_little_noise_still_falls_along_a_line():
 )
 def test_what_does_not_fall_along_a_line_is_no_exponential(other):
     assert checks.exponential("says", LATER, other * np.linspace(0.5, 3.0, 20)[:, None], ALL).decision is FAILS
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 4.0, 8.0])
+@pytest.mark.parametrize("began", [-5.0, 0.0])
+@pytest.mark.parametrize("falls_to", [0.9, np.exp(-1.0), 0.3, 0.1, 0.01])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_power_law_is_no_exponential_over_whatever_span(order, began, falls_to, noise):
+    """Before: 1/t^2 from 10 to 18 s was one, as its logarithm is straight to R² of 0.99."""
+    last = 10.0 * falls_to ** (-1.0 / order)
+    seconds = np.linspace(10.0, last, 100)
+    drawn = np.random.default_rng(5).standard_normal((60, 100))
+    verdict = checks.exponential("says", seconds + began, seconds**-order * (1.0 + noise * drawn), ALL)
+    assert verdict.decision is not HOLDS
+    if noise == 0.0:
+        assert verdict.decision is FAILS
+
+
+def test_a_fall_too_short_or_too_noisy_for_its_curvature_is_open():
+    for span, noise, decision in (((0.0, 10.0), 0.02, HOLDS), ((0.0, 1.6), 1e-3, HOLDS), ((0.0, 1.6), 0.02, OPEN)):
+        drawn = 1.0 + noise * np.random.default_rng(4).standard_normal((100, 101))
+        assert checks.exponential("says", LATER, falling() * drawn, span).decision is decision
+
+
+def test_a_power_law_is_of_an_order_above_all_below_its_own():
+    for began, order in ((1.0, 3.0), (20.0, 12.0)):
+        found = fall(LATER, (began + LATER[None]) ** -order)
+        for below in (order - 2.0, order + 4.0):
+            (surely,), (unsure,) = found.exceeds(below)
+            assert (surely, unsure) == (below < order, False)
+
+
+def test_errors_that_are_alike_from_moment_to_moment_tell_less():
+    rng = np.random.default_rng(6)
+    noise = rng.standard_normal((1000, 101))
+    for memory, share in ((0.0, 0.98), (0.5, 0.97), (0.9, 0.87)):
+        alike = noise.copy()
+        for tick in range(1, 101):
+            alike[:, tick] = memory * alike[:, tick - 1] + np.sqrt(1.0 - memory**2) * noise[:, tick]
+        found = fall(LATER, FALLS * np.exp(0.02 * alike))
+        assert np.mean((found.low <= 0.0) & (found.high >= 0.0)) > share
 
 
 def test_what_falls_by_next_to_nothing_or_at_two_moments_is_open():
@@ -336,7 +378,7 @@ def test_a_run_without_a_line_is_one_run_that_does_not_fall(last):
     verdict = checks.exponential("says", LATER, falling(np.where(LATER < 5.0, 1.0, last)), ALL)
     assert verdict.decision is HOLDS
     assert verdict.found.startswith("99 of 100 runs fall")
-    rate = float(verdict.found.split("by ")[1].split(" 1/s")[0])
+    rate = float(verdict.found.split("order 10, by ")[1].split(" 1/s")[0])
     assert 0.6 < rate < 0.8
 
 

@@ -224,8 +224,13 @@ CASES = {
     "agents.algebra.smoothing.mixed": of(
         smoothing.mixed, real(4, 3, 2, axis=1), real(4, 3, 2, axis=1), real(4, axis=1), out=1
     ),
+    "agents.algebra.smoothing.counts": of(
+        lambda passed, seconds: smoothing.counts(passed, seconds, 3), share(), share(), out=2
+    ),
     "agents.algebra.smoothing.splined": of(
-        smoothing.splined, real(4, 3, 2, axis=1), real(4, 3, 2, axis=1), share(), share(), out=1
+        lambda older, newer, *way: smoothing.splined(older, newer, smoothing.counts(*way, 3)),
+        *(real(4, 3, 2, axis=1), real(4, 3, 2, axis=1), share(), share()),
+        out=1,
     ),
     "agents.algebra.smoothing.lagging": of(
         lambda stages, entering: smoothing.lagging(stages, entering, 0.26), real(4, 9), real(9)

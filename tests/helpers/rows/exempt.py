@@ -65,7 +65,7 @@ EXEMPT = {
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
         world.formation.composed.compose world.formation.design.design
         world.formation.layouts.grid
-        world.formation.layouts.strewn world.formation.leading.corners world.formation.leading.leaders
+        world.formation.layouts.strewn world.formation.leading.corners world.formation.leading.led
         world.formation.spectrum.slowest analysis.models.cuts.smallest_cut
         analysis.models.jacobi.step analysis.models.jacobi.rates analysis.claims.random_graphs.edges
         analysis.claims.random_graphs.rates analysis.models.autoregressive.fit
@@ -93,6 +93,7 @@ EXEMPT = {
         analysis.claims.checks.follows analysis.claims.intervals.mean analysis.claims.intervals.difference
         analysis.claims.intervals.ratio analysis.claims.intervals.student analysis.figures.curves.evolution
         analysis.figures.curves.rates analysis.figures.curves.indicator analysis.figures.target.agreement
+        analysis.claims.falling.Fall.exceeds analysis.claims.falling.fall
     """,
     SHAPES: """
         agents.estimators.centralized.SwarmFilter.begin agents.algebra.geometry.identity agents.algebra.unknowns.EdgeModel.begin
