@@ -263,7 +263,8 @@ def test_ga_rkf_coasts_and_its_indicator_ages(geometry):
             shape, _ = conral.sense(PLACE, shape, np.zeros((3, 2)), np.zeros(3, dtype=bool))
             shape, _ = conral.fuse(PLACE, shape, deaf(PLACE, conral), own(tick))
         assert equal(after.shape.indicator, shape.indicator)
-        assert after.shape.indicator.psi == pytest.approx(25 * before.shape.indicator.psi) > 0.0
+        assert after.shape.indicator.psi == pytest.approx(25 * before.shape.indicator.psi)
+        assert before.shape.indicator.psi > 0.0
 
 
 # ---- a target
