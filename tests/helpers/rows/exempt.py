@@ -38,7 +38,7 @@ EXEMPT = {
         netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
         netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
-        agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
+        agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
@@ -104,6 +104,7 @@ EXEMPT = {
         agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
         agents.estimators.base.Centre.step
         agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        agents.estimators.base.Estimator.missed
         netem.impairments.own.Loss.lost world.physics.bodies.Body.rest world.physics.bodies.Body.coasting
         world.physics.bodies.Body.moved
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
