@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from affinet.verdicts.pursued import agreed as agreed
     from affinet.verdicts.pursued import found as found
     from agents.brief import Brief as Brief
+    from agents.brief import Gap as Gap
     from agents.brief import Own as Own
     from agents.brief import Reading as Reading
     from agents.estimate import Estimate as Estimate
@@ -97,7 +98,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "verdicts.pursued"): ("agreed", "found"),
     ("affinet", "verdicts.checking"): ("Checker", "CheckResult"),
     ("affinet", "verdicts.evidence"): ("Evidence",),
-    ("agents", "brief"): ("Brief", "Own", "Reading"),
+    ("agents", "brief"): ("Brief", "Gap", "Own", "Reading"),
     ("agents", "estimate"): ("Estimate", "no_edges", "no_indicator"),
     ("agents", "estimators.base"): ("Centre", "CentreEstimate", "Estimator"),
     ("agents", "estimators.centralized"): ("SwarmFilter",),

@@ -9,15 +9,15 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from agents.brief import DERIVATIVES, Brief, Own, Reading
+from agents.brief import DERIVATIVES, Brief, Gap, Own, Reading
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
 from agents.laws.base import Law
 from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
-from agents.loading import returned
+from agents.loading import capabilities, returned
 from analysis.models.affine import Manoeuvre
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 from analysis.models.pursuit import Sighting
 from netem.core.channels import INPUT
 from netem.loading.calling import Calling
@@ -26,11 +26,25 @@ from netem.loading.returned import array, pair
 
 
 class AgentState(NamedTuple):
-    """What an agent remembers from tick to tick; every array begins with the batch axes."""
+    """What an agent remembers from tick to tick; every array begins with the batch axes.
+
+    Parameters
+    ----------
+    estimator, law
+        The states of its algorithms.
+    input
+        Flown from its last tick on, shape (..., D).
+    sensed
+        The last tick in which it sensed, by the run's count and not by its clock, shape (...); -1 before the first.
+    held
+        Whether it was dead since, so that its body held, shape (...).
+    """
 
     estimator: Any
     law: Any
     input: Array
+    sensed: Integers
+    held: Mask
 
 
 class AgentAction(NamedTuple):
@@ -94,12 +108,19 @@ class Agent:
         with Calling(self.law, "init"):
             law = self.law.init(self.brief, batch)
             returned.fresh(law, batch)
-        return AgentState(estimator, law, input=np.zeros((*batch, self.brief.dimension)))
+        still, never = np.zeros((*batch, self.brief.dimension)), np.full(batch, -1, dtype=np.int64)
+        return AgentState(estimator, law, still, never, held=np.zeros(batch, dtype=bool))
+
+    def revived(self, state: AgentState) -> AgentState:
+        """What it remembers when its process is new and goes on from this state: its body has held since."""
+        return state._replace(held=np.ones_like(state.held))
 
     def sense(
-        self, state: AgentState, measured: Array, seen: Mask, motion: Array | None
+        self, state: AgentState, tick: int, measured: Array, seen: Mask, motion: Array | None
     ) -> tuple[AgentState, Mapping[str, Fields]]:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
+
+        Who has missed ticks since it sensed last is told so first.
 
         The input broadcast is the one now flying, of the tick before; with it go velocity and higher derivatives, the `motion`
         (..., m - 1, D) of integrators of an order m above 1. Bodies that measure a velocity where they are steered by one tell
@@ -109,11 +130,14 @@ class Agent:
         ----------
         state
             What it remembers.
+        tick
+            Its number in the run, whatever clocks say.
         measured, seen
             Relative positions, shape (..., n, D), in metres, and which there are, shape (..., n).
         motion
             Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
         """
+        state = self._caught_up(state, tick, motion)
         before = readonly(state.estimator)
         with Calling(self.estimator, "sense"):
             told = self.estimator.sense(self.brief, before, readonly(measured), readonly(seen))
@@ -123,6 +147,26 @@ class Agent:
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
         moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
         return state._replace(estimator=estimator), {INPUT: moving, **said}
+
+    def _caught_up(self, state: AgentState, tick: int, motion: Array | None) -> AgentState:
+        """What it remembers, and knows of the ticks that it has missed."""
+        now = np.full_like(state.sensed, tick)
+        flying = np.where(state.held[..., None], 0.0, state.input)
+        missed = np.where(state.sensed < 0, 0, now - state.sensed - 1)
+        estimator = state.estimator
+        if self._counts_missed_ticks and missed.any():
+            within = flying if motion is None else motion[..., 0, :]
+            before = np.where(state.held[..., None], state.input, within) if self.law.order == 1 else within
+            gap, given = Gap(missed, before, within), readonly(estimator)
+            with Calling(self.estimator, "missed"):
+                told = self.estimator.missed(self.brief, given, readonly(gap))
+                returned.state(given, told, missed.shape)
+            estimator = chosen(missed > 0, told, estimator)
+        return state._replace(estimator=estimator, input=flying, sensed=now, held=np.zeros_like(state.held))
+
+    @cached_property
+    def _counts_missed_ticks(self) -> bool:
+        return capabilities.counts_missed_ticks(self.estimator)
 
     def act(
         self,
@@ -163,7 +207,7 @@ class Agent:
             steered = np.where(brief.leader[..., None], led, steered)
         if self.limit is not None:
             steered = saturated(steered, self.limit)
-        return AgentState(estimator, law, steered), AgentAction(steered, estimate)
+        return state._replace(estimator=estimator, law=law, input=steered), AgentAction(steered, estimate)
 
     def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
         batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]

@@ -44,6 +44,24 @@ class Own(NamedTuple):
     higher: Array | None = None
 
 
+class Gap(NamedTuple):
+    """Ticks that an agent missed: it was paused, or killed and restarted with what it remembered.
+
+    Parameters
+    ----------
+    ticks
+        How many, shape (...); 0 where none.
+    before
+        Its velocity from the tick before them to the first, shape (..., D), in metres per second.
+    within
+        From one of them to the next, shape (..., D), as far as it knows: paused bodies fly on, those of the dead hold.
+    """
+
+    ticks: Integers
+    before: Array
+    within: Array
+
+
 @dataclass(frozen=True)
 class Brief:
     """An agent's place in the formation; with leading axes, the places of many.

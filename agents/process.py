@@ -86,7 +86,7 @@ class AgentNode:
         self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
         self._state: AgentState = self._agent.init(())
         if self._checkpoint and brief.remembers:
-            self._state = checkpoint.load(self._checkpoint, like=self._state)
+            self._state = self._agent.revived(checkpoint.load(self._checkpoint, like=self._state))
         elif self._checkpoint:  # it may die before it has acted, and what a predecessor wrote is not its own
             checkpoint.save(self._checkpoint, self._state)
         self._heard = 0
@@ -137,7 +137,7 @@ class AgentNode:
         if inbox.neighbours:
             slots = [self._slot[number] for number in inbox.neighbours]
             measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, measured, seen, inbox.motion)
+        self._state, said = self._agent.sense(self._state, inbox.k, measured, seen, inbox.motion)
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
         for name, fields in {channels.MEASUREMENT: observed, **said}.items():
             self._broadcasts[name].say(

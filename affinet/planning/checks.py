@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from affinet.scenario.target import TargetSection
 from agents.algebra import stability
 from agents.loading import capabilities
 from agents.swarm import SwarmBrief
@@ -164,6 +165,18 @@ def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
         for fault in faults
         if fault.trigger is None and fault.start >= ticks
     ]
+
+
+def detections(target: TargetSection, seconds: float) -> list[Finding]:
+    """Detectors that find nothing in a run of so many seconds."""
+    if target.misses == 1.0:
+        says = "target.misses = 1: no detection ever finds the target, and all that is known of it is what was known at first"
+        return [Finding("detections", "note", says)]
+    late = [f"{latency:g}" for latency in target.latencies if latency >= seconds]
+    if late:
+        says = f"a detection that takes {' or '.join(late)} s (target.latencies) is not done in a run of {seconds:g} s"
+        return [Finding("detections", "note", says)]
+    return []
 
 
 def _connected(formation: Formation) -> Finding:

@@ -145,6 +145,7 @@ def _make(given: Scenario) -> Plan:
     ]
     found = [*findings, *aired, *(note for _, said in degraded for note in said)]
     found += checks.timeline(played.faults, given.time.ticks, given.time.dt)
+    found += [] if given.target is None else checks.detections(given.target, given.time.ticks * given.time.dt)
     if law.build().by_stress:
         found += phases.of_timeline(swarm, world.links, played.faults)
     plan = Plan(

@@ -88,7 +88,7 @@ def _tick(agents: Agent, batch: tuple[int, ...], told: Heard | None, *, position
     brief = agents.brief
     nowhere, nobody = np.zeros_like(brief.nominal), np.zeros_like(brief.present)
     motion = np.repeat(nowhere[..., None, :], agents.law.order - 1, axis=-2) if agents.law.order > 1 else None
-    state, _ = agents.sense(agents.init(batch), np.zeros_like(brief.relative), nobody, motion)
+    state, _ = agents.sense(agents.init(batch), 0, np.zeros_like(brief.relative), nobody, motion)
     silence = {
         channel: Heard(
             {name: np.zeros((*nobody.shape, *f.shape), dtype=f.dtype) for name, f in fields.items()},

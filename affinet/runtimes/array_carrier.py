@@ -89,10 +89,12 @@ class ArrayCarrier:
         links, before = self._links, self._welcomed_back(tick)
         relayed = self._relay.decide(tick, scene.position)
         idle = relayed.conditions.idle
+        # Those who are idle live the tick with the others, and what comes of it is put back: they must not catch up for that.
+        living = before._replace(sensed=np.where(idle, tick - 1, before.sensed)) if idle.any() else before
         seen = relayed.seen[links.slots] & links.present
         measured = np.where(seen[..., None], sensed[links.slots], 0.0)
         motion = self._world.odometry(scene)
-        state, said = self._agents.sense(before, measured, seen, motion)
+        state, said = self._agents.sense(living, tick, measured, seen, motion)
         told = {name: self._relay.as_told(tick, name, self._numbers, fields) for name, fields in said.items()}
         self._relay.keep(tick, told)
         heard = {name: self._hear(tick, name, relayed.delivery) for name in self._fields}
@@ -105,11 +107,13 @@ class ArrayCarrier:
         return BatchActed(np.where(idle[:, None], 0.0, action.input), action, relayed)
 
     def _welcomed_back(self, tick: int) -> AgentState:
-        timeline = self.timeline
-        if cold := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
-            state: AgentState = chosen(np.isin(self._numbers, [*cold]), self._fresh, self._state)
-            return state
-        return self._state
+        warm = self.timeline.remembering(tick)
+        cold = set(self.timeline.restarted(tick)) - set(warm)
+        state = self._state
+        for agents, new in ((cold, self._fresh), (warm, self._agents.revived(state))):
+            if agents:
+                state = chosen(np.isin(self._numbers, [*agents]), new, state)
+        return state
 
     def _from_the_centre(self, centre: CheckedCentre, measured: Array, seen: Mask, inputs: Array) -> Heard:
         def of_swarms(array: Any) -> Any:

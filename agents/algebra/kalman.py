@@ -15,7 +15,7 @@ import numpy as np
 from agents.algebra.small import invert
 from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product, sum_over
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 
@@ -130,6 +130,23 @@ def _ahead(S: int, O: int) -> Plain:  # noqa: E741
                         spread[order * D + one, column * D + other] = moved
 
     return plain
+
+
+def coasted(mean: Array, covariance: Array, F: Array, Q: Array, ticks: Integers) -> tuple[Array, Array]:
+    """So many steps ahead, shape (...), at once: 0 leave a filter as it is."""
+    for many in np.unique(ticks[ticks > 0]).tolist():
+        those, far = ticks == many, predict(mean, covariance, *_repeated(F, Q, many))
+        mean, covariance = chosen(those, far[0], mean), chosen(those, far[1], covariance)
+    return mean, covariance
+
+
+def _repeated(F: Array, Q: Array, ticks: int) -> tuple[Array, Array]:
+    """F and Q of so many ticks together, from those of a half of them, a quarter, and so on."""
+    if ticks == 1:
+        return F, Q
+    half, driven = _repeated(F, Q, ticks // 2)
+    whole, twice = product(half, half), product(half, driven, half.T) + driven
+    return (product(F, whole), product(F, twice, F.T) + Q) if ticks % 2 else (whole, twice)
 
 
 class Corrected(NamedTuple):

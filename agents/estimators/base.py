@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate
 from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
@@ -67,6 +67,13 @@ class Estimator(Protocol[State]):
 
     def fuse(self, brief: Brief, state: State, heard: Mapping[str, Heard], own: Own) -> tuple[State, Estimate]:
         """Take in what the neighbours broadcast, and estimate; `own` is what the agent itself flew from the tick before."""
+
+    def missed(self, brief: Brief, state: State, gap: Gap) -> State:  # noqa: ARG002
+        """The state after ticks in which the agent neither measured nor heard, before `sense`; unchanged by default.
+
+        It is called when an agent goes on that was paused, or killed and restarted with its state.
+        """
+        return state
 
     @property
     def wants(self) -> Wants:

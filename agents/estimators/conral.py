@@ -23,7 +23,7 @@ import numpy as np
 from agents.algebra import geometry
 from agents.algebra.constraints import MAPS, Constraint
 from agents.algebra.geometry import disagreement
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
 from agents.estimators.ral import Perceived, RelativeAffineLocalization, complete
@@ -83,6 +83,11 @@ class ConsensusLocalization(Estimator[Agreement]):
         return Agreement(
             perceived, perceived.local._replace(gram=nominal), Indicator(np.full(batch, np.nan), np.zeros(batch))
         )
+
+    def missed(self, brief: Brief, state: Agreement, gap: Gap) -> Agreement:  # noqa: ARG002
+        """The indicator ages; the map stays, as where nobody is heard."""
+        indicator = state.indicator
+        return state._replace(indicator=indicator._replace(age=indicator.age + gap.ticks))
 
     def sense(
         self, brief: Brief, state: Agreement, measured: Array, seen: Mask

@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman, late_news
+from agents.algebra import inputs, kalman, late_news, missed_ticks
 from agents.algebra.blocks import diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.algebra.unknowns import Belief, EdgeModel
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
@@ -89,6 +89,19 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
         edges = Edges(self._model(brief).begin(prior, of_edges(brief), shape), np.zeros(shape, dtype=bool))
         past = late_news.blank(edges, batch, (slots, dimension), min(self.memory, brief.lateness))
         return EdgeStates(edges, past, np.zeros((*shape, dimension)), np.zeros(shape, dtype=bool))
+
+    def missed(self, brief: Brief, state: EdgeStates, gap: Gap) -> EdgeStates:
+        """Predict by what the agent flew and the neighbours are guessed to fly; begin again where guesses are not doubted."""
+        if self.sigma_n == 0.0:
+            return self.init(brief, gap.ticks.shape)
+        nothing, no = np.zeros_like(state.measured), np.zeros_like(state.seen)
+
+        def live(state: EdgeStates, gone: int) -> EdgeStates:
+            past = late_news.advanced(state.past, state.edges, gap.within if gone else gap.before, nothing, no)
+            edges, past, _ = late_news.reprocessed(past, 0, partial(self._step, brief))
+            return state._replace(edges=edges, past=past)
+
+        return missed_ticks.lived(state, gap.ticks, live, fresh=lambda: self.init(brief, gap.ticks.shape))
 
     def sense(
         self,

@@ -16,7 +16,7 @@ import numpy as np
 
 from agents.algebra import kalman
 from agents.algebra.constraints import Constraint
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
 from agents.estimators.conral import Agreement, ConsensusLocalization
@@ -65,6 +65,10 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Fusion:
         """All edges unknown, no shape perceived."""
         return Fusion(self.unknown(brief, batch), self._shaper.init(brief, batch))
+
+    def missed(self, brief: Brief, state: Fusion, gap: Gap) -> Fusion:
+        """Every edge coasts: an old shape told the filters already what it says. It ages."""
+        return Fusion(self.coasted(brief, state.tracks, gap.ticks), self._shaper.missed(brief, state.shape, gap))
 
     def sense(self, brief: Brief, state: Fusion, measured: Array, seen: Mask) -> tuple[Fusion, Mapping[str, Fields]]:
         """Perceive the shape; the filters wait for what the neighbours say of it."""

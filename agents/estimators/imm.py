@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import kalman
+from agents.algebra import kalman, missed_ticks
 from agents.algebra.small import determinant, inverse
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
@@ -80,6 +80,16 @@ class InteractingMultipleModel(Estimator[Modes]):
         filters = kalman.unknown((*shape, 3), brief.dimension, deviations)
         alike = np.full((*shape, 3), 1.0 / 3.0)
         return Modes(*filters, alike, np.full(shape, np.nan), np.zeros(shape, dtype=bool))
+
+    def missed(self, brief: Brief, state: Modes, gap: Gap) -> Modes:
+        """Mix and predict, tick after tick."""
+        nothing, no = np.zeros((*state.known.shape, brief.dimension)), np.zeros_like(state.known)
+        return missed_ticks.lived(
+            state,
+            gap.ticks,
+            live=lambda modes, _: self.sense(brief, modes, nothing, no)[0],
+            fresh=lambda: self.init(brief, gap.ticks.shape),
+        )
 
     def sense(self, brief: Brief, state: Modes, measured: Array, seen: Mask) -> tuple[Modes, Mapping[str, Fields]]:
         """Mix, predict every edge by every model, correct those measured, and weigh the models that predicted them."""

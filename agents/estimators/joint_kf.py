@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra import inputs, kalman, late_news
+from agents.algebra import inputs, kalman, late_news, missed_ticks
 from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
 from agents.algebra.unknowns import Belief, EdgeModel
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
@@ -73,6 +73,19 @@ class JointEdgeFilter(Estimator[Joint]):
         belief = self._model(brief).begin(prior, brief.process, batch)
         past = late_news.blank(belief, batch, (slots, dimension), min(self.memory, brief.lateness))
         return Joint(belief, past, np.zeros((*batch, slots, dimension)), np.zeros((*batch, slots), dtype=bool))
+
+    def missed(self, brief: Brief, state: Joint, gap: Gap) -> Joint:
+        """Predict by what the agent flew and the neighbours are guessed to fly; begin again where guesses are not doubted."""
+        if self.sigma_n == 0.0:
+            return self.init(brief, gap.ticks.shape)
+        nothing, no = np.zeros_like(state.measured), np.zeros_like(state.seen)
+
+        def live(state: Joint, gone: int) -> Joint:
+            past = late_news.advanced(state.past, state.edges, gap.within if gone else gap.before, nothing, no)
+            belief, past, _ = late_news.reprocessed(past, 0, partial(self._step, brief))
+            return state._replace(edges=belief, past=past)
+
+        return missed_ticks.lived(state, gap.ticks, live, fresh=lambda: self.init(brief, gap.ticks.shape))
 
     def sense(
         self,

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.algebra import kalman
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.exchange import Channels, Fields, Heard
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.reports import NIS
 
 
@@ -66,6 +66,13 @@ class EdgeFilters:
         F, Q = kalman.motion(self.model, brief.dt, self.sigma_w)
         return kalman.predict(tracks.mean, tracks.covariance, F, Q)
 
+    def coasted(self, brief: Brief, tracks: Tracks, ticks: Integers) -> Tracks:
+        """All filters after so many ticks without a measurement, shape (...)."""
+        of_edges = np.broadcast_to(ticks[..., None], tracks.known.shape)
+        F, Q = kalman.motion(self.model, brief.dt, self.sigma_w)
+        mean, covariance = kalman.coasted(tracks.mean, tracks.covariance, F, Q, of_edges)
+        return tracks._replace(mean=mean, covariance=covariance)
+
     def estimate(self, brief: Brief, tracks: Tracks, psi: Array) -> Estimate:
         """What the filters say."""
         dimension = brief.dimension
@@ -91,6 +98,10 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
     def init(self, brief: Brief, batch: tuple[int, ...]) -> Tracks:
         """All edges unknown."""
         return self.unknown(brief, batch)
+
+    def missed(self, brief: Brief, state: Tracks, gap: Gap) -> Tracks:
+        """Every edge coasts."""
+        return self.coasted(brief, state, gap.ticks)
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""

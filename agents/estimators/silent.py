@@ -16,7 +16,7 @@ import numpy as np
 from agents.algebra import inputs, kalman
 from agents.algebra.geometry import identity
 from agents.algebra.small import inverse
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
 from agents.estimators.edge_kf import of_edges
@@ -92,6 +92,10 @@ class SilentEdgeFilter(Estimator[Silent]):
             length=np.zeros(batch),
         )
         return Silent(past, np.zeros((*batch, slots, dimension)), np.zeros((*batch, slots), dtype=bool))
+
+    def missed(self, brief: Brief, state: Silent, gap: Gap) -> Silent:  # noqa: ARG002
+        """Begin again: what it infers counts as sure, and more so the longer nothing is measured."""
+        return self.init(brief, gap.ticks.shape)
 
     def sense(
         self,

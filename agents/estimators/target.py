@@ -15,10 +15,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from agents.algebra import smoothing, starts
+from agents.algebra import missed_ticks, smoothing, starts
 from agents.algebra.prediction import Prediction, detected, predicted
 from agents.algebra.redcho import Consensus
-from agents.brief import Brief, Own
+from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_edges
 from agents.estimators.base import Estimator
 from agents.exchange import Channels, Field, Fields, Heard
@@ -175,6 +175,22 @@ class TargetEstimator(Estimator[Track]):
             silent=np.full((*batch, slots), self.hold, dtype=np.int64),
             stages=np.broadcast_to(entering[..., None, :], (*batch, stages, different)).copy(),
         )
+
+    def missed(self, brief: Brief, state: Track, gap: Gap) -> Track:
+        """REDCHO and the lags go on, tick after tick; what was known last is carried on from when it was known."""
+        lived = np.minimum(gap.ticks, missed_ticks.LONGEST)
+        state = state._replace(now=state.now + gap.ticks - lived)
+        if self.fusion != "redcho" and self.output != "low-pass":
+            return state._replace(now=state.now + lived)
+
+        def live(track: Track, _: int) -> Track:
+            track = self._lagging(brief, track)._replace(now=track.now + 1)
+            if self.fusion != "redcho":
+                return track
+            silence = Heard({"information": track.theirs}, np.zeros(track.theirs.shape[:-1], dtype=bool))
+            return self._fused(brief, track, packed(*self._information(brief, track)), {TARGET: silence})[0]
+
+        return missed_ticks.lived(state, lived, live, fresh=lambda: self.init(brief, gap.ticks.shape))
 
     def sense(
         self,

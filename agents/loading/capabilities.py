@@ -49,6 +49,11 @@ def findings(algorithm: Any, swarm: SwarmBrief) -> list[Finding]:
         return list(found)
 
 
+def counts_missed_ticks(estimator: Any) -> bool:
+    """Whether an estimator is to be told of the ticks that its agent missed; not by default."""
+    return _says(estimator, "missed")
+
+
 def step_matrix(law: Any, swarm: SwarmBrief) -> Array | None:
     """One tick of the followers under a law, shape (S, S); None, the default, where nobody knows it."""
     if not _says(law, "step_matrix"):

@@ -10,6 +10,7 @@ import pytest
 from affinet.planning import making
 from affinet.scenario import loading
 from agents.agent import Agent
+from agents.algebra import missed_ticks
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
 from agents.estimators.ga_rkf import GeometryAwareFilter
@@ -167,7 +168,7 @@ def fly_together(agent, links, measured, seen, fresh, position, velocity):
     state, ticks = agent.init(fresh.shape[1:-1]), []
     for tick in range(TICKS):
         told = odometry(agent, velocity[tick])
-        state, said = agent.sense(state, measured[tick], seen[tick], told)
+        state, said = agent.sense(state, tick, measured[tick], seen[tick], told)
         heard = gather(said, links.neighbours, fresh[tick])
         state, action = agent.act(state, tick, heard, position[tick], told, None)
         ticks.append((said, heard, action, state))
@@ -185,7 +186,7 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator, law, di
         state = alone.init(())
         for tick, (all_said, all_heard, all_action, all_state) in enumerate(together):
             told = odometry(alone, velocity[tick, row])
-            state, said = alone.sense(state, measured[tick, row], seen[tick, row], told)
+            state, said = alone.sense(state, tick, measured[tick, row], seen[tick, row], told)
             state, action = alone.act(state, tick, row_of(all_heard, row), position[tick, row], told, None)
             for one, many in zip(leaves((said, action, state)), leaves((all_said, all_action, all_state)), strict=True):
                 assert one.shape == many[row].shape
@@ -234,3 +235,36 @@ def test_a_restarted_agent_is_a_fresh_one_and_the_others_go_on(estimator, plans)
     for now, fresh, before in zip(leaves(chosen(restarted, new, flown)), leaves(new), leaves(flown), strict=True):
         assert now[restarted].tobytes() == fresh[restarted].tobytes()
         assert now[~restarted].tobytes() == before[~restarted].tobytes()
+
+
+MISSING = ("rkf", "ga-rkf-conral", "imm", "edge-kf", "joint-kf", "silent-kf", "conral")
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("estimator", MISSING)
+def test_a_batch_in_which_some_missed_ticks_gives_the_bits_of_each_agent_alone(
+    estimator, dimension, plans, monkeypatch
+):
+    monkeypatch.setattr(missed_ticks, "LONGEST", 3)
+    everybody, links = agent_of(plans[dimension], estimator, "constant-velocity"), plans[dimension].world.links
+    measured, seen, fresh, position, velocity = draw(everybody, links, 1, ())
+    *_, (_, _, _, last) = fly_together(everybody, links, measured, seen, fresh, position, velocity)
+    rows = np.arange(links.agents)
+    gaps, held = rows % 5, rows % 3 == 0
+
+    def goes_on(agent, state, row):
+        return agent.sense(state, TICKS, measured[-1][row], seen[-1][row], None)
+
+    state = last._replace(sensed=last.sensed - gaps, held=held)
+    together, said = goes_on(everybody, state, slice(None))
+    at_once, _ = goes_on(everybody, last._replace(held=held), slice(None))
+    for row in range(links.agents):
+        single, told = goes_on(replace(everybody, brief=everybody.brief.of(row)), _row(state, row), row)
+        for one, many in zip(leaves((told, single)), leaves((said, together)), strict=True):
+            assert one.tobytes() == many[row].tobytes()
+        pairs = zip(leaves(together.estimator), leaves(at_once.estimator), strict=True)
+        assert all(now[row].tobytes() == then[row].tobytes() for now, then in pairs) == (gaps[row] == 0)
+
+
+def _row(part, row):
+    return type(part)(*(_row(each, row) for each in part)) if isinstance(part, tuple) else part[row]

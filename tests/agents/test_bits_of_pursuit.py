@@ -45,11 +45,11 @@ def test_a_batch_of_agents_gives_the_bits_of_each_agent_alone(estimator):
         tick = 37 * step  # so that detections are done by all shares of their latency
         position, motion = rng.normal(size=(links.agents, 2)), rng.normal(size=(links.agents, 1, 2))
         fresh = links.present & (rng.random(links.present.shape) < 0.7)
-        together, said = everybody.sense(together, measured, fresh, motion)
+        together, said = everybody.sense(together, step, measured, fresh, motion)
         heard = test_bits.gather(said, links.neighbours, fresh)
         together, action = everybody.act(together, tick, heard, position, motion, sighting)
         for row, one in enumerate(rows):
-            state, told = one.sense(apart[row], measured[row], fresh[row], motion[row])
+            state, told = one.sense(apart[row], step, measured[row], fresh[row], motion[row])
             mine = Sighting(*(field[row] for field in sighting))
             arrived = test_bits.row_of(heard, row)
             apart[row], alone = one.act(state, tick, arrived, position[row], motion[row], mine)

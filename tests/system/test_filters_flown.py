@@ -6,10 +6,16 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import pytest
 from flying import plan_of
+from scripted import timeline
 
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.studies.batch import fly_all
+from agents.estimators.edge_kf import EdgeKalmanFilter
+from agents.estimators.ga_rkf import GeometryAwareFilter
+from agents.estimators.imm import InteractingMultipleModel
+from agents.estimators.joint_kf import JointEdgeFilter
+from agents.estimators.rkf import RelativeKalmanFilter
 from analysis.metrics.consistency import nees
 from world.books.history import History
 
@@ -114,3 +120,64 @@ def test_inputs_that_are_heard_late_count_for_the_tick_they_were_flown_in(estima
 def test_disturbances_that_persist_push_again(estimator):
     """Before, each counted as a new one."""
     consistent(estimator, *COARSE, "dynamics={disturbance=0.02, persistence=0.9}")
+
+
+# ---- ticks that an agent missed
+
+OUT = {
+    "pause": timeline({"verb": "pause", "at": 0.5, "lasts": 1.5, "agents": [1]}),
+    "warm restart": timeline(
+        {"verb": "kill", "at": 0.5, "agents": [1]},
+        {"verb": "restart", "at": 2.0, "agents": [1], "state": "warm"},
+    ),
+}
+# Bodies that nobody steers, and that are pushed about: relative positions are random walks, which the filters know.
+DT, PUSH = 0.05, 0.01  # s, m
+PUSHED = (
+    *COARSE,
+    "agents.law=rest",
+    "formation.leaders=[]",
+    'agents.leaders="pilot"',
+    "sensing={sigma=0.05}",
+    f"dynamics={{disturbance={PUSH}}}",
+)
+WALK = PUSH * np.sqrt(2.0) / DT  # m/s
+RANDOM_WALK = f'{{ model = "random-walk", sigma_w = {WALK} }}'
+ANY_WALK = f"{{ sigma_random_walk = {WALK} }}"
+MISSING = {
+    "edge-kf": (EdgeKalmanFilter, (*WANDERING, guessing("edge-kf"))),
+    "joint-kf": (JointEdgeFilter, (*WANDERING, guessing("joint-kf"))),
+    "rkf": (RelativeKalmanFilter, (*PUSHED, f"agents.parameters.rkf={RANDOM_WALK}")),
+    "ga-rkf": (GeometryAwareFilter, (*PUSHED, f"agents.parameters.ga-rkf={RANDOM_WALK}")),
+    "imm": (InteractingMultipleModel, (*PUSHED, f"agents.parameters.imm={ANY_WALK}")),
+}
+
+
+def after_the_gap(estimator, over, out, runs=40):
+    """NEES of the edges of the agent that was out, in the three ticks after it: its mean, and its standard error."""
+    plan = plan_of("rigid", "time.duration=2.15", *over, f'agents.estimator="{estimator}"', OUT[out])
+    batch = side_by_side(plan, range(1, 1 + runs))
+    flown = History(batch.world, len(batch.channels), batch.reports)
+    InProcessSwarm(batch).fly(flown.extend, 43)
+    arrays, links = flown.arrays(), batch.world.links
+    position = arrays["position"][:-1]
+    off = arrays["estimate"] - (position[:, :, None] - position[:, links.neighbours])
+    wrong = nees(off, arrays["covariance"])[40:, ::10][..., links.present[0]]
+    of_runs = wrong.mean(axis=(0, 2))
+    return of_runs.mean(), of_runs.std() / np.sqrt(runs)
+
+
+def tells_the_truth(mean, error):
+    return error < 0.15 and abs(mean - 2.0) < 4.0 * error
+
+
+@pytest.mark.parametrize("out", OUT)
+@pytest.mark.parametrize("estimator", MISSING)
+def test_who_missed_ticks_is_as_wrong_as_it_says(estimator, out, monkeypatch):
+    """Before, it took one step for all of them."""
+    kind, over = MISSING[estimator]
+    found = after_the_gap(estimator, over, out)
+    assert tells_the_truth(*found), found
+    monkeypatch.setattr(kind, "missed", lambda _self, _brief, state, _gap: state)
+    as_before = after_the_gap(estimator, over, out)
+    assert not tells_the_truth(*as_before), as_before

@@ -8,6 +8,8 @@ from scripted import timeline
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly
 from affinet.scenario import verbs
+from agents.estimators.edge_kf import EdgeKalmanFilter
+from agents.estimators.rkf import RelativeKalmanFilter
 from netem.medium import journal
 from netem.medium.medium import JOURNAL
 from world.books import history
@@ -158,3 +160,30 @@ def test_who_did_nothing_yet_comes_back_warm_with_nothing_in_both_runtimes(name,
     plan = plan_of("corridor", "time.duration=1", *COARSE, timeline(*NOTHING_TO_REMEMBER[name]))
     one, many = (flown(plan, runtime, tmp_path / runtime) for runtime in ("inprocess", "processes"))
     assert one.digest == many.digest
+
+
+GAPS = [
+    {"verb": "pause", "at": 0.2, "lasts": 0.3, "agents": [6], "in_flight": "hold"},
+    {"verb": "pause", "at": 0.3, "lasts": 0.2, "agents": [1]},
+    {"verb": "kill", "at": 0.3, "agents": [5]},
+    {"verb": "restart", "at": 0.6, "agents": [5], "state": "warm"},
+    {"verb": "pause", "at": 0.1, "agents": [7]},
+    {"verb": "kill", "at": 0.2, "agents": [7]},  # while it sleeps
+    {"verb": "restart", "at": 0.4, "agents": [7], "state": "warm"},  # into its sleep
+    {"verb": "resume", "at": 0.6, "agents": [7]},
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "named"),
+    [
+        (EdgeKalmanFilter, ("agents.estimator=edge-kf", "agents.parameters.edge-kf.sigma_n=0.1")),
+        (RelativeKalmanFilter, ("agents.estimator=rkf",)),
+    ],
+)
+def test_who_missed_ticks_makes_the_same_of_them_in_both_runtimes(kind, named, tmp_path, monkeypatch):
+    plan = plan_of("corridor", "time.duration=0.8", *COARSE, "network.delay_ticks=1", *named, timeline(*GAPS))
+    one, many = (flown(plan, runtime, tmp_path / runtime) for runtime in ("inprocess", "processes"))
+    assert one.digest == many.digest
+    monkeypatch.setattr(kind, "missed", lambda _self, _brief, state, _gap: state)
+    assert flown(plan, "inprocess", tmp_path / "as before").digest != one.digest

@@ -83,3 +83,19 @@ def test_who_pursues_by_velocities_or_accelerations_may_have_leaders():
 def test_a_swarm_at_rest_begins_where_all_of_it_is_told():
     said = refusal("agents.parameters.jor.start=[[1.0,2.0]]", name="localization")
     assert "start has 2 numbers for each of the 10 agents, in their order" in said
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        ((), None),
+        (("target.misses=0.99",), None),
+        (("target.misses=1.0",), "no detection ever finds the target"),
+        (("time.duration=0.75",), "a detection that takes 1 s (target.latencies) is not done in a run of 0.75 s"),
+        (("time.duration=0.1",), "a detection that takes 1 or 0.5 s (target.latencies) is not done in a run of 0.1 s"),
+    ],
+)
+def test_detections_that_find_nothing_are_noted(overrides, says):
+    found = [finding for finding in plan_of(NAME, *overrides).findings if finding.check == "detections"]
+    assert [finding.level for finding in found] == ["note"] * bool(says)
+    assert all(says in finding.says for finding in found)

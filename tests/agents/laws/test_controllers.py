@@ -197,13 +197,13 @@ def test_leaders_follow_the_pilot_and_followers_the_law(zhao7):
     agent = Agent(zhao7, NoEstimator(), Static(alpha=2.0), leaders="pilot", leader_gain=1.0, limit=None)
     measured, position = np.random.default_rng(1).normal(size=(2, 7, 4, 2))
     position = position[:, 0]
-    state, said = agent.sense(agent.init((7,)), measured, zhao7.present, None)
+    state, said = agent.sense(agent.init((7,)), 0, measured, zhao7.present, None)
     np.testing.assert_array_equal(said[INPUT]["velocity"], np.zeros((7, 2)))
     heard = {INPUT: Heard({"velocity": np.zeros((7, 4, 2))}, zhao7.present)}
     state, action = agent.act(state, 40, heard, position, None, None)
     np.testing.assert_allclose(action.input[:3], pilot(zhao7, zhao7.mission, 1.0, 40, position)[:3])
     np.testing.assert_allclose(action.input[3:], -2.0 * stress_force(zhao7, action.estimate)[3:])
-    _, said = agent.sense(state, measured, zhao7.present, None)
+    _, said = agent.sense(state, 1, measured, zhao7.present, None)
     np.testing.assert_array_equal(said[INPUT]["velocity"], action.input)
 
 

@@ -109,7 +109,7 @@ def test_agents_say_how_they_move_up_to_their_input_and_steer_by_it(order):
     state = agent.init((10,))
     for tick in range(2):
         flying = state.input
-        state, said = agent.sense(state, made.brief.relative, made.brief.present, motion)
+        state, said = agent.sense(state, tick, made.brief.relative, made.brief.present, motion)
         assert list(said[INPUT]) == ["velocity", "acceleration", "jerk", "snap"][:order]
         assert {name: field.shape for name, field in agent.channels()[INPUT].items()} == dict.fromkeys(
             said[INPUT], (2,)

@@ -103,7 +103,7 @@ def test_leaders_keep_their_distances_and_followers_fly_the_law():
     measured = np.where(
         links.present[..., None], own.relative + np.random.default_rng(1).normal(size=own.relative.shape), 0.0
     )
-    state, _ = agent.sense(agent.init((10,)), measured, links.present, None)
+    state, _ = agent.sense(agent.init((10,)), 0, measured, links.present, None)
     heard = hears(links.present, np.zeros((10, links.present.shape[1], 2)))
     # A position it should not look at: these leaders have no target.
     _, action = agent.act(state, 3, heard, np.full((10, 2), 1e3), None, None)

@@ -254,7 +254,7 @@ def drawn(brief, seed=1):
 
 def act(agent, measured, position, velocity, heard, tick=2000):
     motion = None if velocity is None else velocity[:, None]
-    state, _ = agent.sense(agent.init((10,)), measured, agent.brief.present, motion)
+    state, _ = agent.sense(agent.init((10,)), 0, measured, agent.brief.present, motion)
     return agent.act(state, tick, heard, position, motion, None)
 
 
@@ -272,10 +272,10 @@ def test_leaders_follow_the_pilot_and_followers_the_law_of_double_integrators(oc
 def test_double_integrators_say_their_velocity_and_the_acceleration_now_flying(octa10):
     agent = Agent(octa10, NoEstimator(), VARYING, leaders="pilot", leader_gain=1.0, limit=None)
     measured, position, velocity, heard = drawn(octa10)
-    _, first = agent.sense(agent.init((10,)), measured, octa10.present, velocity[:, None])
+    _, first = agent.sense(agent.init((10,)), 0, measured, octa10.present, velocity[:, None])
     np.testing.assert_array_equal(first[INPUT]["acceleration"], np.zeros((10, 3)))
     state, action = act(agent, measured, position, velocity, heard)
-    _, second = agent.sense(state, measured, octa10.present, velocity[:, None] + 1.0)
+    _, second = agent.sense(state, 1, measured, octa10.present, velocity[:, None] + 1.0)
     assert {name: field.shape for name, field in agent.channels()[INPUT].items()} == dict.fromkeys(second[INPUT], (3,))
     np.testing.assert_array_equal(second[INPUT]["velocity"], velocity + 1.0)
     np.testing.assert_array_equal(second[INPUT]["acceleration"], action.input)
@@ -283,7 +283,7 @@ def test_double_integrators_say_their_velocity_and_the_acceleration_now_flying(o
 
 def test_single_integrators_say_their_input_alone(octa10):
     agent = Agent(octa10, NoEstimator(), Static(), leaders="pilot", leader_gain=1.0, limit=None)
-    _, spoken = agent.sense(agent.init((10,)), octa10.relative, octa10.present, None)
+    _, spoken = agent.sense(agent.init((10,)), 0, octa10.relative, octa10.present, None)
     assert set(spoken[INPUT]) == set(agent.channels()[INPUT]) == {"velocity"}
 
 

@@ -15,6 +15,7 @@ from agents.algebra import (
     geometry,
     kalman,
     late_news,
+    missed_ticks,
     prediction,
     redcho,
     small,
@@ -74,6 +75,10 @@ def _brief(**held):
 
 def _recent(before, *taken_in):
     return late_news.RecentTicks(Belief(before, 2.0 * before), late_news.TakenIn(*taken_in))
+
+
+def _lived(belief, gone):
+    return Belief(belief.mean + 0.3 * belief.covariance, belief.covariance * (0.7 + gone))
 
 
 def _step(before, tick):
@@ -151,6 +156,7 @@ CASES = {
         completion.completed, real(NEIGHBOURS), real(NEIGHBOURS, 2), truth(NEIGHBOURS, p=0.5)
     ),
     "agents.algebra.geometry.gram": of(geometry.gram, real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    "agents.algebra.geometry.cross": of(geometry.cross, real(NEIGHBOURS, 2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     "agents.algebra.geometry.inverse_gram": of(geometry.inverse_gram, covariance(2, 2), truth()),
     "agents.algebra.geometry.apply": of(geometry.apply, real(2, 2), real(NEIGHBOURS, 2)),
     "agents.algebra.geometry.total": of(geometry.total, truth(NEIGHBOURS), real(NEIGHBOURS, 2, 2)),
@@ -200,6 +206,16 @@ CASES = {
     ),
     "agents.algebra.kalman.predict": of(
         lambda mean, spread: kalman.predict(mean, spread, F, Q), real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4)
+    ),
+    "agents.algebra.kalman.coasted": of(
+        lambda mean, spread, ticks: kalman.coasted(mean, spread, F, Q, ticks),
+        *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), whole(9, NEIGHBOURS)),
+    ),
+    "agents.algebra.missed_ticks.lived": of(
+        lambda mean, ticks: missed_ticks.lived(
+            Belief(mean, 2.0 * mean), ticks, _lived, lambda: Belief(0.0 * mean, mean)
+        ),
+        *(real(4, 2), whole(9)),
     ),
     "agents.algebra.kalman.normalised": of(
         kalman.normalised, real(NEIGHBOURS, 2), covariance(NEIGHBOURS, 2, 2), truth(NEIGHBOURS)
@@ -256,6 +272,10 @@ CASES = {
     "agents.estimators.rkf.EdgeFilters.ahead": of(
         lambda mean, spread, nis, known: FILTERS.ahead(BRIEF, Tracks(mean, spread, nis, known)),
         *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS)),
+    ),
+    "agents.estimators.rkf.EdgeFilters.coasted": of(
+        lambda mean, spread, nis, known, ticks: FILTERS.coasted(BRIEF, Tracks(mean, spread, nis, known), ticks),
+        *(real(NEIGHBOURS, 6), covariance(NEIGHBOURS, 6, 6), real(NEIGHBOURS), truth(NEIGHBOURS), whole(9)),
     ),
     "agents.estimators.rkf.EdgeFilters.estimate": of(
         lambda mean, spread, nis, known: FILTERS.estimate(BRIEF, Tracks(mean, spread, nis, known), known[..., 0]),

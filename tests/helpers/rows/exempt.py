@@ -7,6 +7,7 @@ WRITTEN = "of a run that was flown: what is written down, or judged"
 WHOLE = "whole numbers, truths or copies: nothing is rounded"
 SHAPES = "takes no arrays"
 PROTOCOL = "a protocol"
+PART = "a part of kernels, of one row: tests/analysis/kernels"
 FLOWN = "flies in test_bits.py"
 
 EXEMPT = {
@@ -27,7 +28,7 @@ EXEMPT = {
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
         netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
-        netem.medium.verdict.stronger
+        netem.medium.verdict.stronger netem.medium.picking.picked
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
         netem.medium.medium.Medium.offered netem.medium.relay.Relayed.arriving
         netem.medium.relay.Relayed.awake netem.medium.relay.Relayed.seen netem.medium.relay.changed_on_the_way
@@ -38,7 +39,7 @@ EXEMPT = {
         netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
         netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
-        agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
+        agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
@@ -100,10 +101,14 @@ EXEMPT = {
         agents.algebra.kalman.motion agents.algebra.kalman.embedded agents.algebra.kalman.unknown
         agents.estimators.rkf.EdgeFilters.unknown
     """,
+    PART: """
+        agents.algebra.geometry.disagreement agents.algebra.geometry.spans agents.algebra.small.invert netem.core.draws.unit
+    """,
     PROTOCOL: """
         agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
         agents.estimators.base.Centre.step
         agents.estimators.base.Estimator.sense agents.estimators.base.Estimator.fuse
+        agents.estimators.base.Estimator.missed
         netem.impairments.own.Loss.lost world.physics.bodies.Body.rest world.physics.bodies.Body.coasting
         world.physics.bodies.Body.moved
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
