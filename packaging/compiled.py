@@ -29,7 +29,7 @@ def kernels() -> Iterator[Kernel]:
 
 def sizes(kernel: Kernel, dimension: int) -> tuple[int, ...]:
     """What a kernel is compiled for in so many dimensions: filters of up to two derivatives have the most states."""
-    known = {"D": dimension, "O": 3, "S": 3 * dimension}
+    known = {"D": dimension, "M": dimension, "O": 3, "R": 3, "S": 3 * dimension}
     return tuple(known[name] for name in kernel.sizes)
 
 

@@ -86,6 +86,8 @@ def advanced(recent: RecentTicks[T], before: T, own: Array, measured: Array, see
     newest = TakenIn(own, measured, seen, np.zeros_like(measured), np.zeros_like(seen))
 
     def pushed(new: Array, past: Array) -> Array:
+        if past.shape[axis] == 1:
+            return np.expand_dims(new, axis)
         kept = past[(slice(None),) * axis + (slice(0, past.shape[axis] - 1),)]
         return np.concatenate([np.expand_dims(new, axis), kept], axis=axis)
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.algebra.small import inverse
+from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 
@@ -100,14 +101,11 @@ class EdgeModel:
         displaced
             Covariance of what displaces the edges in a tick, shape (..., m, m), in square metres.
         """
-        size, covariance = belief.mean.shape[-1], _carried(self._turn[: self._doubted, : self._doubted], belief)
         row, share = (1, 1.0 - self.persistence * self.persistence) if self.persistence else (0, 1.0)
-        pushed = slice(row * size, (row + 1) * size)
-        covariance[..., pushed, pushed] += share * displaced
-        if self._guesses:
-            newest = slice(self._newest * size, (self._newest + 1) * size)
-            covariance[..., newest, newest] += self.sigma_n * self.sigma_n * np.eye(size)
-        return Belief(product(self._turn, belief.mean), covariance)
+        driven = self.sigma_n * self.sigma_n if self._guesses else 0.0
+        turn = self._turn[: self._doubted, : self._doubted]
+        covariance = _mixed(turn, belief.covariance, displaced, row, share, self._newest, driven)
+        return Belief(_turned(self._turn, belief.mean), covariance)
 
     def hear(self, belief: Belief, inputs: Array, known: Mask) -> Belief:
         """The belief that knows the newest inputs (..., m), where they are `known` (..., m), and what they say of the rest."""
@@ -136,7 +134,9 @@ class EdgeModel:
         if self.persistence:
             mean[..., 0, :] += mean[..., 1, :]
         if self._doubted > 1:
-            covariance = _carried(self._move[: self._doubted, : self._doubted], belief)
+            nothing = np.zeros((mean.shape[-1], mean.shape[-1]))
+            mixes = self._move[: self._doubted, : self._doubted]
+            covariance = _mixed(mixes, covariance, nothing, 0, 0.0, self._newest, 0.0)
         return Belief(mean, covariance)
 
     @property
@@ -179,12 +179,47 @@ class EdgeModel:
         return T
 
 
-def _carried(T: Array, belief: Belief) -> Array:
-    """(T (x) I) P (T (x) I)^T, for the rows that T (r, r) mixes."""
-    once = _mixed(T, belief.covariance)
-    return np.swapaxes(_mixed(T, np.swapaxes(once, -1, -2)), -1, -2)
+@kernel("(q,q),(q,m)->(q,m)", "dd->d")
+def _turned() -> Plain:
+    def plain(T: Array, mean: Array, turned: Array) -> None:
+        for row in range(len(T)):
+            for place in range(mean.shape[1]):
+                turned[row, place] = 0.0
+                for earlier in range(len(T)):
+                    turned[row, place] += T[row, earlier] * mean[earlier, place]
+
+    return plain
 
 
-def _mixed(T: Array, covariance: Array) -> Array:
-    rows = len(T)
-    return product(T, covariance.reshape(*covariance.shape[:-2], rows, -1)).reshape(covariance.shape)
+@kernel("(R,R),(S,S),(M,M),(),(),(),()->(S,S)", "dddldld->d")
+def _mixed(R: int, S: int, M: int) -> Plain:  # noqa: ARG001
+    """(T (x) I) P (T (x) I)^T, more displaced by so much in one row, and driven in another."""
+
+    def plain(
+        T: Array,
+        covariance: Array,
+        displaced: Array,
+        pushed: int,
+        share: float,
+        newest: int,
+        driven: float,
+        mixed: Array,
+    ) -> None:
+        once = scratch(R, 1)
+        for one in range(M):
+            for other in range(M):
+                for row in range(R):
+                    for column in range(R):
+                        once[column, 0] = 0.0
+                        for earlier in range(R):
+                            once[column, 0] += T[row, earlier] * covariance[earlier * M + one, column * M + other]
+                    for column in range(R):
+                        summed = 0.0
+                        for earlier in range(R):
+                            summed += once[earlier, 0] * T[column, earlier]
+                        mixed[row * M + one, column * M + other] = summed
+                mixed[pushed * M + one, pushed * M + other] += share * displaced[one, other]
+            if newest < R:
+                mixed[newest * M + one, newest * M + one] += driven
+
+    return plain

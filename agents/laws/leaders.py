@@ -6,9 +6,9 @@ import numpy as np
 
 from agents.brief import Brief, Reading
 from agents.estimate import Estimate
-from agents.laws.base import weighted
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.affine import Manoeuvre
-from analysis.models.arrays import Array
+from analysis.models.arrays import Array, Mask
 
 
 def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position: Array) -> Array:
@@ -41,9 +41,24 @@ def hold_distances(brief: Brief, gain: float, estimate: Estimate) -> Array:
     estimate
         What it believes of its edges.
     """
-    z, p = estimate.relative, brief.relative
-    stretch = (z * z).sum(axis=-1) - (p * p).sum(axis=-1)
-    return -gain * weighted(np.where(brief.leads & estimate.known, stretch, 0.0), z)
+    held: Array = _held(estimate.relative, brief.relative, brief.leads & estimate.known)
+    return -gain * held
+
+
+@kernel("(n,D),(n,D),(n)->(D)", "dd?->d")
+def _held(D: int) -> Plain:
+    def plain(z: Array, p: Array, led: Mask, held: Array) -> None:
+        for axis in range(D):
+            held[axis] = 0.0
+        for edge in range(len(led)):
+            if led[edge]:
+                stretch = 0.0
+                for axis in range(D):
+                    stretch += z[edge, axis] * z[edge, axis] - p[edge, axis] * p[edge, axis]
+                for axis in range(D):
+                    held[axis] += stretch * z[edge, axis]
+
+    return plain
 
 
 def saturated(command: Array, limit: float) -> Array:

@@ -66,7 +66,11 @@ class Disturbance:
         """Q_A as far as agents can know it: at nominal positions (n, D), shape (n, n)."""
         return np.eye(len(nominal)) if self.kernel is None else self.kernel.correlation(nominal)
 
-    def next(self, before: Array | None, white: Array, position: Array, nominal: Array) -> Array:
+    def root(self, nominal: Array) -> Array:
+        """The square root of `between`, lower triangular, shape (n, n)."""
+        return _root(self.between(nominal))
+
+    def next(self, before: Array | None, white: Array, position: Array, root: Array) -> Array:
         """The displacements of a tick, shape (R, n, D), in metres, of R swarms side by side.
 
         Parameters
@@ -77,14 +81,14 @@ class Disturbance:
             Standard normal draws, shape (R, n, D).
         position
             Of the agents, shape (R, n, D), in metres.
-        nominal
-            Of one swarm, shape (n, D), in metres.
+        root
+            Of Q_A at nominal positions, shape (n, n).
         """
         drawn = product(white, self._root_axes.T)
         if self.kernel is not None and self.kernel.positions == "true":
             drawn = product(_root(self.kernel.correlation(position)), drawn)
         elif self.kernel is not None:
-            drawn = product(_root(self.kernel.correlation(nominal)), drawn)
+            drawn = product(root, drawn)
         if before is None:
             return drawn
         return self.persistence * before + np.sqrt(1.0 - self.persistence * self.persistence) * drawn

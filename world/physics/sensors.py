@@ -12,8 +12,7 @@ from netem.faults.timeline import Conditions
 
 def relative(position: Array, links: Links) -> Array:
     """z_ij = z_i - z_j of every directed link j -> i, shape (..., L, D), for positions (..., N, D), in metres."""
-    seen: Array = position[..., links.dst - 1, :] - position[..., links.src - 1, :]
-    return seen
+    return position.take(links.dst - 1, axis=-2) - position.take(links.src - 1, axis=-2)
 
 
 def noise(standard: Array, covariance: Array) -> Array:

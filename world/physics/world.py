@@ -210,9 +210,13 @@ class World:
             by_swarm(scene.disturbance) if tick else None,
             by_swarm(self._pushes.at(tick)),
             by_swarm(scene.position),
-            self.formation.nominal[:size],
+            self._between,
         )
         return pushed.reshape(scene.position.shape)
+
+    @cached_property
+    def _between(self) -> Array:
+        return self.disturbance.root(self.formation.nominal[: self.formation.agents // self.swarms])
 
     @cached_property
     def _pushes(self) -> DrawnAhead:

@@ -142,7 +142,10 @@ CASES = {
         KERNELS["squared-exponential"].correlation, real(9, 2)
     ),
     "world.physics.disturbance.Disturbance.next": of(
-        lambda before, white, position: PUSH.next(before, white, position, NOMINAL), real(9, 2), real(9, 2), real(9, 2)
+        lambda before, white, position: PUSH.next(before, white, position, PUSH.root(NOMINAL)),
+        real(9, 2),
+        real(9, 2),
+        real(9, 2),
     ),
     "world.physics.bodies.carried": of(lambda *motion: bodies.carried(motion, 0.013), *[real(9, 2)] * 4),
     "world.physics.bodies.Integrators.moved": of(

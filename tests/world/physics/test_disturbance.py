@@ -33,9 +33,9 @@ def test_the_displacements_have_the_covariance_of_agents_by_that_of_axes(shape, 
     kernel, elsewhere = Kernel(shape, 2.0, positions), PLACES[::-1] * 7
     nominal, true = (PLACES, elsewhere) if positions == "nominal" else (elsewhere, PLACES)
     runs = 40_000
-    drawn = Disturbance(Q_D, kernel, 0.0).next(
-        np.zeros((runs, 4, 2)), white(runs, 4, 2), np.broadcast_to(true, (runs, 4, 2)), nominal
-    )
+    pushed = Disturbance(Q_D, kernel, 0.0)
+    before, true = np.zeros((runs, 4, 2)), np.broadcast_to(true, (runs, 4, 2))
+    drawn = pushed.next(before, white(runs, 4, 2), true, pushed.root(nominal))
     Q_A = kernel.correlation(PLACES)
     assert 0.1 < Q_A[0, 1] < 0.9
     assert_covariance(drawn.reshape(runs, 8), np.kron(Q_A, Q_D))
@@ -43,7 +43,7 @@ def test_the_displacements_have_the_covariance_of_agents_by_that_of_axes(shape, 
 
 def test_without_a_kernel_agents_are_pushed_each_by_itself():
     runs = 40_000
-    drawn = Disturbance(Q_D, None, 0.0).next(np.zeros((runs, 4, 2)), white(runs, 4, 2), white(runs, 4, 2), PLACES)
+    drawn = Disturbance(Q_D, None, 0.0).next(np.zeros((runs, 4, 2)), white(runs, 4, 2), white(runs, 4, 2), np.eye(4))
     assert_covariance(drawn.reshape(runs, 8), np.kron(np.eye(4), Q_D))
 
 
@@ -64,7 +64,7 @@ def test_persistence_correlates_successive_ticks_and_leaves_the_covariance(persi
     pushed = Disturbance(Q_D, Kernel("exponential", 2.0, "nominal"), persistence)
     now = np.zeros((runs, 2, 2))
     for _ in range(60):
-        before, now = now, pushed.next(now, rng.normal(size=now.shape), now, PLACES[:2])
+        before, now = now, pushed.next(now, rng.normal(size=now.shape), now, pushed.root(PLACES[:2]))
     both = np.concatenate([before.reshape(runs, 4), now.reshape(runs, 4)], axis=1)
     in_a_tick = np.kron(Kernel("exponential", 2.0, "nominal").correlation(PLACES[:2]), Q_D)
     assert_covariance(both, np.kron([[1, persistence], [persistence, 1]], in_a_tick))
@@ -74,7 +74,7 @@ def test_agents_at_one_place_are_pushed_alike_if_it_is_true_places_that_count():
     here = np.array([[5.0, 5.0], [5.0, 5.0], [6.0, 5.0]])[None]
     for positions, alike in (("true", True), ("nominal", False)):
         pushed = Disturbance(Q_D, Kernel("exponential", 2.0, positions), 0.0)
-        (drawn,) = pushed.next(np.zeros((1, 3, 2)), white(1, 3, 2), here, PLACES[:3])
+        (drawn,) = pushed.next(np.zeros((1, 3, 2)), white(1, 3, 2), here, pushed.root(PLACES[:3]))
         assert np.allclose(drawn[0], drawn[1], atol=1e-5) is alike
         assert not np.allclose(drawn[0], drawn[2], atol=1e-2)
 
@@ -82,9 +82,9 @@ def test_agents_at_one_place_are_pushed_alike_if_it_is_true_places_that_count():
 def test_every_swarm_is_pushed_by_its_own_places():
     pushed = Disturbance(Q_D, Kernel("exponential", 2.0, "true"), 0.0)
     drawn, places = white(2, 4, 2), np.stack([PLACES, 3 * PLACES])
-    together = pushed.next(np.zeros((2, 4, 2)), drawn, places, PLACES)
+    together = pushed.next(np.zeros((2, 4, 2)), drawn, places, pushed.root(PLACES))
     for run in range(2):
-        alone = pushed.next(np.zeros((1, 4, 2)), drawn[run : run + 1], places[run : run + 1], PLACES)
+        alone = pushed.next(np.zeros((1, 4, 2)), drawn[run : run + 1], places[run : run + 1], pushed.root(PLACES))
         assert together[run].tobytes() == alone[0].tobytes()
 
 
