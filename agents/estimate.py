@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import triangle
 from analysis.models.arrays import Array, Mask
+from analysis.models.small import triangle
 
 
 class Estimate(NamedTuple):

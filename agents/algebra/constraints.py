@@ -12,10 +12,10 @@ import numpy as np
 
 from agents.algebra import geometry
 from agents.algebra.geometry import SINGULAR, Fit, spans
-from agents.algebra.small import inverse, rotation
 from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
+from analysis.models.small import inverse, rotation
 
 Constraint = Literal["affine", "scaling", "rotation", "similarity"]
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import inverse, invert
 from analysis.kernels.kernel import Part, Plain, kernel, scratch
 from analysis.models.arrays import Array, Mask
+from analysis.models.small import inverse, invert
 
 # Relative to the mean eigenvalue: neighbours closer to a line (plane) than this do not determine an affine map.
 SINGULAR = 1e-9

@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import invert
 from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Integers, Mask, chosen
+from analysis.models.small import invert
 
 Model = Literal["constant-acceleration", "constant-velocity", "random-walk"]
 

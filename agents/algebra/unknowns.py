@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.algebra.small import inverse
 from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
+from analysis.models.small import inverse
 
 
 class Belief(NamedTuple):

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from agents.algebra import kalman, missed_ticks
-from agents.algebra.small import determinant, inverse
 from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
@@ -24,6 +23,7 @@ from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import exp, log
 from analysis.models.reports import NIS
+from analysis.models.small import determinant, inverse
 
 
 class Modes(NamedTuple):

@@ -16,7 +16,6 @@ import numpy as np
 from agents.algebra import inputs, kalman, late_news, missed_ticks
 from agents.algebra.blocks import block_diagonal, diagonal_blocks
 from agents.algebra.geometry import identity
-from agents.algebra.small import inverse
 from agents.algebra.unknowns import Belief, EdgeModel
 from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
@@ -27,6 +26,7 @@ from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 from analysis.models.reports import NIS
+from analysis.models.small import inverse
 from netem.core.channels import INPUT
 
 

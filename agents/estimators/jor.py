@@ -14,7 +14,6 @@ import numpy as np
 
 from agents.algebra import starts
 from agents.algebra.geometry import identity
-from agents.algebra.small import inverse
 from agents.brief import Brief, Own
 from agents.estimate import Estimate, no_edges
 from agents.estimators.base import Estimator
@@ -24,6 +23,7 @@ from analysis.models import jacobi
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
+from analysis.models.small import inverse
 from netem.core.channels import PLACE
 
 

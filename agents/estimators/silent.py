@@ -15,7 +15,6 @@ import numpy as np
 
 from agents.algebra import inputs, kalman
 from agents.algebra.geometry import identity
-from agents.algebra.small import inverse
 from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate, no_indicator
 from agents.estimators.base import Estimator, refuse_negative
@@ -26,6 +25,7 @@ from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 from analysis.models.reports import NIS
+from analysis.models.small import inverse
 from netem.core.channels import INPUT
 
 

@@ -12,12 +12,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array
+
+_SMALL = 12
 
 
 def product(*factors: NDArray[Any]) -> Array:
     """The matrix product of stacks of matrices (..., r, s), (..., s, t) ..., from left to right."""
-    return reduce(np.matmul, (np.ascontiguousarray(factor) for factor in factors))
+    return reduce(_multiplied, (np.ascontiguousarray(factor) for factor in factors))
+
+
+def _multiplied(one: NDArray[Any], other: NDArray[Any]) -> Array:
+    """By a kernel where matrices are small: a call into BLAS would be mostly preparation."""
+    small = one.ndim > 1 and other.ndim > 1 and max(*one.shape[-2:], other.shape[-1]) <= _SMALL
+    if small and one.dtype == other.dtype == np.float64:
+        multiplied: Array = _small(one, other)
+        return multiplied
+    return np.matmul(one, other)
+
+
+@kernel("(r,s),(s,t)->(r,t)", "dd->d")
+def _small() -> Plain:
+    def plain(one: Array, other: Array, multiplied: Array) -> None:
+        for row in range(len(one)):
+            for column in range(other.shape[1]):
+                multiplied[row, column] = 0.0
+            for between in range(len(other)):
+                for column in range(other.shape[1]):
+                    multiplied[row, column] += one[row, between] * other[between, column]
+
+    return plain
 
 
 def sum_over(array: NDArray[Any], axis: int | tuple[int, ...]) -> Array:

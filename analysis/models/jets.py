@@ -10,6 +10,7 @@ from math import comb
 
 import numpy as np
 
+from analysis.models import small
 from analysis.models.algebra import product
 from analysis.models.arrays import Array
 from analysis.models.elementary import whole_power
@@ -40,7 +41,7 @@ def scaled(factor: Array, other: Array) -> Array:
 
 def inverse(matrix: Array) -> Array:
     """The jet of the inverses of matrices (m + 1, ..., r, r) (lemma 1, i)."""
-    inverted = [np.linalg.inv(matrix[0])]
+    inverted = [small.inverse(matrix[0])]
     for order in range(1, len(matrix)):
         drawn = reduce(
             np.add, [comb(order, lower) * product(matrix[order - lower], inverted[lower]) for lower in range(order)]

@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from agents.algebra import geometry, small
+from agents.algebra import geometry
 from agents.algebra.constraints import MAPS, Constraint
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.ga_rkf import GeometryAwareFilter
 from agents.estimators.ral import THETA, RelativeAffineLocalization
+from analysis.models import small
 from world.formation.nominal import PRESETS
 
 PLACES = {2: HEXA4, 3: np.ones(3) - OCTAHEDRON}

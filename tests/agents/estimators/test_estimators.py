@@ -7,7 +7,7 @@ from briefs import HEXA4, OCTAHEDRON, REST, brief, hears, only, silence, swarm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.algebra import geometry, kalman, small
+from agents.algebra import geometry, kalman
 from agents.algebra.constraints import MAPS
 from agents.estimators.conral import ConsensusLocalization
 from agents.estimators.edge_kf import EdgeKalmanFilter
@@ -18,6 +18,7 @@ from agents.estimators.mmse import MinimumMeanSquareError
 from agents.estimators.none import NoEstimator
 from agents.estimators.ral import THETA, RelativeAffineLocalization
 from agents.estimators.rkf import RelativeKalmanFilter
+from analysis.models import small
 from world.formation.nominal import PRESETS
 
 R = np.array([[0.01, 0.003], [0.003, 0.02]])

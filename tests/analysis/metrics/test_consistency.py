@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2, multivariate_normal
 
 from agents.algebra import kalman
-from agents.algebra.small import triangle
 from analysis.metrics import consistency
+from analysis.models.small import triangle
 
 DRAWS = np.random.default_rng(7)
 

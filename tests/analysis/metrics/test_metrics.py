@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.linalg import orthogonal_procrustes
 
-from agents.algebra.small import triangle
 from analysis.metrics.errors import (
     change_of_step,
     covariance_trace,
@@ -13,6 +12,7 @@ from analysis.metrics.errors import (
     rate_of_fall,
     tracking_error,
 )
+from analysis.models.small import triangle
 
 TARGET = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 POSITION = np.array([[3.0, 4.0], [1.0, 2.0], [1.0, 1.0]])  # 5 m, 2 m and 1 m off

@@ -18,7 +18,6 @@ from agents.algebra import (
     missed_ticks,
     prediction,
     redcho,
-    small,
     smoothing,
     starts,
 )
@@ -289,13 +288,6 @@ CASES = {
         lambda internal, own, theirs: CONSENSUS.step(internal, own, theirs, 0.013),
         *(real(4, 9), real(9), real(NEIGHBOURS, 9)),
     ),
-    **{
-        f"agents.algebra.small.{function.__name__} ({dimension})": of(
-            function, covariance(dimension, dimension), rows=100
-        )
-        for function in (small.determinant, small.inverse, small.rotation, small.triangle)
-        for dimension in (2, 3)
-    },
     **{
         f"agents.algebra.{what} ({dimension})": case
         for dimension in (2, 3)

@@ -3,7 +3,19 @@
 import numpy as np
 
 from analysis.metrics import consistency, errors, indicator, localization
-from analysis.models import affine, algebra, arrays, elementary, graph, information, jacobi, jets, pursuit, sensor
+from analysis.models import (
+    affine,
+    algebra,
+    arrays,
+    elementary,
+    graph,
+    information,
+    jacobi,
+    jets,
+    pursuit,
+    sensor,
+    small,
+)
 from rows.case import covariance, of, real, share, truth, whole
 
 MANY = 500  # numbers that round apart once in a thousand times
@@ -30,6 +42,13 @@ def _of_edges(function):
 
 
 CASES = {
+    **{
+        f"analysis.models.small.{function.__name__} ({dimension})": of(
+            function, covariance(dimension, dimension), rows=100
+        )
+        for function in (small.determinant, small.inverse, small.rotation, small.triangle)
+        for dimension in (2, 3)
+    },
     "analysis.models.arrays.chosen": of(arrays.chosen, truth(), real(9, 2), real(9, 2)),
     "analysis.models.arrays.chosen (tuples)": of(
         lambda which, one, other: arrays.chosen(which, (one, (one,)), (other, (other,))), truth(), real(9), real(9)
