@@ -65,7 +65,7 @@ EXEMPT = {
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
         world.formation.composed.compose world.formation.design.design
-        world.formation.layouts.grid
+        world.formation.layouts.grid world.physics.disturbance.Disturbance.root
         world.formation.layouts.strewn world.formation.leading.corners world.formation.leading.led
         world.formation.spectrum.slowest analysis.models.cuts.smallest_cut
         analysis.models.jacobi.step analysis.models.jacobi.rates analysis.claims.random_graphs.edges
