@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models import jets
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Integers
@@ -31,18 +32,34 @@ def carried(target: Target, prediction: Prediction, seconds: Array) -> tuple[Arr
 
 def predicted(target: Target, prediction: Prediction, now: Integers, dt: float) -> tuple[Array, Array]:
     """Jets of the information of an optimal estimate carried on (6), by the differential equations that it follows."""
-    order = target.order
     elapsed = np.maximum(now - prediction.made, 0)  # a clock that is set right goes back
     first, spread = carried(target, prediction, elapsed * dt)
-    shift, driven = np.eye(order, k=1), np.zeros((order, order))
-    driven[-1, -1] = target.intensity
-    mean, covariance = [first], [spread]
-    for derivative in range(order):
-        mean.append(product(shift, mean[-1]))
-        moved = product(shift, covariance[-1])
-        covariance.append(moved + np.swapaxes(moved, -1, -2) + (driven if derivative == 0 else 0.0))
-    Q = jets.inverse(np.stack(covariance))
-    return Q, jets.times(Q, np.stack(mean))
+    mean, covariance = _derived(first, spread, target.intensity, np.empty(target.order + 1))
+    Q = jets.inverse(np.moveaxis(covariance, -3, 0))
+    return Q, jets.times(Q, np.moveaxis(mean, -3, 0))
+
+
+@kernel("(m,d),(m,m),(),(j)->(j,m,d),(j,m,m)", "dddd->dd")
+def _derived() -> Plain:
+    """Jets of mean and covariance, which follow dx = S x dt + dw, with S the shift of derivatives."""
+
+    def plain(first: Array, spread: Array, intensity: float, orders: Array, mean: Array, covariance: Array) -> None:
+        size = len(first)
+        for order in range(len(orders)):
+            for row in range(size):
+                for axis in range(first.shape[1]):
+                    mean[order, row, axis] = first[row + order, axis] if row + order < size else 0.0
+                for column in range(size):
+                    if order == 0:
+                        covariance[order, row, column] = spread[row, column]
+                    else:
+                        below = covariance[order - 1, row + 1, column] if row + 1 < size else 0.0
+                        beside = covariance[order - 1, column + 1, row] if column + 1 < size else 0.0
+                        covariance[order, row, column] = below + beside
+            if order == 1:
+                covariance[1, size - 1, size - 1] += intensity
+
+    return plain
 
 
 def detected(target: Target, last: Prediction, now: Integers, sighting: Sighting, gate: float, dt: float) -> Prediction:
