@@ -22,11 +22,12 @@ from typing import IO
 from affinet.runtimes import nursery
 from affinet.runtimes.child import Child, Process, RunFailed, started
 from affinet.runtimes.silence import StatusHistory
+from analysis.kernels import kernel as kernels
 
 NURSERY = "nursery"
 # What can be imported here can be there: PYTHONPATH cannot say so of a folder with a colon in its name.
 _RUN = """import json, runpy, sys
-path, _, package = sys.argv[1:]
+path, _, package, *_ = sys.argv[1:]
 sys.path[:] = json.loads(path)
 runpy.run_module(package, run_name="__main__", alter_sys=True)"""
 _LONGEST_ANSWER = 256
@@ -215,9 +216,9 @@ class ForkedProcess:
 
 
 def program() -> list[str]:
-    """The command line of the nursery, with the search path of this process."""
+    """The command line of the nursery, with the search path of this process, and the kernels that planning has called."""
     path = [os.path.abspath(entry) for entry in sys.path if entry]
-    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__]
+    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__, json.dumps(kernels.prepared())]
 
 
 def end_by(deadline: float, process: Process) -> None:

@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.inject import Access
@@ -19,12 +21,14 @@ from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief
+from analysis.metrics.errors import tracking_error
 from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
 from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
 from world.brief import WorldBrief
+from world.physics.world import World
 
 
 @dataclass
@@ -125,6 +129,7 @@ class Launcher:
     def _start(self, group: ProcessGroup) -> None:
         private = self._private
         self._logins = self._make_logins(private)
+        _prepare_kernels(self._plan.world)
         group.start_nursery()
         group.fork("world", self._world_brief(self._logins[WORLD]), trusted=True)
         medium = self._medium_brief(self._logins[HUB], private / "users")
@@ -258,6 +263,12 @@ class Launcher:
             checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
             remembers=remembers,
         )
+
+
+def _prepare_kernels(world: World) -> None:
+    """Call what the world and the medium call: planning has called what agents do, and the nursery loads what was called."""
+    first = world.begin()
+    tracking_error(first.position, world.goal(0, first), np.ones(len(first.position), dtype=bool))
 
 
 def _remove_unwritten(out: Path) -> None:

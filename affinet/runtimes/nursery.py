@@ -3,6 +3,8 @@
 A fork of a process that runs threads, or has opened a session, hangs sooner or later. So nothing is imported here that starts
 a thread (Rerun and Arrow do: the world and the medium import them for themselves), and no code of a user's own.
 
+Kernels that planning has called are loaded before anything is forked.
+
 Its standard input is a socket to the launcher, and its lifeline. A datagram that comes is the name of a process to fork,
 with its standard input, output and error beside it; the answer is a process identifier with a pid file descriptor beside it,
 or the error that kept it from forking. Later it tells with which exit status the process ended, since that is told to parents
@@ -30,6 +32,7 @@ import numpy as np
 from agents import estimators, laws
 from agents import process as agent_process
 from agents.centre import process as centre_process
+from analysis.kernels import kernel as kernels
 from netem import process as medium_process
 from netem.processes.supervised import go_on_without_a_launcher
 from world import process as world_process
@@ -139,6 +142,7 @@ def main() -> None:
     for package in (estimators, laws):
         for module in iter_modules(package.__path__, f"{package.__name__}."):
             import_module(module.name)
+    kernels.prepare(json.loads(sys.argv[-1]))  # once for all: a fork shares them
     _be_called("nursery")
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, as it may come to us, it has nobody's exit status told
     go_on_without_a_launcher()

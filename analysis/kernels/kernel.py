@@ -11,7 +11,7 @@ Sizes that are few and small, as the number of dimensions, are constants of what
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import update_wrapper
 from typing import Any
 
@@ -65,6 +65,7 @@ class Kernel:
         self._sizes = tuple(_capitals(self.cores[: self.arguments]))
         self.sizes = tuple(name for name, _, _ in self._sizes)
         self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}
+        _EVERY[f"{self.name} {self.types}"] = self
 
     def __call__(self, *given: Any) -> Any:
         """What comes of arrays, their leading axes broadcast against each other: an array, or as many as there are results."""
@@ -73,20 +74,41 @@ class Kernel:
                 given = tuple(map(_compact, given, self._axes))
                 break
         sizes = tuple([given[place].shape[axis] for _, place, axis in self._sizes])
-        compiled = self._compiled.get(sizes) or self._made(sizes)
+        compiled = self._compiled.get(sizes) or self.prepare(sizes)
         return compiled(*given)
 
     def plain(self, *sizes: int) -> Plain:
         """What is compiled for these sizes, in the order in which their axes first appear."""
         return self.factory(*sizes)
 
-    def _made(self, sizes: tuple[int, ...]) -> Callable[..., Any]:
+    @property
+    def prepared(self) -> list[tuple[int, ...]]:
+        """The sizes that it is compiled for in this process."""
+        return list(self._compiled)
+
+    def prepare(self, sizes: tuple[int, ...]) -> Callable[..., Any]:
+        """Compile it for these sizes, or load what was compiled before."""
         from analysis.kernels.kept import (
             universal,  # which loads a compiler's library: who computes nothing need not wait
         )
 
         self._compiled[sizes] = universal(self, sizes)
         return self._compiled[sizes]
+
+
+_EVERY: dict[str, Kernel] = {}
+
+
+def prepared() -> dict[str, list[tuple[int, ...]]]:
+    """All kernels that were called in this process, and with which sizes."""
+    return {name: one.prepared for name, one in _EVERY.items() if one.prepared}
+
+
+def prepare(wanted: Mapping[str, Sequence[Sequence[int]]]) -> None:
+    """Make kernels ready, as another process has `prepared` them, if what they are in is imported."""
+    for name, many in wanted.items():
+        for sizes in many if name in _EVERY else ():
+            _EVERY[name].prepare(tuple(sizes))
 
 
 def kernel(layout: str, types: str) -> Callable[[Factory], Kernel]:

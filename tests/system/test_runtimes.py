@@ -1,6 +1,8 @@
 """One implementation, two runtimes, the same bits."""
 
 import json
+import subprocess
+import sys
 from importlib.metadata import entry_points
 
 import numpy as np
@@ -219,6 +221,30 @@ def test_an_agent_stays_below_20_mb(out):
     """Before: 28 MB, of processes that share no more than their libraries."""
     outcome = processes(out, "hexa", "time.duration=2")
     assert max(p["pss_mb"] for p in outcome.processes if p["role"] == "agent") < 20
+
+
+FIRST_EVER = """
+import sys
+from pathlib import Path
+from affinet.planning.making import make
+from affinet.runtimes.run import fly
+from affinet.scenario import loading
+from analysis.kernels.kept import folder
+
+plan = make(loading.load("hexa", ("time.duration=0.1", "record.enabled=false")))
+planned = set(folder().iterdir())
+outcome = fly(plan, "processes", Path(sys.argv[1]), lambda *_: None)
+print(outcome.verdict, *sorted(file.name for file in set(folder().iterdir()) - planned))
+"""
+
+
+def test_where_nothing_is_compiled_yet_no_agent_has_to_compile(out, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
+    told = subprocess.run([sys.executable, "-c", FIRST_EVER, str(out)], capture_output=True, text=True, check=True)
+    verdict, *compiled = told.stdout.split()
+    assert verdict == "pass"
+    assert not [name for name in compiled if name.startswith("agents.")], "seven would compile the same at once"
+    assert len(compiled) <= 2
 
 
 def test_every_message_is_accounted_for(out):

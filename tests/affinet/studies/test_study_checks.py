@@ -357,7 +357,7 @@ def test_work_says_how_far_it_is_to_whom_waits_for_it(tmp_path):
 
 def test_a_flight_tells_which_share_of_it_is_done():
     plan, told = plan_of("corridor", "time.dt=0.05", "time.duration=0.2"), []
-    fly_all(plan, range(1, 52), 1, told.append)  # in two parts
+    fly_all(plan, range(1, 202), 1, told.append)  # in two parts
     assert told == [each / 8 for each in range(1, 9)]
 
 

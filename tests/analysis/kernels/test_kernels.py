@@ -9,6 +9,7 @@ import pytest
 from compiled import kernels, sizes
 
 from analysis.kernels import kept
+from analysis.kernels import kernel as kernels_of
 from analysis.kernels.kernel import Kernel, Part, kernel, scratch
 
 ROWS, SMALL = 40, 5
@@ -190,6 +191,17 @@ def test_other_constants_parts_and_sizes_are_compiled_apart(tmp_path, monkeypatc
     assert by_size(np.ones(2)) == 2.0
     assert by_size(np.ones(3)) == 3.0
     assert len(list(kept.folder().iterdir())) == before + 3
+
+
+def test_what_one_process_has_prepared_another_prepares_as_well():
+    here = Kernel(times(7.0), "()->()", "d->d")
+    here(np.ones(1))
+    name = f"{here.name} {here.types}"
+    assert kernels_of.prepared()[name] == [()]
+    there = Kernel(times(7.0), "()->()", "d->d")  # as it is in the other
+    assert not there.prepared
+    kernels_of.prepare({name: [[]], "of nobody d->d": [[2]]})
+    assert there.prepared == [()]
 
 
 LATER = """
