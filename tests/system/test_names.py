@@ -86,7 +86,7 @@ def test_where_no_folder_will_do_it_is_said_what_would(monkeypatch):
 
 def test_a_child_searches_where_its_launcher_does(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path / "a:b"), ""])
-    *_, path, dash_m, package = forked.program()
+    *_, path, dash_m, package, _ = forked.program()
     assert (dash_m, package) == ("-m", "affinet.runtimes.nursery")
     assert json.loads(path) == [os.path.abspath(entry) for entry in sys.path if entry]
 

@@ -25,7 +25,7 @@ WAITS = READY + "import time\ntime.sleep(600)"
 
 
 def program(first="pass"):
-    return [sys.executable, "-P", str(PROGRAMS / "scripted_nursery.py"), first]
+    return [sys.executable, "-P", str(PROGRAMS / "scripted_nursery.py"), first, "{}"]
 
 
 @pytest.fixture
