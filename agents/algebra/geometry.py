@@ -103,25 +103,6 @@ def _regular(D: int) -> Plain:
     return plain
 
 
-def apply(theta: Array, relative: Array) -> Array:
-    """Relative positions Theta p_ij under a map (..., D, D), shape (..., n, D) (eq. 11)."""
-    placed: Array = _placed(theta, relative)
-    return placed
-
-
-@kernel("(D,D),(n,D)->(n,D)", "dd->d")
-def _placed(D: int) -> Plain:
-    def plain(theta: Array, relative: Array, placed: Array) -> None:
-        for edge in range(len(relative)):
-            for i in range(D):
-                summed = 0.0
-                for j in range(D):
-                    summed += theta[i, j] * relative[edge, j]
-                placed[edge, i] = summed
-
-    return plain
-
-
 def indicator(own: Fit, theirs: Array, counts: Mask) -> Array:
     """Local convergence indicator psi_i, shape (...) (eq. 16).
 
@@ -158,25 +139,6 @@ def disagreement(own: Array, theirs: Array, counts: Mask) -> float:
 def _indicated(_: int) -> Plain:
     def plain(own: Array, feasible: bool, theirs: Array, counts: Mask, found: Array) -> None:
         found[0] = disagreement(own, theirs, counts) if feasible else np.nan
-
-    return plain
-
-
-def total(counts: Mask, maps: Array) -> Array:
-    """Sum of the maps (..., n, D, D) that count, shape (..., D, D)."""
-    summed: Array = _summed(counts, maps)
-    return summed
-
-
-@kernel("(n),(n,D,D)->(D,D)", "?d->d")
-def _summed(D: int) -> Plain:
-    def plain(counts: Mask, maps: Array, summed: Array) -> None:
-        for i in range(D):
-            for j in range(D):
-                summed[i, j] = 0.0
-                for edge in range(len(counts)):
-                    if counts[edge]:
-                        summed[i, j] += maps[edge, i, j]
 
     return plain
 

@@ -163,7 +163,7 @@ def test_covariance_is_that_of_the_scatter_to_first_order(constraint, dimension,
     errors = rng.multivariate_normal(np.zeros(dimension), noise, size=(100_000, 6))
     measured = np.where(seen[:, None], relative @ theta.T + errors, 0.0)
     fits = maps.fit(relative, measured, np.broadcast_to(seen, (100_000, 6)))
-    scatter = geometry.apply(fits.theta, relative)
+    scatter = relative @ np.swapaxes(fits.theta, -1, -2)
     said = maps.covariance(exact, relative, noise)
     for edge in range(6):
         assert np.linalg.norm(np.cov(scatter[:, edge].T) - said[edge]) < 0.03 * np.linalg.norm(said[edge])

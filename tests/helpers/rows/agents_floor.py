@@ -157,8 +157,6 @@ CASES = {
     "agents.algebra.geometry.gram": of(geometry.gram, real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     "agents.algebra.geometry.cross": of(geometry.cross, real(NEIGHBOURS, 2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     "agents.algebra.geometry.inverse_gram": of(geometry.inverse_gram, covariance(2, 2), truth()),
-    "agents.algebra.geometry.apply": of(geometry.apply, real(2, 2), real(NEIGHBOURS, 2)),
-    "agents.algebra.geometry.total": of(geometry.total, truth(NEIGHBOURS), real(NEIGHBOURS, 2, 2)),
     "agents.algebra.geometry.indicator": of(
         lambda theta, gram, theirs, counts: geometry.indicator(_fit(theta, gram), theirs, counts),
         *(real(2, 2), covariance(2, 2), real(NEIGHBOURS, 2, 2), truth(NEIGHBOURS)),
