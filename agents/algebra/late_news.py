@@ -146,6 +146,16 @@ def reprocessed(
     return believed, recent._replace(before=_each(renewed, recent.before, *after[1:])), innovation
 
 
+def unheard(
+    recent: RecentTicks[T], before: T, own: Array, step: Callable[[T, TakenIn], tuple[T, Array]]
+) -> tuple[T, RecentTicks[T]]:
+    """What is believed after a tick in which nothing was measured and nothing heard, and the ticks with it."""
+    quiet = _at(recent.ticks, 0, recent.ticks.seen.ndim - 2)
+    passed = advanced(recent, before, own, np.zeros_like(quiet.measured), np.zeros_like(quiet.seen))
+    believed, passed, _ = reprocessed(passed, 0, step)
+    return believed, passed
+
+
 def _at(many: T, ago: int, axis: int) -> T:
     return _each(lambda array: array[(slice(None),) * axis + (ago,)], many)
 

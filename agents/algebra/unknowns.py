@@ -105,7 +105,7 @@ class EdgeModel:
         driven = self.sigma_n * self.sigma_n if self._guesses else 0.0
         turn = self._turn[: self._doubted, : self._doubted]
         covariance = _mixed(turn, belief.covariance, displaced, row, share, self._newest, driven)
-        return Belief(_turned(self._turn, belief.mean), covariance)
+        return Belief(product(self._turn, belief.mean), covariance)
 
     def hear(self, belief: Belief, inputs: Array, known: Mask) -> Belief:
         """The belief that knows the newest inputs (..., m), where they are `known` (..., m), and what they say of the rest."""
@@ -177,18 +177,6 @@ class EdgeModel:
         if self.persistence:
             T[0, 1] = 1.0
         return T
-
-
-@kernel("(q,q),(q,m)->(q,m)", "dd->d")
-def _turned() -> Plain:
-    def plain(T: Array, mean: Array, turned: Array) -> None:
-        for row in range(len(T)):
-            for place in range(mean.shape[1]):
-                turned[row, place] = 0.0
-                for earlier in range(len(T)):
-                    turned[row, place] += T[row, earlier] * mean[earlier, place]
-
-    return plain
 
 
 @kernel("(R,R),(S,S),(M,M),(),(),(),()->(S,S)", "dddldld->d")

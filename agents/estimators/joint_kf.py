@@ -78,11 +78,10 @@ class JointEdgeFilter(Estimator[Joint]):
         """Predict by what the agent flew and the neighbours are guessed to fly; begin again where guesses are not doubted."""
         if self.sigma_n == 0.0:
             return self.init(brief, gap.ticks.shape)
-        nothing, no = np.zeros_like(state.measured), np.zeros_like(state.seen)
 
         def live(state: Joint, gone: int) -> Joint:
-            past = late_news.advanced(state.past, state.edges, gap.within if gone else gap.before, nothing, no)
-            belief, past, _ = late_news.reprocessed(past, 0, partial(self._step, brief))
+            own = gap.within if gone else gap.before
+            belief, past = late_news.unheard(state.past, state.edges, own, partial(self._step, brief))
             return state._replace(edges=belief, past=past)
 
         return missed_ticks.lived(state, gap.ticks, live, fresh=lambda: self.init(brief, gap.ticks.shape))

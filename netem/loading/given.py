@@ -11,7 +11,7 @@ import numpy as np
 
 def readonly(given: Any) -> Any:
     """The same value, with views that cannot be written to in place of its arrays; tuples and maps are gone through."""
-    if type(given) is np.ndarray:
+    if isinstance(given, np.ndarray):
         if given.flags.writeable:
             given = given.view()
             given.setflags(write=False)

@@ -197,6 +197,10 @@ CASES = {
     "agents.algebra.late_news.reprocessed": of(
         lambda *given: late_news.reprocessed(_recent(*given), 2, _step), *REMEMBERED
     ),
+    "agents.algebra.late_news.unheard": of(
+        lambda *given: late_news.unheard(_recent(*given[:6]), Belief(given[6], given[6]), given[7], _step),
+        *(*REMEMBERED, real(2), real(2)),
+    ),
     "agents.estimators.joint_kf.corrected": of(
         lambda mean, spread, *measured: joint_kf.corrected(Belief(mean, spread), *measured),
         *(real(3, 18), covariance(36, 36), real(18), covariance(18, 18), truth(NEIGHBOURS)),
