@@ -14,7 +14,7 @@ _IMPORTED = re.compile(r"^from analysis\.kernels\.kernel import .*\bkernel\b", r
 
 sys.path.insert(0, str(HOUSE))  # a checkout is compiled before anything is installed from it
 
-from analysis.kernels.kept import folder, universal  # noqa: E402
+from analysis.kernels.kept import folder  # noqa: E402
 from analysis.kernels.kernel import Kernel  # noqa: E402
 
 
@@ -38,7 +38,7 @@ def main() -> int:
     before = set(folder().glob("*.o"))
     for kernel in kernels():
         for dimension in (2, 3):
-            universal(kernel, sizes(kernel, dimension))
+            kernel.prepare(sizes(kernel, dimension))
     made = len(set(folder().glob("*.o")) - before)
     sys.stdout.write(f"{made} kernels compiled, kept in {folder()}\n")
     return 0

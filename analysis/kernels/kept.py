@@ -24,9 +24,9 @@ from analysis.kernels.kernel import Kernel, Part
 from analysis.kernels.machine_code import loaded
 
 
-def universal(kernel: Kernel, sizes: tuple[int, ...]) -> Callable[..., Any]:
-    """The universal function of a kernel for these sizes, compiled now if it never was on this machine."""
-    path = folder() / f"{kernel.name}-{_digest(kernel, sizes)}.o"
+def universal(kernel: Kernel, sizes: tuple[int, ...], file: str) -> Callable[..., Any]:
+    """The universal function of a kernel for these sizes from this file, compiled now if it never was."""
+    path = Path(file)
     try:
         code = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
@@ -35,6 +35,11 @@ def universal(kernel: Kernel, sizes: tuple[int, ...]) -> Callable[..., Any]:
         code = object_code(kernel, sizes)
         _keep(path, code)
     return loaded(kernel, code)
+
+
+def place(kernel: Kernel, sizes: tuple[int, ...]) -> Path:
+    """The file in which this user's processes keep it."""
+    return folder() / f"{kernel.name}-{_digest(kernel, sizes)}.o"
 
 
 def folder() -> Path:

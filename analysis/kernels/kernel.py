@@ -65,6 +65,7 @@ class Kernel:
         self._sizes = tuple(_capitals(self.cores[: self.arguments]))
         self.sizes = tuple(name for name, _, _ in self._sizes)
         self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}
+        self._files: dict[tuple[int, ...], str] = {}
         _EVERY[f"{self.name} {self.types}"] = self
 
     def __call__(self, *given: Any) -> Any:
@@ -82,33 +83,35 @@ class Kernel:
         return self.factory(*sizes)
 
     @property
-    def prepared(self) -> list[tuple[int, ...]]:
-        """The sizes that it is compiled for in this process."""
-        return list(self._compiled)
+    def prepared(self) -> list[tuple[tuple[int, ...], str]]:
+        """The sizes that it is compiled for in this process, and the file of each."""
+        return list(self._files.items())
 
-    def prepare(self, sizes: tuple[int, ...]) -> Callable[..., Any]:
-        """Compile it for these sizes, or load what was compiled before."""
+    def prepare(self, sizes: tuple[int, ...], file: str | None = None) -> Callable[..., Any]:
+        """Compile it for these sizes, or load what was compiled before, from where this user's are kept or from this file."""
         from analysis.kernels.kept import (
+            place,
             universal,  # which loads a compiler's library: who computes nothing need not wait
         )
 
-        self._compiled[sizes] = universal(self, sizes)
+        self._files[sizes] = file or str(place(self, sizes))
+        self._compiled[sizes] = universal(self, sizes, self._files[sizes])
         return self._compiled[sizes]
 
 
 _EVERY: dict[str, Kernel] = {}
 
 
-def prepared() -> dict[str, list[tuple[int, ...]]]:
-    """All kernels that were called in this process, and with which sizes."""
+def prepared() -> dict[str, list[tuple[tuple[int, ...], str]]]:
+    """All kernels that were called in this process, with which sizes, and the file of each."""
     return {name: one.prepared for name, one in _EVERY.items() if one.prepared}
 
 
-def prepare(wanted: Mapping[str, Sequence[Sequence[int]]]) -> None:
+def prepare(wanted: Mapping[str, Sequence[tuple[Sequence[int], str]]]) -> None:
     """Make kernels ready, as another process has `prepared` them, if what they are in is imported."""
     for name, many in wanted.items():
-        for sizes in many if name in _EVERY else ():
-            _EVERY[name].prepare(tuple(sizes))
+        for sizes, file in many if name in _EVERY else ():
+            _EVERY[name].prepare(tuple(sizes), file)
 
 
 def kernel(layout: str, types: str) -> Callable[[Factory], Kernel]:

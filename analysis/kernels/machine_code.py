@@ -28,14 +28,17 @@ def loaded(kernel: Kernel, code: bytes) -> Callable[..., Any]:
     kinds = ctypes.create_string_buffer(bytes(np.dtype(letter).num for letter in kernel.types))
     name, layout = kernel.name.encode(), kernel.layout.replace(" ", "").encode()
     results = len(kernel.types) - kernel.arguments
-    _kept_alive.append((linker, loops, nothing, kinds, name, layout))  # NumPy keeps no reference to any of them
+    _keep_for_ever((linker, _target(), loops, nothing, kinds, name, layout))  # NumPy keeps no reference to any of them
     made: Callable[..., Any] = _maker()(
         loops, nothing, kinds, 1, kernel.arguments, results, _NO_IDENTITY, name, None, 0, layout
     )
     return made
 
 
-_kept_alive: list[Any] = []
+def _keep_for_ever(held: object) -> None:
+    # A list of this module would not do: modules may go (pytester takes those away that a test has imported) before the
+    # functions that were made by them, and these would run into memory that is no longer theirs.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(held))
 
 
 @cache

@@ -193,15 +193,39 @@ def test_other_constants_parts_and_sizes_are_compiled_apart(tmp_path, monkeypatc
     assert len(list(kept.folder().iterdir())) == before + 3
 
 
-def test_what_one_process_has_prepared_another_prepares_as_well():
+def test_what_one_process_has_prepared_another_prepares_as_well(tmp_path, monkeypatch):
     here = Kernel(times(7.0), "()->()", "d->d")
     here(np.ones(1))
     name = f"{here.name} {here.types}"
-    assert kernels_of.prepared()[name] == [()]
+    ((sizes, file),) = kernels_of.prepared()[name]
+    assert sizes == ()
     there = Kernel(times(7.0), "()->()", "d->d")  # as it is in the other
     assert not there.prepared
-    kernels_of.prepare({name: [[]], "of nobody d->d": [[2]]})
-    assert there.prepared == [()]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # as a test that moves home between the two
+    kernels_of.prepare({name: [([], file)], "of nobody d->d": [([2], file)]})
+    assert there.prepared == [((), file)]
+    assert there(np.ones(1)) == 7.0
+    assert not kept.folder().exists(), "it was compiled once more"
+
+
+OUTLIVES = """
+import gc, sys
+import numpy as np
+from netem.core import draws
+uniform, purpose = draws.uniform, draws.Purpose.LOSS
+before = uniform(3, purpose, tick=7)
+for name in [name for name in sys.modules if name.startswith("analysis.kernels")]:
+    sys.modules[name].__dict__.clear()
+    del sys.modules[name]
+gc.collect()
+others = [np.ones(2**16) for _ in range(50)]
+assert uniform(3, purpose, tick=7) == before
+"""
+
+
+def test_a_kernel_outlives_the_modules_that_made_it():
+    done = subprocess.run([sys.executable, "-c", OUTLIVES], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 LATER = """
