@@ -23,18 +23,18 @@ import llvmlite.binding as llvm
 from analysis.kernels.kernel import Kernel, Part
 from analysis.kernels.machine_code import loaded
 
+_SEAL = 16  # bytes
 
-def universal(kernel: Kernel, sizes: tuple[int, ...], file: str) -> Callable[..., Any]:
-    """The universal function of a kernel for these sizes from this file, compiled now if it never was."""
-    path = Path(file)
-    try:
-        code = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
+
+def universal(kernel: Kernel, sizes: tuple[int, ...], file: str) -> tuple[Callable[..., Any], str]:
+    """The universal function of a kernel for these sizes from this file, compiled now if it never was; and where it is kept."""
+    code = _read(file)
+    if code is None:
         from analysis.kernels.compiling import object_code  # Numba takes a second
 
         code = object_code(kernel, sizes)
-        _keep(path, code)
-    return loaded(kernel, code)
+        file = _keep(Path(file), code + _seal(code))
+    return loaded(kernel, code), file
 
 
 def place(kernel: Kernel, sizes: tuple[int, ...]) -> Path:
@@ -47,19 +47,57 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "affinet" / "kernels"
 
 
-def _keep(path: Path, code: bytes) -> None:
-    """Write it whole or not at all: others may do the same at the same time."""
+def _read(file: str) -> bytes | None:
+    """The code in a file, if it is all there: a file that a power failure cut short would crash whoever runs it."""
+    try:
+        written = Path(file).read_bytes()
+    except OSError:
+        return None
+    code, seal = written[:-_SEAL], written[-_SEAL:]
+    return code if seal == _seal(code) else None
+
+
+def _seal(code: bytes) -> bytes:
+    return blake2b(code, digest_size=_SEAL).digest()
+
+
+def _keep(path: Path, content: bytes) -> str:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as unfinished:
-            unfinished.write(code)
-        Path(unfinished.name).replace(path)
+        _write(path, content)
     except OSError as error:
-        warnings.warn(
-            f"every process compiles its kernels anew, as they cannot be kept in {path.parent} ({error.strerror}):"
-            " set XDG_CACHE_HOME to a folder that can be written to",
-            stacklevel=2,
-        )
+        _warn_of(str(path.parent), error.strerror)
+        return _in_memory(path.name, content)
+    return str(path)
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Whole or not at all: others may do the same at the same time."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as unfinished:
+        try:
+            unfinished.write(content)
+            unfinished.flush()
+        except OSError:  # the disk is full
+            Path(unfinished.name).unlink()
+            raise
+    Path(unfinished.name).replace(path)
+
+
+@cache
+def _warn_of(folder: str, reason: str) -> None:
+    warnings.warn(
+        f"every command compiles its kernels anew, as they cannot be kept in {folder} ({reason}):"
+        " set XDG_CACHE_HOME to a folder that can be written to",
+        stacklevel=2,
+    )
+
+
+def _in_memory(name: str, content: bytes) -> str:
+    """A file for those processes that this one starts, which need not compile it as well; it goes with this process."""
+    descriptor = os.memfd_create(name)
+    with open(descriptor, "wb", closefd=False) as file:
+        file.write(content)
+    return f"/proc/{os.getpid()}/fd/{descriptor}"
 
 
 def _digest(kernel: Kernel, sizes: tuple[int, ...]) -> str:

@@ -94,8 +94,7 @@ class Kernel:
             universal,  # which loads a compiler's library: who computes nothing need not wait
         )
 
-        self._files[sizes] = file or str(place(self, sizes))
-        self._compiled[sizes] = universal(self, sizes, self._files[sizes])
+        self._compiled[sizes], self._files[sizes] = universal(self, sizes, file or str(place(self, sizes)))
         return self._compiled[sizes]
 
 

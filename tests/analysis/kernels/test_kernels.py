@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from compiled import kernels, sizes
 from analysis.kernels import kept
 from analysis.kernels import kernel as kernels_of
 from analysis.kernels.kernel import Kernel, Part, kernel, scratch
+from netem.core.draws import Purpose, uniform
 
 ROWS, SMALL = 40, 5
 EVERY = list(kernels())
@@ -250,8 +252,43 @@ def test_later_processes_need_no_compiler(tmp_path, monkeypatch):
     assert later().stdout.split() == [str(number)]
 
 
-def test_where_nothing_can_be_kept_it_is_said(tmp_path, monkeypatch):
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with pytest.warns(UserWarning, match="set XDG_CACHE_HOME to a folder that can be written to"):
-        assert Kernel(times(5.0), "()->()", "d->d")(np.ones(1)) == 5.0
+@pytest.mark.parametrize("left", [0, 10, 700, -1])
+def test_a_file_that_was_cut_short_is_compiled_anew(tmp_path, monkeypatch, left):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    Kernel(times(11.0), "()->()", "d->d")(np.ones(1))
+    (file,) = kept.folder().iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(whole[:left])
+    assert Kernel(times(11.0), "()->()", "d->d")(np.ones(1)) == 11.0
+    assert file.read_bytes() == whole
+
+
+NOTHING_KEPT = """
+import subprocess, sys
+from analysis.kernels.kernel import prepared
+from netem.core import draws
+draws.uniform(3, draws.Purpose.LOSS, tick=7)
+later = "import sys, json; sys.modules['numba'] = None; from netem.core import draws; from analysis.kernels import kernel;"
+later += "kernel.prepare(json.loads(sys.argv[1])); print(draws.uniform(3, draws.Purpose.LOSS, tick=7)[0])"
+import json
+sys.exit(subprocess.run([sys.executable, "-c", later, json.dumps(prepared())]).returncode)
+"""
+
+
+@pytest.mark.parametrize("what_is_there", ["a file", "a folder"])
+def test_where_nothing_can_be_kept_it_is_said_and_still_compiled_once(tmp_path, monkeypatch, what_is_there):
+    if what_is_there == "a file":
+        (tmp_path / "affinet").touch()
+    else:
+        Path(draws_of(tmp_path)).mkdir(parents=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    done = subprocess.run([sys.executable, "-c", NOTHING_KEPT], capture_output=True, text=True, check=True)
+    assert done.stderr.count("set XDG_CACHE_HOME to a folder that can be written to") == 1
+    assert done.stdout.split() == [str(uniform(3, Purpose.LOSS, tick=7)[0])]
+
+
+def draws_of(cache):
+    """Where the kernel of draws would be kept in such a folder."""
+    uniform(3, Purpose.LOSS, tick=7)
+    ((_, file),) = [one for one in kernels_of.prepared()["netem.core.draws._drawn LLLLLLd"] if one[0] == ()]
+    return cache / "affinet" / "kernels" / Path(file).name
