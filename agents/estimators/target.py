@@ -33,6 +33,7 @@ from netem.core.channels import TARGET
 
 _SUREST, _LEAST_SURE = 1e-3, 1e3  # standard deviations whose information can be inverted side by side
 _SHORTEST, _LONGEST = 1e-3, 1e3  # lags, in seconds
+_MOST = 0.5  # of the detections of the target
 _LEAST = 0.01  # of one's own information: no mean over fewer than a hundred agents is smaller
 
 
@@ -245,6 +246,9 @@ class TargetEstimator(Estimator[Track]):
             found.append(Finding("information", "note", says))
         if self.fusion == "redcho":
             found += self._consensus.findings(swarm.dt, aided=self.derivatives == "own")
+        if self.gate > 0.0 and (share := _through(self.gate, swarm.dimension)) < _MOST:
+            says = f"gate = {self.gate:g} lets {share:.2g} of the detections of the target through, and turns the others away"
+            found.append(Finding("detections", "note", f"{says}; 3 to 5 standard deviations are usual"))
         return found
 
     def _fused(self, brief: Brief, state: Track, own: Array, heard: Mapping[str, Heard]) -> tuple[Track, Array]:
@@ -305,6 +309,13 @@ class TargetEstimator(Estimator[Track]):
     @cached_property
     def _consensus(self) -> Consensus:
         return Consensus(len(self.k) - 1, self.theta, tuple(self.k), tuple(self.gamma))
+
+
+def _through(gate: float, dimension: int) -> float:
+    """The share of detections of the target that are off what is expected by no more than so many standard deviations."""
+    from scipy.special import chdtr  # only who checks needs it
+
+    return float(chdtr(dimension, gate * gate))
 
 
 def _target(brief: Brief) -> Target:

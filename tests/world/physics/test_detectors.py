@@ -108,6 +108,17 @@ def test_a_gate_keeps_what_is_not_the_target_out():
 
 
 @pytest.mark.parametrize(
+    ("gate", "told"),
+    # 1 - exp(-g^2 / 2) of what is off by two axes: half of it at 1.177
+    [(0.0, []), (1.18, []), (1.17, ["gate = 1.17 lets 0.5 of"]), (0.1, ["gate = 0.1 lets 0.005 of"])],
+)
+def test_a_gate_that_turns_most_detections_away_is_told_of(gate, told):
+    plan = plan_of(NAME, f'agents.parameters.target={{fusion="none",gate={gate}}}')
+    found = [one.says for one in plan.findings if one.check == "detections"]
+    assert [says.partition(" the ")[0] for says in found] == told
+
+
+@pytest.mark.parametrize(
     ("said", "says"),
     [
         ("target.probabilities=[0.5]", "give a probability for each latency"),
