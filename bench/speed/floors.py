@@ -1,0 +1,130 @@
+"""Ticks in which nobody computes: the messages of GA-RKF by pipes, ZeroMQ, Ray actors and bare Zenoh."""
+
+from __future__ import annotations
+
+import importlib.util
+import secrets
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from speed.lines import Pipes
+from speed.started import all_of
+
+from affinet.planning.plan import Plan
+from netem.wire import messages
+from netem.wire.session import HUB, WORLD, agent_name, socket_folder
+
+TRANSPORTS = ("pipes", "ZeroMQ", "Zenoh", "Ray actors")
+_NEEDS = {"ZeroMQ": "zmq", "Ray actors": "ray"}
+_TICK = 500  # a typical one
+
+
+def is_installed(transport: str) -> bool:
+    """Whether its package is there."""
+    return importlib.util.find_spec(_NEEDS.get(transport, "zenoh")) is not None
+
+
+def tick(transport: str, plan: Plan, ticks: int) -> float:
+    """Seconds of a tick in which nobody computes."""
+    agents, size = plan.world.formation.agents, sizes(plan)
+    shared = {"agents": agents, "ticks": ticks, "size": size}
+    if transport == "Ray actors":
+        with all_of("ray_floor", {"driver": shared}) as (started):
+            return float(started["driver"].said())
+    names = {"world": WORLD, "hub": HUB, **{str(agent): agent_name(agent) for agent in range(1, agents + 1)}}
+    with tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder()) as private:
+        passwords = {role: secrets.token_hex(8) for role in names}
+        Path(private, "users").write_text("".join(f"{name}:{passwords[role]}\n" for role, name in names.items()))
+        if transport == "pipes":
+            Pipes.lay(Path(private), agents)
+        shared |= {"transport": transport, "folder": private}
+        endpoint = f"unixsock-stream/{private}/z.sock"
+        told = {
+            role: shared | {"role": role, "login": [endpoint, name, passwords[role]]} for role, name in names.items()
+        }
+        with all_of("floor", told) as started:
+            for role in ("hub", *(role for role in names if role not in ("hub", "world")), "world"):
+                started[role].tell("go")
+            return float(started["world"].said())
+
+
+def sizes(plan: Plan) -> dict[str, int]:
+    """Typical packed sizes of a tick's messages."""
+    number = np.random.default_rng(0).normal
+    dimension, links = plan.world.formation.dimension, len(plan.world.links)
+    agents = plan.world.formation.agents
+    degree = round(links / agents)
+    heard = round(degree * plan.scenario.network.availability)
+    nothing = np.empty((0, 5), dtype=np.int64)
+    map_ = number(size=(dimension, dimension))
+    said: dict[str, dict[str, Any]] = {
+        "input": {"velocity": number(size=dimension)},
+        "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
+        "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
+    }
+    broadcasts = [
+        messages.pack(messages.Broadcast(k=_TICK, src=1, channel=name, seq=_TICK, payload=fields))
+        for name, fields in said.items()
+    ]
+    told = {
+        "sense": messages.pack(
+            messages.Sense(
+                k=_TICK,
+                src=WORLD,
+                seq=_TICK,
+                last=False,
+                measured=number(size=(links, dimension)),
+                position=number(size=(agents, 2)),
+                motion=None,
+                sightings=None,
+                fired=[],
+            )
+        ),
+        "seen": messages.pack(
+            messages.SenseInbox(
+                k=_TICK,
+                src=HUB,
+                seq=_TICK,
+                clock=_TICK,
+                neighbours=[1] * heard,
+                measured=number(size=(heard, 2)),
+                position=None,
+                motion=None,
+                sighting=None,
+            )
+        ),
+        "heard": messages.pack_exchange(_TICK, _TICK, broadcasts * heard),
+        "act": messages.pack(
+            messages.Act(
+                k=_TICK,
+                src=1,
+                seq=_TICK,
+                input=number(size=dimension),
+                estimate=number(size=(degree, dimension)),
+                known=np.ones(degree, dtype=bool),
+                covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
+                psi=0.1,
+                feasible=True,
+                reports={},
+                heard=_TICK,
+            )
+        ),
+        "journal": messages.pack(
+            messages.Journal(
+                k=_TICK,
+                src=HUB,
+                seq=_TICK,
+                verdicts=np.ones((4, links), np.uint8),
+                odd=nothing,
+                apart=nothing,
+                late=0,
+                dropped=nothing,
+                released=nothing,
+                handed=[9] * agents,
+                injected=None,
+            )
+        ),
+    }
+    return {name: len(data) for name, data in told.items()} | {"said": len(broadcasts[-1])}
