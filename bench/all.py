@@ -1,6 +1,6 @@
 """All that is measured of affinet's speed, against its peers, in one table.
 
-    python bench/all.py [--only runs tick growth] [--rounds 5] [--share 1.0] [--keep] [--history FILE]
+    python bench/all.py [--only runs tick7 tick10 growth] [--rounds 5] [--share 1.0] [--keep] [--history FILE]
 
 Every ratio is affinet's cost by that of the peer: below 1 affinet is the cheaper. Peers and affinet take turns, round by
 round, and a ratio is the median of those of the rounds, with an interval of it. Ends with status 1 where a ratio is 20 % worse
@@ -13,6 +13,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from speed import growth, history, lockstep, monte_carlo
@@ -22,7 +23,8 @@ from speed.rows import Row
 
 PARTS: Mapping[str, Callable[[int, float], list[Row]]] = {
     "runs": monte_carlo.measure,
-    "tick": lockstep.measure,
+    "tick7": partial(lockstep.measure, "corridor"),
+    "tick10": partial(lockstep.measure, "hexa"),
     "growth": growth.measure,
 }
 

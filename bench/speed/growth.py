@@ -23,7 +23,7 @@ from affinet.scenario import loading
 
 _AGENTS, _AGENTS_OVER_PROCESSES, _REACHES = (5, 10, 20, 40), (5, 10, 20), (1, 2, 4, 8)
 _USUAL_REACH, _USUAL_AGENTS = 2, 20
-_TICKS, _TICKS_OVER_PROCESSES = 128, 200
+_TICKS, _TICKS_OVER_PROCESSES = 128, 150
 
 
 def ring(agents: int, reach: int, ticks: int) -> Plan:

@@ -35,7 +35,7 @@ def be_world(told: Mapping[str, Any], socket: zmq.Context) -> None:
     position = target[0] + np.where(leader, 0.0, told["spread"] * draws.start(agents))
     velocity = np.zeros((agents, 2))
     slots = [np.flatnonzero(dst == agent) for agent in range(agents)]
-    kept = {
+    kept: dict[str, Any] = {
         name: np.zeros((ticks, rows, *shape))
         for name, rows, shape in (
             ("position", agents, (2,)),

@@ -162,7 +162,7 @@ class Zenoh:
 
     def leave(self) -> None:
         """Close the session."""
-        self._session.close()
+        self._session.close()  # type: ignore[no-untyped-call]
 
     def _key(self, place: str) -> str:
         match place.split("/"):

@@ -22,8 +22,7 @@ from speed.started import PeerFailed
 from affinet.planning.plan import Plan
 from affinet.runtimes.launcher import Launcher
 
-_SWARMS = ("corridor", "hexa")
-_TICKS, _FLOOR_TICKS, _CHECKED = 400, 400, 40
+_TICKS, _CHECKED = 250, 40
 _PEER_BY_HAND = "ZeroMQ and filterpy by hand"
 _GROUP = "not installed: uv sync --inexact --group bench"
 
@@ -52,13 +51,9 @@ def fly(plan: Plan) -> Flown:
     return Flown(flight.wall_s / plan.world.ticks, flight.start_s, memory)
 
 
-def measure(rounds: int, share: float) -> list[Row]:
-    """Costs of a tick of 7 and of 10 agents, of the start, of memory, and of recording."""
-    return [row for scenario in _SWARMS for row in _of(scenario, rounds, share)]
-
-
-def _of(scenario: str, rounds: int, share: float) -> list[Row]:
-    ticks, floor_ticks = (max(5, round(many * share)) for many in (_TICKS, _FLOOR_TICKS))
+def measure(scenario: str, rounds: int, share: float) -> list[Row]:
+    """Costs of a tick of a scenario, of its start, of memory, and of recording."""
+    ticks = max(5, round(_TICKS * share))
     fused = planned(scenario, ticks, "agents.estimator='ga-rkf'")
     filtered = planned(scenario, ticks)
     bare = planned(scenario, ticks, "record.enabled=false")
@@ -71,7 +66,7 @@ def _of(scenario: str, rounds: int, share: float) -> list[Row]:
     for _ in range(rounds):
         for transport in [one for one in transports if one not in absent]:
             try:
-                costs[transport].append(floors.tick(transport, fused, floor_ticks))
+                costs[transport].append(floors.tick(transport, fused, ticks))
             except PeerFailed as failure:
                 absent[transport] = str(failure)
         costs["GA-RKF"].append(fly(fused).tick_s)

@@ -39,8 +39,8 @@ class Row:
 def compared(name: str, ours: Sequence[float], theirs: Sequence[float], unit: Literal["s", "MB"] = "s") -> Row:
     """The ratio of two costs that were measured in the same rounds."""
     show = seconds if unit == "s" else megabytes
-    both = [show(over_rounds(costs).median) for costs in (ours, theirs)]
-    return Row(name, *both, "ratio", ratio(ours, theirs))
+    own, other = (show(over_rounds(costs).median) for costs in (ours, theirs))
+    return Row(name, own, other, "ratio", ratio(ours, theirs))
 
 
 def missing(name: str, why: str) -> Row:

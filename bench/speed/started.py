@@ -61,7 +61,7 @@ class Process:
     def kill(self) -> None:
         """Whatever it does."""
         self._process.kill()
-        self._process.wait()
+        self._process.communicate()
 
 
 @contextmanager

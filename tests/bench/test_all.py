@@ -115,8 +115,12 @@ def test_a_peer_that_ends_before_its_time_is_said_in_its_row(monkeypatch):
     monkeypatch.setattr(floors, "tick", failed)
     monkeypatch.setattr(floors, "is_installed", lambda transport: transport != "ZeroMQ")
     monkeypatch.setattr(lockstep.importlib.util, "find_spec", lambda _: None)
-    rows = {row.name: row.ours for row in lockstep.measure(2, 0.02) if row.kind == "nothing"}
-    assert rows["tick of 7 agents: GA-RKF / pipes, nobody computes"] == "it does not start"
+    rows = {row.name: row.ours for row in lockstep.measure("corridor", 2, 0.02) if row.kind == "nothing"}
     absent = "not installed: uv sync --inexact --group bench"
-    assert rows["tick of 7 agents: GA-RKF / ZeroMQ, nobody computes"] == absent
-    assert rows["tick of 10 agents: RKF / ZeroMQ and filterpy by hand"] == absent
+    assert rows == {
+        "tick of 7 agents: GA-RKF / pipes, nobody computes": "it does not start",
+        "tick of 7 agents: GA-RKF / ZeroMQ, nobody computes": absent,
+        "tick of 7 agents: GA-RKF / Zenoh, nobody computes": "it does not start",
+        "tick of 7 agents: GA-RKF / Ray actors, nobody computes": "it does not start",
+        "tick of 7 agents: RKF / ZeroMQ and filterpy by hand": absent,
+    }

@@ -17,8 +17,8 @@ SMALLEST = {
     ),
     "leaders": (("--swarms", "swarm50"), "| swarm50 | 8 | 7.0 | "),
     "all": (
-        ("--only", "runs", "growth", "--rounds", "1", "--share", "0.03"),
-        "| run-step: affinet, 1 run / filterpy, an object an edge | ",
+        ("--only", "runs", "tick7", "growth", "--rounds", "1", "--share", "0.03"),
+        "| tick over processes, 5 to 20 agents of 4 neighbours | ",  # the last of them
     ),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }
