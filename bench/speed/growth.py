@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from speed.lockstep import fly
 from speed.measured import exponent, over_rounds
+from speed.problem import PATIENCE_S
 from speed.rows import Row, seconds
 
 from affinet.planning import making
@@ -36,7 +37,7 @@ def ring(agents: int, reach: int, ticks: int) -> Plan:
         f"edges = {[f'{i + 1}-{j + 1}' for i, j in sorted(edges)]}",
         "leaders = [1, 2, 3]",
         '[manoeuvre]\npreset = "hover"',
-        f"[time]\ndt = 0.01\nduration = {ticks / 100:g}",
+        f"[time]\ndt = 0.01\nduration = {ticks / 100:g}\npatience = {PATIENCE_S:g}",
         "[sensing]\nsigma = 0.1",
         '[agents]\nestimator = "rkf"\nlaw = "rest"',
         "[network]\navailability = 0.7",
