@@ -87,7 +87,7 @@ def loop(arguments, sizes, strides, unused):
     return known["loop"]
 
 
-_KINDS = {"d": "np.float64", "?": "np.bool_", "l": "np.int64", "L": "np.uint64"}
+_KINDS = {"d": "np.float64", "?": "np.bool_", "l": "np.int64", "L": "np.uint64", "B": "np.uint8"}
 
 
 def _bound(plain: Any) -> FunctionType:

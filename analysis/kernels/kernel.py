@@ -51,7 +51,8 @@ class Kernel:
         The core axes of arguments and results, as those of NumPy's generalised universal functions: "(n,D),(n)->(D,D)". It is
         compiled for each size of the axes in capitals, `sizes`.
     types
-        Their types, by NumPy's letters: "d" float64, "?" bool, "l" int64, "L" uint64; "d?->d".
+        Their types, by NumPy's letters: "d" float64, "?" bool, "l" int64, "L" uint64, "B" uint8;
+        "d?->d".
     """
 
     def __init__(self, factory: Factory, layout: str, types: str) -> None:

@@ -32,6 +32,8 @@ def drawn(one, dimension, rng):
             given.append(rng.random(shape) < 0.7)
         elif letter == "l":
             given.append(rng.integers(0, 2, size=shape))
+        elif letter == "B":
+            given.append(rng.choice([0, 1, 2, 14, 255], size=shape).astype(np.uint8))
         else:
             given.append(rng.integers(0, 2**32, size=shape, dtype=np.uint64))
     return given

@@ -28,7 +28,7 @@ EXEMPT = {
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
         netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
-        netem.medium.verdict.stronger netem.medium.picking.picked
+        netem.medium.verdict.stronger netem.medium.verdict.also_held netem.medium.picking.picked
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
         netem.medium.medium.Medium.offered netem.medium.relay.Relayed.arriving
         netem.medium.relay.Relayed.awake netem.medium.relay.Relayed.seen netem.medium.relay.changed_on_the_way
