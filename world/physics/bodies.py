@@ -97,7 +97,8 @@ class Integrators:
         """Each derivative is carried by those above it, up to the input, which is held."""
         if self.order == 1:
             return Motion(carried([at.position, flown + push], dt), flown[:, None], at.pose)
-        return Motion(*_integrated(at.position, at.derivatives, flown, push, dt), at.pose)
+        position, derivatives = _integrated(at.position, at.derivatives, flown, push, dt)
+        return Motion(position, derivatives, at.pose)
 
 
 @kernel("(D),(k,D),(D),(p),()->(D),(k,D)", "ddddd->dd")
