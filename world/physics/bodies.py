@@ -96,7 +96,7 @@ class Integrators:
     def moved(self, at: Motion, flown: Array, push: Array, dt: float) -> Motion:
         """Each derivative is carried by those above it, up to the input, which is held."""
         if self.order == 1:
-            return Motion(carried([at.position, flown + push], dt), flown[:, None], at.pose)
+            return Motion(at.position + dt * (flown + push), flown[:, None], at.pose)
         position, derivatives = _integrated(at.position, at.derivatives, flown, push, dt)
         return Motion(position, derivatives, at.pose)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,7 +70,7 @@ class Disturbance:
         """The square root of `between`, lower triangular, shape (n, n)."""
         return _root(self.between(nominal))
 
-    @property
+    @cached_property
     def still(self) -> bool:
         """Whether nothing is displaced."""
         return not self.covariance.any()
