@@ -42,6 +42,7 @@ EXEMPT = {
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
+
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
         world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
@@ -50,7 +51,8 @@ EXEMPT = {
     ONE_WORLD: """
         world.physics.detectors.Detectors.chosen world.physics.detectors.Detectors.found
         world.physics.target.MovingTarget.begin world.physics.target.MovingTarget.sighting
-        world.physics.target.MovingTarget.step world.physics.sensors.astray world.physics.world.World.begin
+        world.physics.target.MovingTarget.step world.physics.target.MovingTarget.drive
+        world.physics.sensors.astray world.physics.world.World.begin
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
         world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
         world.physics.world.World.odometry world.physics.world.World.step world.carrier.ZenohCarrier.carry world.flight.fly
