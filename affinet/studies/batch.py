@@ -147,9 +147,7 @@ def _of_all(tell: Callable[[float], None], number: int, parts: int) -> Callable[
     return lambda share: tell((number + share) / parts)
 
 
-def fly_together(
-    flights: Sequence[Flight], every: int, tell: Callable[[float], None] = lambda _: None
-) -> list[Runs]:
+def fly_together(flights: Sequence[Flight], every: int, tell: Callable[[float], None] = lambda _: None) -> list[Runs]:
     """The runs of several plans, all at once: those of each, bit for bit as it flies alone.
 
     Parameters
@@ -174,13 +172,11 @@ def _fly(flights: Sequence[Flight], firsts: Sequence[int], every: int, tell: Cal
     batch, plan, runs = together(flights), flights[0].plan, sum(len(flight.seeds) for flight in flights)
     size = plan.world.formation.agents
     swarm = InProcessSwarm(batch)
-    tracking: list[Array] = []
     kept: list[dict[str, Array]] = []
     psi: list[Array] = []
     limits: list[Bounds] = []
     first: list[dict[str, Array]] = []
-    peak = np.zeros(runs)
-    paths = _Paths()
+    flown = _Flown(runs)
     places = _Places(plan, runs)
 
     def of_runs(array: Any) -> Any:
@@ -191,27 +187,22 @@ def _fly(flights: Sequence[Flight], firsts: Sequence[int], every: int, tell: Cal
 
     with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
         for instant in swarm.ticks():
-            flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
-            target = of_runs(batch.world.goal(instant.tick, instant.scene))
-            lost = (present & ~np.isfinite(flown).all(axis=-1)).any(axis=-1)
-            tracking.append(np.where(lost, np.inf, errors.tracking_error(flown, target, present)))
+            present = of_runs(~swarm.timeline.at(instant.tick).absent)
+            goal = batch.world.goal(instant.tick, instant.scene)
+            flown.step(*map(of_runs, (instant.scene.position, goal, instant.input)), present)
             places.measure(instant, plan.timeline)
-            paths.step(flown, present)
-            peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
                 looked_at = _looked_at(batch, present, moment)
                 awake = of_runs(~swarm.timeline.at(instant.tick).idle)
                 pursued = _pursued(batch, awake, moment, of_runs)
-                moved = {"peak": peak, "roughness": paths.roughness()}
-                kept.append({**moved, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
+                kept.append({**flown.since(), **looked_at, **pursued, **_reported(moment, awake, of_runs)})
                 psi.append(of_runs(moment.psi))
                 limits.append(_bounds(plan, present, of_links(moment.entry.verdicts)))
                 first.append(_shown(plan, moment, firsts, of_runs))
                 places.keep(moment)
-                peak = np.zeros(runs)
             tell((instant.tick + 1) / plan.world.ticks)
-        error = np.stack(tracking, axis=1)
+        error = np.stack(flown.errors, axis=1)
         mean_error = error.mean(axis=1)
         seconds = np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt
         over_moments = {name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]}
@@ -243,23 +234,27 @@ def _bounds(plan: Plan, present: Mask, verdicts: VerdictCodes) -> Bounds:
     return bounds(world.formation.nominal, heard, world.sensor.common, seen, present)
 
 
-class _Paths:
-    """How rough the paths of many runs are."""
+class _Flown:
+    """How many runs fly, tick by tick."""
 
-    def __init__(self) -> None:
-        self._recent: list[Array] = []
-        self._squares: list[Array] = []
+    def __init__(self, runs: int) -> None:
+        self.errors: list[Array] = []
+        self._path: tuple[Array, ...] = ()
+        self._ticks, self._change, self._peak = 0, np.zeros(runs), np.zeros(runs)
 
-    def step(self, position: Array, present: Mask) -> None:
-        """Take in where agents are in a tick, shape (R, N, D), and who takes part, (R, N)."""
-        self._recent = [*(self._recent[-2:] or [position, position]), position]
-        self._squares.append(errors.change_of_step(np.stack(self._recent, axis=1), present) ** 2)
+    def step(self, position: Array, target: Array, steered: Array, present: Mask) -> None:
+        """Take in a tick: where agents are and should be, and what they fly, shape (R, N, D); who takes part, (R, N)."""
+        self._path = (*(self._path[-2:] or (position, position)), position)
+        tick = errors.tick_flown(self._path, target, steered, present)
+        self.errors.append(tick.error)
+        self._ticks, self._change = self._ticks + 1, self._change + tick.change
+        self._peak = np.maximum(self._peak, tick.longest)
 
-    def roughness(self) -> Array:
-        """Since this was asked last, shape (R,), in metres."""
-        found: Array = np.sqrt(np.mean(self._squares, axis=0))
-        self._squares = []
-        return found
+    def since(self) -> dict[str, Array]:
+        """The longest input, and how rough the paths are, since this was asked last, shape (R,)."""
+        said = {"peak": self._peak, "roughness": np.sqrt(self._change / self._ticks)}
+        self._ticks, self._change, self._peak = 0, np.zeros_like(self._change), np.zeros_like(self._peak)
+        return said
 
 
 class _Places:
