@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.kernels.kernel import Plain, kernel
+from analysis.kernels.kernel import Part, Plain, kernel
 from analysis.models.arrays import Array, Integers
 
 
@@ -44,14 +44,19 @@ class Manoeuvre:
         return gained / dt
 
 
+@Part
+def placed(theta: Array, offset: Array, tick: int, nominal: Array, axis: int) -> float:
+    """A coordinate of the target in a tick of an agent at a nominal position (D,) (paper 000, eq. 3)."""
+    reached, turned = min(max(tick, 0), len(theta) - 1), 0.0
+    for j in range(len(nominal)):
+        turned += theta[reached, axis, j] * nominal[j]
+    return float(turned + offset[reached, axis])
+
+
 @kernel("(t,D,D),(t,D),(),(D)->(D)", "ddld->d")
 def _targets(D: int) -> Plain:
     def plain(theta: Array, offset: Array, tick: int, nominal: Array, target: Array) -> None:
-        reached = min(max(tick, 0), len(theta) - 1)
         for i in range(D):
-            placed = 0.0
-            for j in range(D):
-                placed += theta[reached, i, j] * nominal[j]
-            target[i] = placed + offset[reached, i]
+            target[i] = placed(theta, offset, tick, nominal, i)
 
     return plain
