@@ -45,25 +45,26 @@ class Manoeuvre:
 
 
 @Part
-def _target_of(theta: Array, offset: Array, tick: int, nominal: Array, axis: int) -> float:
-    reached = min(max(tick, 0), len(theta) - 1)
-    placed = 0.0
+def placed(theta: Array, offset: Array, tick: int, nominal: Array, axis: int) -> float:
+    """A coordinate of the target in a tick of an agent at a nominal position (D,) (paper 000, eq. 3)."""
+    reached, turned = min(max(tick, 0), len(theta) - 1), 0.0
     for other in range(len(nominal)):
-        placed += theta[reached, axis, other] * nominal[other]
-    return placed + offset[reached, axis]
+        turned += theta[reached, axis, other] * nominal[other]
+    return float(turned + offset[reached, axis])
 
 
 @Part
-def _velocity_of(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, axis: int) -> float:
-    here = _target_of(theta, offset, tick, nominal, axis)
-    return (_target_of(theta, offset, tick + 1, nominal, axis) - here) / dt
+def travelling(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, axis: int) -> float:
+    """A coordinate of its mean velocity from this tick to the next, in metres per second."""
+    here = placed(theta, offset, tick, nominal, axis)
+    return (placed(theta, offset, tick + 1, nominal, axis) - here) / dt
 
 
 @kernel("(t,D,D),(t,D),(),(D)->(D)", "ddld->d")
 def _targets(D: int) -> Plain:
     def plain(theta: Array, offset: Array, tick: int, nominal: Array, target: Array) -> None:
         for axis in range(D):
-            target[axis] = _target_of(theta, offset, tick, nominal, axis)
+            target[axis] = placed(theta, offset, tick, nominal, axis)
 
     return plain
 
@@ -72,7 +73,7 @@ def _targets(D: int) -> Plain:
 def _velocities(D: int) -> Plain:
     def plain(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, velocity: Array) -> None:
         for axis in range(D):
-            velocity[axis] = _velocity_of(theta, offset, tick, nominal, dt, axis)
+            velocity[axis] = travelling(theta, offset, tick, nominal, dt, axis)
 
     return plain
 
@@ -81,7 +82,7 @@ def _velocities(D: int) -> Plain:
 def _accelerations(D: int) -> Plain:
     def plain(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, acceleration: Array) -> None:
         for axis in range(D):
-            before = _velocity_of(theta, offset, tick - 1, nominal, dt, axis)
-            acceleration[axis] = (_velocity_of(theta, offset, tick, nominal, dt, axis) - before) / dt
+            before = travelling(theta, offset, tick - 1, nominal, dt, axis)
+            acceleration[axis] = (travelling(theta, offset, tick, nominal, dt, axis) - before) / dt
 
     return plain

@@ -103,7 +103,8 @@ EXEMPT = {
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PART: """
-        agents.algebra.geometry.disagreement agents.algebra.geometry.spans analysis.models.small.invert netem.core.draws.unit
+        agents.algebra.geometry.disagreement agents.algebra.geometry.spans agents.algebra.kalman.move
+        agents.algebra.kalman.observe analysis.models.affine.placed analysis.models.small.invert netem.core.draws.unit
     """,
     PROTOCOL: """
         agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
