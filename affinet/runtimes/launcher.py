@@ -22,6 +22,8 @@ from affinet.runtimes.told import Event
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief, forms_of
 from analysis.metrics.errors import tracking_error
+from netem.faults.fault import Fault, Verb
+from netem.faults.timeline import Timeline
 from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
@@ -269,6 +271,8 @@ class Launcher:
 def _prepare_kernels(world: World) -> None:
     """Call what the world and the medium call: planning has called what agents do, and the nursery loads what was called."""
     first = world.begin()
+    paused = Timeline(world.links, [Fault(Verb.PAUSE, 0, 1, agents=(1,))]).at(0)
+    world.step(0, first, world.measure(0, first, paused), world.flown(first, first.velocity, paused), paused)
     tracking_error(first.position, world.goal(0, first), np.ones(len(first.position), dtype=bool))
 
 

@@ -13,6 +13,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from analysis.kernels.kernel import Part, Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import exp, log, power, whole_power
 
@@ -103,9 +104,30 @@ class MessageDelay:
         return 1.0 + float(np.sqrt(1.0 + whole_power(self.mean / self.jitter, 2)))
 
 
+@Part
+def whole_ticks(seconds: float, dt: float) -> int:
+    """Whole ticks until the first exchange at or after a delay, which is not negative."""
+    ahead = seconds / dt - _SLACK
+    if ahead <= 0.0:
+        return 0
+    if not ahead < _NEVER:
+        return int(_NEVER)
+    whole = int(ahead)
+    return whole + 1 if whole < ahead else whole
+
+
 def ticks(seconds: Array, dt: float) -> Integers:
-    """Whole ticks until the first exchange at or after the delay."""
-    return np.ceil(np.minimum(seconds / dt - _SLACK, _NEVER)).astype(np.int64)
+    """Whole ticks until the first exchange at or after each delay."""
+    whole: Integers = _ticks(seconds, dt)
+    return whole
+
+
+@kernel("(),()->()", "dd->l")
+def _ticks() -> Plain:
+    def plain(seconds: float, dt: float, whole: Integers) -> None:
+        whole[0] = whole_ticks(seconds, dt)
+
+    return plain
 
 
 def correlated(before: Array, fresh: Array, correlation: float) -> Array:
