@@ -84,7 +84,7 @@ class LinkModel:
         self._bits = np.where(self._sensing, 0.0, profile.message_bits)
         self._sender, self._receiver = links.src - 1, links.dst - 1
         self._spatial = profile.spatial
-        self._listed_link, self._listed_number, sensing, comms = profile.listed.T
+        self._listed_link, self._listed_number, sensing, comms = profile.listed.reshape(-1, 4).T
         self._listed_on = np.where(self._measured, sensing, comms).astype(bool)
         self._corrupts, self._doubles = bool(profile.corrupt.any()), bool(profile.duplicate.any())
         self._unmarked, self._single = np.zeros(self._shape, dtype=np.uint8), np.full(self._shape, -1)
