@@ -269,7 +269,7 @@ class Launcher:
 
 
 def _prepare_kernels(world: World) -> None:
-    """Call what the world and the medium call: planning has called what agents do, and the nursery loads what was called."""
+    """Call what the world calls: planning has called what agents do, and the nursery loads what was called."""
     first = world.begin()
     paused = Timeline(world.links, [Fault(Verb.PAUSE, 0, 1, agents=(1,))]).at(0)
     world.step(0, first, world.measure(0, first, paused), world.flown(first, first.velocity, paused), paused)

@@ -184,10 +184,7 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
 
 @Part
 def observe(mean: Array, P: Array, observed: Array, R: Array, corrected: Array, left: Array, room: Array) -> float:
-    """One filter after an observation of its position, into `corrected` and `left`; its innovation squared and normalised.
-
-    `room` has shape (4 D, D).
-    """
+    """One filter observed, into `corrected` and `left`; its innovation squared and normalised. `room` is (4 D, D)."""
     S, D = len(mean), len(observed)
     doubt, precision, pull, gain = room[:D], room[D : 2 * D], room[2 * D : 3 * D], room[3 * D :]
     for i in range(D):

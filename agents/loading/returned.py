@@ -122,10 +122,7 @@ def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
 
 
 def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapping[str, Shape] | None) -> Estimate:
-    """An estimate of n slots in D dimensions, if it is one, and its reports have the shapes (..., *) that are known of them.
-
-    Nobody can write to it from now on.
-    """
+    """An estimate of n slots, if it is one and its reports have the shapes known of them; nobody writes to it from now on."""
     if not isinstance(given, Estimate):
         raise WrongReturn(f"must return an Estimate, got {kind(given)}")
     edges = (slots, dimension)

@@ -13,7 +13,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from analysis.kernels.kernel import Part, Plain, kernel
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import exp, log, power, whole_power
 
@@ -104,28 +104,25 @@ class MessageDelay:
         return 1.0 + float(np.sqrt(1.0 + whole_power(self.mean / self.jitter, 2)))
 
 
-@Part
-def whole_ticks(seconds: float, dt: float) -> int:
-    """Whole ticks until the first exchange at or after a delay, which is not negative."""
-    ahead = seconds / dt - _SLACK
-    if ahead <= 0.0:
-        return 0
-    if not ahead < _NEVER:
-        return int(_NEVER)
-    whole = int(ahead)
-    return whole + 1 if whole < ahead else whole
-
-
-def ticks(seconds: Array, dt: float) -> Integers:
-    """Whole ticks until the first exchange at or after each delay."""
-    whole: Integers = _ticks(seconds, dt)
+def ticks(seconds: Array, dt: float, least: int = 0) -> Integers:
+    """Whole ticks until the first exchange at or after each delay, and no less than the least."""
+    whole: Integers = _ticks(seconds, dt, least)
     return whole
 
 
-@kernel("(),()->()", "dd->l")
+@kernel("(),(),()->()", "ddl->l")
 def _ticks() -> Plain:
-    def plain(seconds: float, dt: float, whole: Integers) -> None:
-        whole[0] = whole_ticks(seconds, dt)
+    def plain(seconds: float, dt: float, least: int, whole: Integers) -> None:
+        ahead = seconds / dt - _SLACK
+        if ahead <= 0.0:
+            whole[0] = 0
+        elif not ahead < _NEVER:
+            whole[0] = int(_NEVER)
+        else:
+            whole[0] = int(ahead)
+            if whole[0] < ahead:
+                whole[0] += 1
+        whole[0] = max(whole[0], least)
 
     return plain
 

@@ -164,7 +164,7 @@ class ImpairmentsByTick:
     def _ticks(self, seconds: Array) -> Integers:
         if seconds is self._still.delay_s:
             return self._still.delay_ticks
-        return np.maximum(delay.ticks(seconds, self._profile.dt), self._profile.least_delay)
+        return delay.ticks(seconds, self._profile.dt, self._profile.least_delay)
 
     def _swelling(self, n: int, correlation: float, draw: Array) -> Array:
         """Uniform numbers again, but each like the one before it."""

@@ -17,8 +17,8 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels as channel_names
 from netem.core.draws import Purpose, Seed, uniform
 from netem.core.links import Links
+from netem.impairments import delay
 from netem.impairments.corrupt import Mark, Marks
-from netem.impairments.delay import whole_ticks
 from netem.impairments.profile import Profile
 from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
@@ -84,7 +84,7 @@ class LinkModel:
         self._bits = np.where(self._sensing, 0.0, profile.message_bits)
         self._sender, self._receiver = links.src - 1, links.dst - 1
         self._spatial = profile.spatial
-        self._listed_link, self._listed_number, sensing, comms = profile.listed.T
+        self._listed_link, self._listed_number, sensing, comms = profile.listed.reshape(-1, 4).T
         self._listed_on = np.where(self._measured, sensing, comms).astype(bool)
         self._corrupts, self._doubles = bool(profile.corrupt.any()), bool(profile.duplicate.any())
         self._unmarked, self._single = np.zeros(self._shape, dtype=np.uint8), np.full(self._shape, -1)
@@ -202,7 +202,7 @@ class LinkModel:
         """Ticks that messages wait in the air if they are no measurements, shape (C, L) or (1, L)."""
         wait = impairments.delay_ticks
         if extra_s is not None:
-            wait = _at_least(impairments.delay_s + extra_s, self.profile.dt, self.profile.least_delay)
+            wait = delay.ticks(impairments.delay_s + extra_s, self.profile.dt, self.profile.least_delay)
         if self.keeps_order:
             wait = np.where(self._ordered, np.maximum(wait, state.last_due - tick), wait)
         return wait
@@ -211,7 +211,7 @@ class LinkModel:
         self, tick: int, impairments: TickImpairments, kind: VerdictCodes, due: Integers, extra_s: Array | None
     ) -> Integers:
         seconds = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
-        wait = _at_least(seconds, self.profile.dt, self.profile.least_delay)
+        wait = delay.ticks(seconds, self.profile.dt, self.profile.least_delay)
         copy_due: Integers = _copied(tick, self._measured, kind, impairments.copied, wait, due, self._ordered)
         return copy_due
 
@@ -244,14 +244,6 @@ def _decided() -> Plain:
 def _marked() -> Plain:
     def plain(measured: bool, verdict: int, mark: int, spoke: bool, marked: Marks) -> None:
         marked[0] = mark if passed(verdict) and not measured and (spoke or mark != _STALE) else 0
-
-    return plain
-
-
-@kernel("(),(),()->()", "ddl->l")
-def _at_least() -> Plain:
-    def plain(seconds: float, dt: float, least: int, wait: Integers) -> None:
-        wait[0] = max(whole_ticks(seconds, dt), least)
 
     return plain
 

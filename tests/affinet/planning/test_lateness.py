@@ -78,7 +78,7 @@ def latest(plan, monkeypatch):
 
     def listening(self, *told):
         heard = hear(self, *told)
-        ages.append(int(np.max(np.where(heard.fresh, heard.age, 0))))
+        ages.extend(int(np.max(np.where(one.fresh, one.age, 0))) for one in heard.values())
         return heard
 
     monkeypatch.setattr(ArrayCarrier, "_hear", listening)

@@ -691,22 +691,25 @@ def test_an_error_survives_the_way_from_a_worker(folder):
     assert str(caught.value).startswith(f"case {{}}: {name}:Own.fuse in tick 7: ")
 
 
-def test_a_study_names_the_case(folder, capsys):
-    name = write(folder, broken(ESTIMATOR, (SENSED, f"{SENSED} @ np.eye(3)")))
-    (folder / "mine.toml").write_text(f"""
+MINE = """
 title = "mine"
 source = "me"
 figure = "curves"
 scenario = "corridor"
-full = {{ runs = 1 }}
-quick = {{ runs = 1 }}
+full = { runs = 1 }
+quick = { runs = 1 }
 [[axes]]
 name = "column"
-values = {{ here = [] }}
+values = { here = [] }
 [[axes]]
 name = "row"
-values = {{ here = [] }}
-[[axes]]
+values = { here = [] }
+"""
+
+
+def test_a_study_names_the_case(folder, capsys):
+    name = write(folder, broken(ESTIMATOR, (SENSED, f"{SENSED} @ np.eye(3)")))
+    (folder / "mine.toml").write_text(f"""{MINE}[[axes]]
 name = "estimator"
 values = {{ none = ["agents.estimator=none"], own = ["agents.estimator={name}:Own"] }}
 """)
@@ -718,23 +721,11 @@ values = {{ none = ["agents.estimator=none"], own = ["agents.estimator={name}:Ow
     )
 
 
-TWO_CASES = """
-title = "mine"
-source = "me"
-figure = "curves"
-scenario = "corridor"
-set = ["agents.estimator={}:Own", "agents.law=rest", "time.dt=0.05", "time.duration=0.5"]
-full = {{ runs = 1 }}
-quick = {{ runs = 1 }}
-[[axes]]
-name = "column"
-values = {{ here = [] }}
-[[axes]]
-name = "row"
-values = {{ here = [] }}
+SET = 'set = ["agents.estimator={}:Own", "agents.law=rest", "time.dt=0.05", "time.duration=0.5"]'
+SHARES = """
 [[axes]]
 name = "share"
-values = {{ all = ["network.availability=1.0"], half = ["network.availability=0.5"] }}
+values = { all = ["network.availability=1.0"], half = ["network.availability=0.5"] }
 """
 
 
@@ -750,7 +741,7 @@ def test_of_cases_that_fly_together_the_one_is_named_whose_code_fails(fails, nam
     monkeypatch.setattr(study, "processors", lambda: 1)  # both are one batch
     monkeypatch.setattr(study, "in_processes", lambda work, given, _: (work(one) for one in given))
     name = write(folder, broken(ESTIMATOR, (SENSED, f"1 / 0 if {fails} else {SENSED}")))
-    (folder / "mine.toml").write_text(TWO_CASES.format(name))
+    (folder / "mine.toml").write_text(SET.format(name) + MINE + SHARES)
     assert main(["study", "mine.toml"]) == 3
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith(f"{named}: {name}:Own.sense in tick 0: ZeroDivisionError: division by zero")
