@@ -12,7 +12,7 @@ import numpy as np
 from agents import checkpoint
 from agents.agent import Agent, AgentState
 from agents.brief import Brief
-from agents.exchange import Heard
+from agents.exchange import Channels, Heard
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Sighting
 from netem.core import channels
@@ -21,6 +21,7 @@ from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
+from netem.wire.arrays import TRUTH, Form, WireError, channel_rows, numbers, packed
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
@@ -61,10 +62,6 @@ class AgentBrief:
     remembers: bool
 
 
-# Which data types that came will do for one that is wanted.
-_KINDS = {"f": "iuf", "i": "i", "u": "iu", "b": "b"}
-
-
 class AgentNode:
     """One agent on the network."""
 
@@ -95,9 +92,13 @@ class AgentNode:
         keys = Keys(brief.run)
         self._inbox = session.hears(keys.inbox(self._number), 64)
         self._channels = self._agent.channels()
-        self._silence = {
-            channel: {name: np.zeros(field.shape, dtype=field.dtype).tolist() for name, field in fields.items()}
-            for channel, fields in self._channels.items()
+        self._forms = forms_of(self._channels)
+        self._said_by = {
+            name: [
+                f"agent {neighbour} on {name!r}"
+                for neighbour in (*brief.neighbours, *[0] * (self._width - len(brief.neighbours)))
+            ]
+            for name in self._channels
         }
         spoken = sorted([channels.MEASUREMENT, *self._channels])
         self._broadcasts = {name: session.says(keys.broadcast(self._number, name)) for name in spoken}
@@ -136,25 +137,30 @@ class AgentNode:
         seen = np.zeros(self._width, dtype=bool)
         if inbox.neighbours:
             slots = [self._slot[number] for number in inbox.neighbours]
-            measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, inbox.k, measured, seen, inbox.motion)
+            measured[slots] = numbers(inbox.measured, "SenseInbox: measured", (len(slots), self._dimension))
+            seen[slots] = True
+        self._state, said = self._agent.sense(self._state, inbox.k, measured, seen, self._motion(inbox))
         observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
-        for name, fields in {channels.MEASUREMENT: observed, **said}.items():
-            self._broadcasts[name].say(
-                messages.pack(
-                    messages.Broadcast(
-                        k=inbox.k, src=self._number, channel=name, seq=self._numbers.next(name), payload=dict(fields)
-                    )
-                )
-            )
+        for channel, fields in said.items():
+            forms = self._forms[channel]
+            self._say(inbox.k, channel, {name: packed(fields[name], form.dtype) for name, form in forms.items()})
+        self._say(inbox.k, channels.MEASUREMENT, observed)
+
+    def _say(self, tick: int, channel: str, payload: dict[str, Any]) -> None:
+        seq = self._numbers.next(channel)
+        said = messages.Broadcast(k=tick, src=self._number, channel=channel, seq=seq, payload=payload)
+        self._broadcasts[channel].say(messages.pack(said))
+
+    def _motion(self, sensed: messages.SenseInbox) -> Array | None:
+        if sensed.motion is None:
+            return None
+        return numbers(sensed.motion, "SenseInbox: motion", (-1, self._dimension))
 
     def _exchange(self, inbox: messages.ExchangeInbox, sensed: messages.SenseInbox) -> None:
         self._heard += len(inbox.messages)
         heard = {**self._gather(inbox.k, inbox.messages), **self._from_the_centre(inbox.k)}
-        sighting = _sighting(sensed.sighting)
-        self._state, action = self._agent.act(
-            self._state, sensed.clock, heard, sensed.position, sensed.motion, sighting
-        )
+        position, motion, sighting = self._position(sensed), self._motion(sensed), self._sighting(sensed)
+        self._state, action = self._agent.act(self._state, sensed.clock, heard, position, motion, sighting)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
         estimate, degree = action.estimate, len(self._neighbours)
@@ -162,13 +168,13 @@ class AgentNode:
             k=inbox.k,
             src=self._number,
             seq=self._numbers.next("act"),
-            input=action.input,
-            estimate=estimate.relative[:degree],
-            known=estimate.known[:degree],
-            covariance=estimate.spread[:degree],
+            input=packed(action.input),
+            estimate=packed(estimate.relative[:degree]),
+            known=packed(estimate.known[:degree], TRUTH),
+            covariance=packed(estimate.spread[:degree]),
             psi=float(estimate.psi),
             feasible=None if estimate.feasible is None else bool(estimate.feasible),
-            reports=dict(estimate.reports),
+            reports={name: packed(said) for name, said in estimate.reports.items()},
             heard=self._heard,
         )
         self._act.say(messages.pack(act))
@@ -181,45 +187,48 @@ class AgentNode:
         self._supervisor.works(tick)
         self._tellings.check("told", told.seq)
         if told.k != tick:
-            raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
-        fields = {"relative": told.relative, "covariance": told.covariance, "nis": told.nis}
+            raise WireError(f"the centre told of tick {told.k} in tick {tick}")
+        edges = (self._width, self._dimension)
+        shapes = {"relative": edges, "covariance": (*edges, self._dimension), "nis": edges[:1]}
+        fields = {
+            name: numbers(getattr(told, name), f"the centre: Told: {name}", shape) for name, shape in shapes.items()
+        }
         return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
 
     def _gather(self, tick: int, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
         # Messages come sorted by tick, so what stands in a slot in the end is the newest.
-        said: dict[str, dict[int, messages.Broadcast]] = {name: {} for name in self._channels}
+        said: dict[str, list[messages.Broadcast | None]] = {name: [None] * self._width for name in self._channels}
         for message in arrived:
             if message.channel in said:
                 said[message.channel][self._slot[message.src]] = message
-        return {name: self._heard_on(tick, name, said[name]) for name in self._channels}
+        return {name: self._heard_on(tick, name, newest) for name, newest in said.items()}
 
-    def _heard_on(self, tick: int, channel: str, said: dict[int, messages.Broadcast]) -> Heard:
-        payloads = {slot: message.payload for slot, message in said.items()}
-        fields = {name: self._rows(channel, name, payloads) for name in self._channels[channel]}
-        age = np.zeros(self._width, dtype=np.int64)
-        for slot, message in said.items():
-            age[slot] = tick - message.k
-        return Heard(fields, np.array([slot in said for slot in range(self._width)]), age)
+    def _heard_on(self, tick: int, channel: str, said: list[messages.Broadcast | None]) -> Heard:
+        payloads = [None if message is None else message.payload for message in said]
+        return Heard(
+            channel_rows(self._forms[channel], payloads, self._said_by[channel]),
+            fresh=np.array([message is not None for message in said], dtype=bool),
+            age=np.array([0 if message is None else tick - message.k for message in said], dtype=np.int64),
+        )
 
-    def _rows(self, channel: str, name: str, said: dict[int, Any]) -> Array:
-        field, silence = self._channels[channel][name], self._silence[channel][name]
-        kinds = _KINDS[np.dtype(field.dtype).kind]
-        try:
-            rows = np.array([said[slot][name] if slot in said else silence for slot in range(self._width)])
-        except (KeyError, TypeError, ValueError, OverflowError):
-            rows = np.array(None)
-        if rows.shape != (self._width, *field.shape) or rows.dtype.kind not in kinds:
-            rows = np.zeros((self._width, *field.shape))
-            for slot, payload in said.items():  # one of them is wrong: which
-                whose = f"agent {self._neighbours[slot]} on {channel!r}: {name!r}"
-                rows[slot] = messages.numbers(payload.get(name), whose, field.shape, kinds)
-        return rows.astype(field.dtype, copy=False)
+    def _position(self, sensed: messages.SenseInbox) -> Array | None:
+        if sensed.position is None:
+            return None
+        return numbers(sensed.position, "SenseInbox: position", (self._dimension,))
+
+    def _sighting(self, sensed: messages.SenseInbox) -> Sighting | None:
+        if (said := sensed.sighting) is None:
+            return None
+        position = numbers(said.position, "SenseInbox: sighting", (self._dimension,))
+        return Sighting(position, np.array(said.done), np.array(said.by), np.array(said.method))
 
 
-def _sighting(said: messages.Sighted | None) -> Sighting | None:
-    if said is None:
-        return None
-    return Sighting(said.position, np.array(said.done), np.array(said.by), np.array(said.method))
+def forms_of(spoken: Channels) -> dict[str, dict[str, Form]]:
+    """What the fields of each channel hold, as the network is told."""
+    return {
+        channel: {name: Form(field.shape, np.dtype(field.dtype).kind == "b") for name, field in fields.items()}
+        for channel, fields in spoken.items()
+    }
 
 
 def main() -> NoReturn:

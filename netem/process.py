@@ -7,10 +7,10 @@ changes it.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -28,7 +28,8 @@ from netem.medium.medium import Medium, recorded
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
-from netem.wire.broadcasts import Broadcasts, fields
+from netem.wire.arrays import CODE, WHOLE, Form, WireError, channel_rows, numbers, packed
+from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
@@ -56,6 +57,8 @@ class MediumBrief:
         Faults that an earlier run was given while it flew.
     recorded
         The journal of an earlier run that is to be judge of this one.
+    forms
+        What the fields of each channel hold that agents look into.
     positioned
         Agents that have positioning, shape (N,).
     journal, batch
@@ -73,13 +76,13 @@ class MediumBrief:
     triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
+    forms: Mapping[str, Mapping[str, Form]]
     positioned: Mask
     journal: str
     batch: int
 
 
-@dataclass(frozen=True)
-class Arriving:
+class Arriving(NamedTuple):
     """A broadcast on its way into an inbox: the tick it speaks of, who said it on which link and channel, how corrupted."""
 
     content: int
@@ -100,7 +103,7 @@ class Decided:
     awake
         Numbers of the agents that hear and speak.
     seen
-        For each agent, the rows of the links whose measurement reaches it.
+        The rows of links whose measurement arrives, and where those of each agent end among them, from 0 on.
     heard
         For each agent, the broadcasts that reach it, in order.
     entry, journal
@@ -109,7 +112,7 @@ class Decided:
 
     relayed: Relayed
     awake: tuple[int, ...]
-    seen: dict[int, list[int]]
+    seen: tuple[Integers, list[int]]
     heard: dict[int, list[Arriving]]
     entry: Entry
     journal: bytes
@@ -127,6 +130,7 @@ class MediumNode:
         self._awaited: set[tuple[int, str]] = set()
         self._links = brief.links
         self._src, self._dst = brief.links.src.tolist(), brief.links.dst.tolist()
+        self._ends = np.concatenate([[0], np.cumsum(brief.links.degree)])
         timeline = Timeline(brief.links, brief.faults, brief.triggers, brief.injected)
         path = None if brief.recorded is None else Path(brief.recorded)
         verdicts = recorded(path, brief.links, brief.channels)
@@ -160,7 +164,8 @@ class MediumNode:
             if sense.fired:
                 self._relay.fire(sense.fired, sense.k)
             if decided is None:
-                decided = self._decide(sense.k, sense.position)
+                where = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
+                decided = self._decide(sense.k, where)
             self._welcome_back(sense.k)
             self._hand_out_measurements(sense, decided)
             self._journal.say(decided.journal)
@@ -182,7 +187,13 @@ class MediumNode:
             src=HUB,
             seq=self._numbers.next("journal"),
             handed=[len(heard[agent]) for agent in self._inboxes],
-            **entry._asdict(),
+            verdicts=packed(entry.verdicts, CODE),
+            odd=packed(entry.odd, WHOLE),
+            apart=packed(entry.apart, WHOLE),
+            late=int(entry.late),
+            dropped=packed(entry.dropped, WHOLE),
+            released=packed(entry.released, WHOLE),
+            injected=entry.injected,
         )
         awake = tuple((np.flatnonzero(relayed.awake) + 1).tolist())
         return Decided(relayed, awake, self._seen(relayed.seen), heard, entry, messages.pack(journal))
@@ -192,16 +203,14 @@ class MediumNode:
             with question:
                 try:
                     order = messages.unpack(Order, question.data)
-                except messages.WireError as error:
+                except WireError as error:
                     question.refuse(str(error))
                     continue
                 question.answer(messages.pack(self._relay.obey(order, tick)))
 
-    def _seen(self, arrived: Mask) -> dict[int, list[int]]:
-        seen: dict[int, list[int]] = defaultdict(list)
-        for link in np.flatnonzero(arrived).tolist():
-            seen[self._dst[link]].append(link)
-        return seen
+    def _seen(self, arrived: Mask) -> tuple[Integers, list[int]]:
+        rows = np.flatnonzero(arrived)  # links toward one agent stand together
+        return rows, np.searchsorted(rows, self._ends).tolist()
 
     def _heard(self, arriving: Integers) -> dict[int, list[Arriving]]:
         heard: dict[int, list[Arriving]] = defaultdict(list)
@@ -216,17 +225,22 @@ class MediumNode:
 
     def _hand_out_measurements(self, sense: messages.Sense, decided: Decided) -> None:
         clock = self._relay.timeline.clock(sense.k).tolist()
+        rows, ends = decided.seen
+        measured = _parts(sense.measured, len(self._src))
+        whom = [(self._src[row], measured[row]) for row in rows.tolist()]
+        position = _parts(sense.position, len(self._inboxes))
+        motion = None if sense.motion is None else _parts(sense.motion, len(self._inboxes))
         for agent in decided.awake:
-            links = decided.seen[agent]
+            seen = whom[ends[agent - 1] : ends[agent]]
             inbox = messages.SenseInbox(
                 k=sense.k,
                 src=HUB,
                 seq=self._numbers.next(f"inbox {agent}"),
                 clock=clock[agent - 1],
-                neighbours=[self._src[link] for link in links],
-                measured=sense.measured[links],
-                position=sense.position[agent - 1] if self._brief.positioned[agent - 1] else None,
-                motion=None if sense.motion is None else sense.motion[agent - 1],
+                neighbours=[src for src, _ in seen],
+                measured=b"".join([y for _, y in seen]),
+                position=position[agent - 1] if self._brief.positioned[agent - 1] else None,
+                motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
             self._inboxes[agent].say(messages.pack(inbox))
@@ -235,12 +249,13 @@ class MediumNode:
         tick, said = decided.relayed.tick, Spoken()
         self._awaited = {(agent, name) for agent in decided.awake for name in self._spoken}
         self._supervisor.waits(tick, "what it broadcasts", self._silent)
+        somebody_lies = bool(decided.relayed.conditions.liars)
         while self._awaited:
             arrived = self._broadcasts.next()
             data = arrived.data
             broadcast = self._reader.read(arrived.key, data, tick, self._awaited)
             self._awaited.remove((broadcast.src, broadcast.channel))
-            said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data)
+            said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data) if somebody_lies else data
         self._relay.keep(tick, said)
         self._supervisor.works(tick)
 
@@ -256,7 +271,9 @@ class MediumNode:
     def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
         if not self._relay.lies(said.k, said.channel, said.src):
             return data
-        return _rewritten(said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields))
+        return self._rewritten(
+            said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields)
+        )
 
     def _as_it_arrives(self, arriving: Arriving) -> bytes:
         data = self._relay.said(arriving.content)[arriving.src, self._brief.channels[arriving.channel]]
@@ -265,7 +282,15 @@ class MediumNode:
         mark = np.array([arriving.mark], dtype=np.uint8)
         content, channel, link = (np.array([row]) for row in (arriving.content, arriving.channel, arriving.link))
         said = messages.unpack(messages.Broadcast, data)
-        return _rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))
+        return self._rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))
+
+    def _rewritten(self, said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
+        """A broadcast with its fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
+        if (forms := self._brief.forms.get(said.channel)) is None:  # nobody looks into it
+            return messages.pack(said)
+        changed = change(channel_rows(forms, [said.payload], [f"agent {said.src} on {said.channel!r}"]))
+        payload = {name: packed(changed[name], form.dtype) for name, form in forms.items()}
+        return messages.pack(replace(said, payload=payload))
 
     def _end(self, tick: int) -> None:
         for agent, inbox in self._inboxes.items():
@@ -273,10 +298,10 @@ class MediumNode:
             inbox.say(messages.pack(messages.EndInbox(k=tick, src=HUB, seq=number)))
 
 
-def _rewritten(said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
-    """A broadcast with its named fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
-    changed = change({name: field[None] for name, field in fields(said).items()})
-    return messages.pack(replace(said, payload={name: field[0] for name, field in changed.items()}))
+def _parts(data: bytes, count: int) -> list[bytes]:
+    """As many bytes for each."""
+    size = len(data) // count
+    return [data[start : start + size] for start in range(0, size * count, size)]
 
 
 def main() -> None:

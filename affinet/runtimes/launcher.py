@@ -20,7 +20,7 @@ from affinet.runtimes.interruption import Interrupted, Interruption
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.centre.process import CentreBrief
-from agents.process import AgentBrief
+from agents.process import AgentBrief, forms_of
 from analysis.metrics.errors import tracking_error
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
@@ -238,6 +238,7 @@ class Launcher:
             triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
+            forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
             journal=str(self._out / JOURNAL),
             batch=self._plan.books(self._viewer).batch,

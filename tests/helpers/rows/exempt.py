@@ -41,7 +41,7 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
-        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
+        world.acts.Acts.together world.carrier.ProcessesActed.input
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
         world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
