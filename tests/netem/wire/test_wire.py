@@ -15,7 +15,7 @@ from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief
+from agents.process import AgentBrief, HostBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
@@ -59,6 +59,7 @@ MESSAGES = [
         sightings=[SIGHTED] * 2,
         fired=[1],
     ),
+    messages.Roster(k=7, src="netem", seq=7, awake=[1, 3], restarted=[3], remembering=[]),
     messages.SenseInbox(
         k=7,
         src="netem",
@@ -432,6 +433,7 @@ MEDIUM = MediumBrief(
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
+    hosts={1: (1, 3)},
     journal="/tmp/run/journal.arrows",
     batch=50,
 )
@@ -467,6 +469,7 @@ def plain_of(brief):
     "brief",
     [
         *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, limit=None, checkpoint=None, remembers=False)),
+        HostBrief(2, (AGENT, replace(AGENT, agent=3))),
         *(MEDIUM, *MEDIUM.faults, *MEDIUM.triggers),
     ],
     ids=[
@@ -474,6 +477,7 @@ def plain_of(brief):
         "no mission",
         "agent",
         "no limit, no checkpoint",
+        "host",
         "medium",
         *(f.verb for f in MEDIUM.faults),
         "above",
