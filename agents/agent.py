@@ -16,6 +16,7 @@ from agents.exchange import Channels, Field, Fields, Heard
 from agents.laws.base import Law
 from agents.laws.leaders import hold_distances, pilot, pilot_of_accelerations, saturated
 from agents.loading import capabilities, returned
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array, Integers, Mask, chosen
 from analysis.models.pursuit import Sighting
@@ -109,10 +110,13 @@ class Agent:
             law = self.law.init(self.brief, batch)
             returned.fresh(law, batch)
         still, never = np.zeros((*batch, self.brief.dimension)), np.full(batch, -1, dtype=np.int64)
-        return AgentState(estimator, law, still, never, held=np.zeros(batch, dtype=bool))
+        fresh = AgentState(estimator, law, still, never, held=np.zeros(batch, dtype=bool))
+        protect(fresh)
+        return fresh
 
     def revived(self, state: AgentState) -> AgentState:
         """What it remembers when its process is new and goes on from this state: its body has held since."""
+        protect(state)
         return state._replace(held=np.ones_like(state.held))
 
     def sense(
@@ -129,40 +133,41 @@ class Agent:
         Parameters
         ----------
         state
-            What it remembers.
+            What it remembers, as a method of this returned it.
         tick
             Its number in the run, whatever clocks say.
         measured, seen
-            Relative positions, shape (..., n, D), in metres, and which there are, shape (..., n).
+            Relative positions, shape (..., n, D), in metres, and which there are, shape (..., n); nobody can write to them from
+            now on.
         motion
             Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
         """
         state = self._caught_up(state, tick, motion)
-        before = readonly(state.estimator)
+        protect((measured, seen))
+        batch = seen.shape[:-1]
         with Calling(self.estimator, "sense"):
-            told = self.estimator.sense(self.brief, before, readonly(measured), readonly(seen))
+            told = self.estimator.sense(self.brief, state.estimator, measured, seen)
             estimator, said = pair(told, "the state, and what to broadcast")
-            returned.state(before, estimator, seen.shape[:-1])
-            returned.said(self._spoken, said, seen.shape[:-1])
+            returned.state(state.estimator, estimator, batch)
+            returned.said(self._spoken, said, batch)
         moves = [*([] if motion is None else np.moveaxis(motion, -2, 0)), state.input]
         moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
-        return state._replace(estimator=estimator), {INPUT: moving, **said}
+        return AgentState(estimator, *state[1:]), {INPUT: moving, **said}
 
     def _caught_up(self, state: AgentState, tick: int, motion: Array | None) -> AgentState:
         """What it remembers, and knows of the ticks that it has missed."""
-        now = np.full_like(state.sensed, tick)
-        flying = np.where(state.held[..., None], 0.0, state.input)
-        missed = np.where(state.sensed < 0, 0, now - state.sensed - 1)
-        estimator = state.estimator
+        estimator, law, told, sensed, held = state
+        now, missed, flying, moved_on = _woken(sensed, held, told, tick)
         if self._counts_missed_ticks and missed.any():
             within = flying if motion is None else motion[..., 0, :]
-            before = np.where(state.held[..., None], state.input, within) if self.law.order == 1 else within
-            gap, given = Gap(missed, before, within), readonly(estimator)
+            before = np.where(held[..., None], told, within) if self.law.order == 1 else within
             with Calling(self.estimator, "missed"):
-                told = self.estimator.missed(self.brief, given, readonly(gap))
-                returned.state(given, told, missed.shape)
-            estimator = chosen(missed > 0, told, estimator)
-        return state._replace(estimator=estimator, input=flying, sensed=now, held=np.zeros_like(state.held))
+                lived = self.estimator.missed(self.brief, estimator, readonly(Gap(missed, before, within)))
+                returned.state(estimator, lived, missed.shape)
+            estimator = chosen(missed > 0, lived, estimator)
+            protect(estimator)
+        protect(flying)
+        return AgentState(estimator, law, flying, now, moved_on)
 
     @cached_property
     def _counts_missed_ticks(self) -> bool:
@@ -186,7 +191,7 @@ class Agent:
         tick
             What its clock says.
         heard
-            By channel.
+            By channel; nobody can write to it from now on.
         position
             Its own, shape (..., D), in metres, of leaders and of those whose law wants it.
         motion
@@ -196,7 +201,8 @@ class Agent:
         """
         brief = self.brief
         velocity, higher = (state.input, None) if motion is None else (motion[..., 0, :], motion[..., 1:, :])
-        own, heard = readonly(Own(velocity, state.input, tick, position, sighting, higher)), readonly(heard)
+        own = readonly(Own(velocity, state.input, tick, position, sighting, higher))
+        protect(heard)
         estimator, estimate = self._fused(state, heard, own)
         law, steered = self._commanded(state, own, estimate, heard[INPUT])
         if self.leaders == "distances":
@@ -207,23 +213,23 @@ class Agent:
             steered = np.where(brief.leader[..., None], led, steered)
         if self.limit is not None:
             steered = saturated(steered, self.limit)
-        return state._replace(estimator=estimator, law=law, input=steered), AgentAction(steered, estimate)
+        protect(steered)
+        return AgentState(estimator, law, steered, state.sensed, state.held), AgentAction(steered, estimate)
 
     def _fused(self, state: AgentState, heard: Mapping[str, Heard], own: Own) -> tuple[Any, Estimate]:
         batch, (slots, dimension) = state.input.shape[:-1], self.brief.relative.shape[-2:]
-        before = readonly(state.estimator)
         with Calling(self.estimator, "fuse"):
-            told = self.estimator.fuse(self.brief, before, heard, own)
+            told = self.estimator.fuse(self.brief, state.estimator, heard, own)
             estimator, estimate = pair(told, "the state, and an Estimate")
-            returned.state(before, estimator, batch)
+            returned.state(state.estimator, estimator, batch)
             return estimator, returned.estimate(estimate, slots, dimension, batch, self.reports)
 
     def _commanded(self, state: AgentState, own: Own, estimate: Estimate, inputs: Heard) -> tuple[Any, Array]:
-        batch, before = state.input.shape[:-1], readonly(state.law)
+        batch = state.input.shape[:-1]
         with Calling(self.law, "command"):
-            told = self.law.command(self.brief, before, own.tick, own, readonly(estimate), inputs)
+            told = self.law.command(self.brief, state.law, own.tick, own, estimate, inputs)
             law, steered = pair(told, "the state, and the input")
-            returned.state(before, law, batch)
+            returned.state(state.law, law, batch)
             array("the input", steered, "D", (self.brief.dimension,), batch)
             return law, steered
 
@@ -231,3 +237,26 @@ class Agent:
         if self.law.order == 1:
             return pilot(self.brief, mission, self.leader_gain, tick, position)
         return pilot_of_accelerations(self.brief, mission, self.leader_gain, tick, position, velocity)
+
+
+@kernel("(),(),(D),()->(),(),(D),()", "l?dl->lld?")
+def _woken(D: int) -> Plain:
+    """In which tick it senses, how many it has missed, what it flies, and that its body holds no longer."""
+
+    def plain(
+        sensed: int,
+        held: bool,
+        told: Array,
+        tick: int,
+        now: Integers,
+        missed: Integers,
+        flying: Array,
+        holds: Mask,
+    ) -> None:
+        now[0] = tick
+        missed[0] = 0 if sensed < 0 else tick - sensed - 1
+        for axis in range(D):
+            flying[axis] = 0.0 if held else told[axis]
+        holds[0] = False
+
+    return plain

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
+from textwrap import fill
 from typing import NamedTuple
 
 from pydantic import Field, model_validator
@@ -264,7 +265,7 @@ def _more(study: str) -> str:
 
 
 def _whence(name: str, full: StudyRecord) -> Iterator[str]:
-    yield f"{full.title} ({full.source})."
+    yield fill(f"{full.title} ({full.source}).", 120)
     yield ""
     yield f"{full.runs} runs of each case, intervals of {100 * full.confidence:.0f} %, from"
     yield f"[{name}.json](../affinet/shipped/results/{name}.json);"

@@ -28,8 +28,11 @@ def kernels() -> Iterator[Kernel]:
 
 
 def sizes(kernel: Kernel, dimension: int) -> tuple[int, ...]:
-    """What a kernel is compiled for in so many dimensions: filters of up to two derivatives have the most states."""
-    known = {"D": dimension, "M": dimension, "O": 3, "R": 3, "S": 3 * dimension}
+    """What a kernel is compiled for in so many dimensions.
+
+    Filters of up to two derivatives have the most states; a message under way has so many fields, and as it arrives so many.
+    """
+    known = {"A": 4, "F": 6, "D": dimension, "M": dimension, "O": 3, "R": 3, "S": 3 * dimension}
     return tuple(known[name] for name in kernel.sizes)
 
 

@@ -52,7 +52,7 @@ def _mean_delay(one: LinkClass, dt: float, least_delay: int) -> tuple[float, flo
     laws = one.delays(dt)
     share = (np.arange(4096) + 0.5) / 4096
     seconds = sum((law.quantile(share) for law in laws), start=np.zeros(len(share)))
-    ticks = np.maximum(delay.ticks(seconds, dt), least_delay)
+    ticks = delay.ticks(seconds, dt, least_delay)
     return sum(law.mean_delay for law in laws), float(ticks.mean())
 
 

@@ -9,13 +9,16 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from agents.agent import AgentAction, AgentState
+from agents.batch import beside_others, come_back, put_back
 from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
-from analysis.models.arrays import Array, Integers, Mask, chosen
+from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks
+from netem.loading.given import protect
+from netem.medium import by_slot
 from netem.medium.in_flight import Delivery
 from netem.medium.medium import Medium
 from netem.medium.picking import picked
@@ -46,11 +49,11 @@ class ArrayCarrier:
     def __init__(self, plan: Plan) -> None:
         self._world = plan.world
         self._links = plan.world.links
-        self._channels = plan.channels
         self._agents = plan.agents
         self._numbers = np.arange(1, self._links.agents + 1)
         self._fields = self._agents.channels()
-        self._state = self._fresh = self._agents.init(self._numbers.shape)
+        self._rows = [plan.channels.index(channel) for channel in self._fields]
+        self._state = self._agents.init(self._numbers.shape)
         medium = Medium(plan.world.seed, plan.channels, plan.profiles, plan.timeline, plan.recorded())
         self._relay = Relay[Broadcasts](medium)
         self._centre = plan.centre
@@ -86,34 +89,31 @@ class ArrayCarrier:
             raise
 
     def _tick(self, tick: int, scene: Scene, sensed: Array) -> BatchActed:
-        links, before = self._links, self._welcomed_back(tick)
+        before = self._welcomed_back(tick)
         relayed = self._relay.decide(tick, scene.position)
-        idle = relayed.conditions.idle
-        # Those who are idle live the tick with the others, and what comes of it is put back: they must not catch up for that.
-        living = before._replace(sensed=np.where(idle, tick - 1, before.sensed)) if idle.any() else before
-        seen = relayed.seen[links.slots] & links.present
-        measured = np.where(seen[..., None], sensed[links.slots], 0.0)
+        idle, living = relayed.conditions.idle, before
+        some_idle = idle.any()
+        if some_idle:
+            living = beside_others(before, idle, tick)
+        measured, seen = by_slot.sensed(sensed, relayed.seen, self._links)
         motion = self._world.odometry(scene)
         state, said = self._agents.sense(living, tick, measured, seen, motion)
         told = {name: self._relay.as_told(tick, name, self._numbers, fields) for name, fields in said.items()}
         self._relay.keep(tick, told)
-        heard = {name: self._hear(tick, name, relayed.delivery) for name in self._fields}
+        heard = self._hear(tick, relayed.delivery)
         if self._centre:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, self._steered(said))
         sighting = self._world.sighting(tick, scene)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
-        self._state = chosen(idle, before, state) if idle.any() else state
+        self._state = put_back(idle, before, state) if some_idle else state
         self._relay.finish(tick)
-        return BatchActed(np.where(idle[:, None], 0.0, action.input), action, relayed)
+        steered = np.where(idle[:, None], 0.0, action.input) if some_idle else action.input
+        return BatchActed(steered, action, relayed)
 
     def _welcomed_back(self, tick: int) -> AgentState:
-        warm = self.timeline.remembering(tick)
-        cold = set(self.timeline.restarted(tick)) - set(warm)
-        state = self._state
-        for agents, new in ((cold, self._fresh), (warm, self._agents.revived(state))):
-            if agents:
-                state = chosen(np.isin(self._numbers, [*agents]), new, state)
-        return state
+        if not (restarted := self.timeline.restarted(tick)):
+            return self._state
+        return come_back(self._agents, self._numbers, self._state, restarted, self.timeline.remembering(tick))
 
     def _from_the_centre(self, centre: CheckedCentre, measured: Array, seen: Mask, inputs: Array) -> Heard:
         def of_swarms(array: Any) -> Any:
@@ -132,20 +132,23 @@ class ArrayCarrier:
         clocks = self.timeline.clock(tick)
         return int(clocks[0]) if (clocks == clocks[0]).all() else clocks
 
-    def _hear(self, tick: int, channel: str, delivery: Delivery) -> Heard:
-        row, links = self._channels.index(channel), self._links
-        content = np.where(links.present, delivery.newest[row, links.slots], -1)
-        fresh = content >= 0
-        fields = self._gathered(tick, channel, content, fresh)
-        if delivery.mark.any():
-            mark = np.where(fresh, delivery.mark[row, links.slots], np.uint8(Mark.NONE))
-            fields = self._changed(fields, row, content, mark) if mark.any() else fields
-        return Heard(fields, fresh, np.where(fresh, tick - content, 0))
+    def _hear(self, tick: int, delivery: Delivery) -> dict[str, Heard]:
+        """What everybody hears on each channel."""
+        arriving = _protected(by_slot.arriving(delivery.newest[self._rows], self._links, tick))
+        marked, heard = delivery.mark.any(), {}
+        for channel, row, fresh, age in zip(self._fields, self._rows, *arriving, strict=True):
+            fields = self._gathered(tick, channel, fresh, age)
+            if marked:
+                mark = np.where(fresh, delivery.mark[row, self._links.slots], np.uint8(Mark.NONE))
+                fields = self._changed(fields, row, tick - age, mark) if mark.any() else fields
+            heard[channel] = Heard(fields, fresh, age)
+        return heard
 
-    def _gathered(self, tick: int, channel: str, content: Integers, fresh: Mask) -> dict[str, Any]:
+    def _gathered(self, tick: int, channel: str, fresh: Mask, age: Integers) -> dict[str, Any]:
         """What arrives of what was said, in one tick or in several."""
-        spoken, said = [tick], np.where(fresh, 0, -1)
-        if content.min(where=fresh, initial=tick) < tick:
+        spoken, said = [tick], fresh - 1
+        if age.any():
+            content = tick - age
             spoken = np.unique(content[fresh]).tolist()
             said = np.where(fresh, np.searchsorted(spoken, content), -1)
         broadcasts = [self._relay.said(one)[channel] for one in spoken]
@@ -163,3 +166,8 @@ class ArrayCarrier:
         for name, field in wrong.items():
             arriving[name][struck] = field
         return arriving
+
+
+def _protected(given: Any) -> Any:
+    protect(given)
+    return given

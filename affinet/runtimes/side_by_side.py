@@ -1,28 +1,40 @@
-"""Many runs of one plan as one: swarms that fly side by side, each with draws of its own.
+"""Many runs as one: swarms that fly side by side, each with draws of its own.
 
 A batch is a plan of as many agents as all its runs have together, and of no link between two of them. Whatever flies a plan
-flies a batch, and every run in it is the run that would have been flown alone.
+flies a batch, and every run in it is the run that would have been flown alone. Runs of several plans fly in one batch where
+the plans are alike (`alike.py`): what differs is laid over the links of each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from affinet.planning.plan import Plan
+from affinet.runtimes.alike import alike
 from agents.brief import Brief
 from netem.faults.fault import Fault
-from netem.impairments.chain import ChainLayer
-from netem.impairments.delay import MessageDelay
+from netem.impairments.chain import ChainLayer, steady
 from netem.impairments.profile import Profile
 from world.formation.nominal import Formation
 
+# The air of some runs, and how many they are.
+_Airs = Sequence[tuple[Profile, int]]
+
 
 class NotABatch(ValueError):
-    """The plan has something that cannot be flown side by side."""
+    """The plans have something that cannot be flown side by side."""
+
+
+class Flight(NamedTuple):
+    """Runs of a plan with each of these seeds."""
+
+    plan: Plan
+    seeds: Sequence[int]
 
 
 def side_by_side(plan: Plan, seeds: Sequence[int]) -> Plan:
@@ -33,23 +45,40 @@ def side_by_side(plan: Plan, seeds: Sequence[int]) -> Plan:
     NotABatch
         When its air depends on positions, counts messages, or follows a trace; or a fault waits for a condition.
     """
-    number, world = len(seeds), plan.world
-    size = world.formation.agents
+    return together([Flight(plan, seeds)])
+
+
+def together(flights: Sequence[Flight]) -> Plan:
+    """The runs of several plans, one after the other, as one plan.
+
+    Raises
+    ------
+    NotABatch
+        When the plans are not alike, or one of them cannot be flown side by side.
+    """
+    plan, world = flights[0].plan, flights[0].plan.world
+    for other, _ in flights[1:]:
+        if not alike(plan, other):
+            raise NotABatch("plans that differ in more than what each link has for itself are not flown side by side")
     for profile in plan.profiles:
         _refuse(profile)
     if plan.triggers or plan.journal:
         raise NotABatch("a fault that waits for a condition comes at another time in each run; fly them one by one")
-    links = world.links.side_by_side(number)
+    seeds = np.concatenate([np.array(flight.seeds, dtype=np.uint64) for flight in flights])
+    number, size = len(seeds), world.formation.agents
     return replace(
         plan,
         world=replace(
             world,
-            swarm_seeds=np.repeat(np.array(seeds, dtype=np.uint64), size),
+            swarm_seeds=np.repeat(seeds, size),
             formation=_formation(world.formation, number),
-            links=links,
+            links=world.links.side_by_side(number),
             swarms=number,
         ),
-        profiles=tuple(_profile(profile, number) for profile in plan.profiles),
+        profiles=tuple(
+            _profile([(flight.plan.profiles[place], len(flight.seeds)) for flight in flights])
+            for place in range(len(plan.profiles))
+        ),
         faults=tuple(_fault(fault, number, size) for fault in plan.faults),
         brief=_brief(plan.brief, number),
     )
@@ -95,32 +124,74 @@ def _brief(one: Brief, number: int) -> Brief:
     )
 
 
-def _profile(one: Profile, number: int) -> Profile:
+def _profile(airs: _Airs) -> Profile:
+    def joined(of: Callable[[Profile], Any]) -> Any:
+        return _joined((of(air), number) for air, number in airs)
+
+    first = airs[0][0]
     return replace(
-        one,
-        chains=tuple(_chains(layer, number) for layer in one.chains),
-        own=tuple(replace(loss, rows=np.tile(loss.rows, number)) for loss in one.own),
-        delays=tuple(_delay(law, number) for law in one.delays),
-        duplicate=np.tile(one.duplicate, number),
-        reorder=np.tile(one.reorder, number),
-        corrupt=np.tile(one.corrupt, (number, 1)),
-        bias=np.tile(one.bias, number),
+        first,
+        chains=tuple(_layer(airs, lane) for lane in _lanes(airs)),
+        own=_for_some_links(airs, attrgetter("own")),
+        delays=_for_some_links(airs, attrgetter("delays")),
+        **{name: joined(attrgetter(name)) for name in ("duplicate", "reorder", "corrupt", "bias")},
     )
 
 
-def _chains(layer: ChainLayer, number: int) -> ChainLayer:
+def _for_some_links(airs: _Airs, of: Callable[[Profile], Sequence[Any]]) -> tuple[Any, ...]:
+    """Losses or delays, which are the same in all but the links for which they are."""
+    alike = zip(*(of(air) for air, _ in airs), strict=True)
+    numbers = [number for _, number in airs]
+    return tuple(
+        replace(each[0], rows=_joined(zip((one.rows for one in each), numbers, strict=True))) for each in alike
+    )
+
+
+def _joined(parts: Iterable[tuple[Any, int]]) -> Any:
+    """Arrays that begin with the links of a run, each for so many runs, one after the other."""
+    return np.concatenate([np.tile(array, (number,) + (1,) * (array.ndim - 1)) for array, number in parts])
+
+
+def _lanes(airs: _Airs) -> list[tuple[bool, bool, int]]:
+    """What tells the layers of chains of profiles apart, in the order in which planning has them: sensing first."""
+    return sorted({_lane(layer) for air, _ in airs for layer in air.chains})
+
+
+def _lane(layer: ChainLayer) -> tuple[bool, bool, int]:
+    return not layer.sensing, not layer.comms, layer.lane
+
+
+def _layer(airs: _Airs, lane: tuple[bool, bool, int]) -> ChainLayer:
+    """One layer for the links of all, with as many states as any has; who has none there never loses by it."""
+    layers = [next((one for one in air.chains if _lane(one) == lane), None) for air, _ in airs]
+    there = [layer for layer in layers if layer is not None]
+    states = max(layer.loss.shape[-1] for layer in there)
+    never = _never(there[0])
+    padded = [_padded(never if layer is None else layer, states) for layer in layers]
+
+    def joined(of: Callable[[ChainLayer], Any]) -> Any:
+        return _joined((of(layer), number) for layer, (_, number) in zip(padded, airs, strict=True))
+
+    names = ("cumulative", "start", "loss", "extra_delay", "by_packet")
+    return replace(there[0], **{name: joined(attrgetter(name)) for name in names})
+
+
+def _never(like: ChainLayer) -> ChainLayer:
+    links = len(like.loss)
+    by_packet = np.zeros(links, dtype=bool)
+    return ChainLayer.of(like.lane, [steady()] * links, by_packet, sensing=like.sensing, comms=like.comms)
+
+
+def _padded(layer: ChainLayer, states: int) -> ChainLayer:
+    """The layer with so many states, those beyond its own never entered."""
+    beyond = (0, states - layer.loss.shape[-1])
     return replace(
         layer,
-        cumulative=np.tile(layer.cumulative, (number, 1, 1)),
-        start=np.tile(layer.start, (number, 1)),
-        loss=np.tile(layer.loss, (number, 1)),
-        extra_delay=np.tile(layer.extra_delay, (number, 1)),
-        by_packet=np.tile(layer.by_packet, number),
+        cumulative=np.pad(layer.cumulative, ((0, 0), beyond, beyond), constant_values=1.0),
+        start=np.pad(layer.start, ((0, 0), beyond), constant_values=1.0),
+        loss=np.pad(layer.loss, ((0, 0), beyond)),
+        extra_delay=np.pad(layer.extra_delay, ((0, 0), beyond)),
     )
-
-
-def _delay(law: MessageDelay, number: int) -> MessageDelay:
-    return replace(law, rows=np.tile(law.rows, number))
 
 
 def _fault(fault: Fault, number: int, size: int) -> Fault:

@@ -1,17 +1,18 @@
-"""Many runs of one plan, flown side by side: what comes of each, tick by tick."""
+"""Many runs flown side by side: what comes of each, tick by tick."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.inprocess import BatchTick, InProcessSwarm
-from affinet.runtimes.side_by_side import side_by_side
+from affinet.runtimes.side_by_side import Flight, together
 from affinet.verdicts.metrics import METRICS, seen
 from analysis.metrics import errors
 from analysis.metrics.indicator import Bounds, bounds
@@ -31,7 +32,7 @@ from world.books.localized import FirstMeasurements
 REPORT = "report:"  # and the name of a report: a quantity
 
 # What a tick costs however many fly is then a third of it.
-_AT_ONCE = 200
+AT_ONCE = 200
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,17 @@ class Runs:
             first=self.first,
         )
 
+    def part(self, rows: slice, place: int) -> Runs:
+        """These of them, where `first` begins with several: those whose first is in this place."""
+        return Runs(
+            seconds=self.seconds,
+            mean_error=self.mean_error[rows],
+            psi=self.psi[rows],
+            bounds=Bounds(*(each[rows] for each in self.bounds)),
+            quantities={name: values[rows] for name, values in self.quantities.items()},
+            first={name: values[place] for name, values in self.first.items()},
+        )
+
 
 def fly_all(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float], None] = lambda _: None) -> Runs:
     """The runs of a plan with each of these seeds.
@@ -123,59 +135,74 @@ def fly_all(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float]
     NotABatch
         When the plan cannot be flown side by side.
     """
-    firsts = range(0, len(seeds), _AT_ONCE)
+    firsts = range(0, len(seeds), AT_ONCE)
     parts = [
-        _fly(plan, seeds[first : first + _AT_ONCE], every, _of_all(tell, number, len(firsts)))
+        fly_together([Flight(plan, seeds[first : first + AT_ONCE])], every, _of_all(tell, number, len(firsts)))
         for number, first in enumerate(firsts)
     ]
-    return reduce(Runs.together, parts)
+    return reduce(Runs.together, (runs for (runs,) in parts))
 
 
 def _of_all(tell: Callable[[float], None], number: int, parts: int) -> Callable[[float], None]:
     return lambda share: tell((number + share) / parts)
 
 
-def _fly(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float], None]) -> Runs:
-    together, size = side_by_side(plan, seeds), plan.world.formation.agents
-    swarm = InProcessSwarm(together)
-    tracking: list[Array] = []
+def fly_together(flights: Sequence[Flight], every: int, tell: Callable[[float], None] = lambda _: None) -> list[Runs]:
+    """The runs of several plans, all at once: those of each, bit for bit as it flies alone.
+
+    Parameters
+    ----------
+    flights
+        What to fly, and with which draws; a seed may occur in several.
+    every, tell
+        As of `fly_all`.
+
+    Raises
+    ------
+    NotABatch
+        When the plans are not alike, or one of them cannot be flown side by side.
+    """
+    ends = [*accumulate((len(flight.seeds) for flight in flights), initial=0)]
+    flown = _fly(flights, ends[:-1], every, tell)
+    return [flown.part(slice(*rows), place) for place, rows in enumerate(pairwise(ends))]
+
+
+def _fly(flights: Sequence[Flight], firsts: Sequence[int], every: int, tell: Callable[[float], None]) -> Runs:
+    """All runs; `first` of the result begins with the flights, whose first runs these are."""
+    batch, plan, runs = together(flights), flights[0].plan, sum(len(flight.seeds) for flight in flights)
+    size = plan.world.formation.agents
+    swarm = InProcessSwarm(batch)
     kept: list[dict[str, Array]] = []
     psi: list[Array] = []
     limits: list[Bounds] = []
     first: list[dict[str, Array]] = []
-    peak = np.zeros(len(seeds))
-    paths = _Paths()
-    places = _Places(plan, len(seeds))
+    flown = _Flown(runs)
+    places = _Places(plan, runs)
 
     def of_runs(array: Any) -> Any:
-        return array.reshape(len(seeds), size, *array.shape[1:])
+        return array.reshape(runs, size, *array.shape[1:])
 
     def of_links(array: Any) -> Any:
-        return np.moveaxis(array.reshape(len(array), len(seeds), -1), 0, 1)
+        return np.moveaxis(array.reshape(len(array), runs, -1), 0, 1)
 
     with np.errstate(over="ignore", invalid="ignore"):  # of runs that diverge
         for instant in swarm.ticks():
-            flown, present = of_runs(instant.scene.position), of_runs(~swarm.timeline.at(instant.tick).absent)
-            target = of_runs(together.world.goal(instant.tick, instant.scene))
-            lost = (present & ~np.isfinite(flown).all(axis=-1)).any(axis=-1)
-            tracking.append(np.where(lost, np.inf, errors.tracking_error(flown, target, present)))
+            present = of_runs(~swarm.timeline.at(instant.tick).absent)
+            goal = batch.world.goal(instant.tick, instant.scene)
+            flown.step(of_runs(instant.scene.position), of_runs(goal), of_runs(instant.input), present)
             places.measure(instant, plan.timeline)
-            paths.step(flown, present)
-            peak = np.maximum(peak, np.linalg.norm(of_runs(instant.input), axis=-1).max(axis=-1))
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
-                looked_at = _looked_at(together, present, moment)
+                looked_at = _looked_at(batch, present, moment)
                 awake = of_runs(~swarm.timeline.at(instant.tick).idle)
-                pursued = _pursued(together, awake, moment, of_runs)
-                moved = {"peak": peak, "roughness": paths.roughness()}
-                kept.append({**moved, **looked_at, **pursued, **_reported(moment, awake, of_runs)})
+                pursued = _pursued(batch, awake, moment, of_runs)
+                kept.append({**flown.since(), **looked_at, **pursued, **_reported(moment, awake, of_runs)})
                 psi.append(of_runs(moment.psi))
                 limits.append(_bounds(plan, present, of_links(moment.entry.verdicts)))
-                first.append(_shown(plan, moment))
+                first.append(_shown(plan, moment, firsts, of_runs))
                 places.keep(moment)
-                peak = np.zeros(len(seeds))
             tell((instant.tick + 1) / plan.world.ticks)
-        error = np.stack(tracking, axis=1)
+        error = np.stack(flown.errors, axis=1)
         mean_error = error.mean(axis=1)
         seconds = np.arange(0, error.shape[1], every, dtype=np.float64) * plan.world.dt
         over_moments = {name: np.stack([one[name] for one in kept], axis=1) for name in kept[0]}
@@ -190,7 +217,7 @@ def _fly(plan: Plan, seeds: Sequence[int], every: int, tell: Callable[[float], N
             "fall": errors.rate_of_fall(seconds, over_moments["procrustes"]),
             **places.found(len(kept)),
         },
-        first={name: np.stack([one[name] for one in first]) for name in first[0]},
+        first={name: np.stack([one[name] for one in first], axis=1) for name in first[0]},
     )
 
 
@@ -207,23 +234,27 @@ def _bounds(plan: Plan, present: Mask, verdicts: VerdictCodes) -> Bounds:
     return bounds(world.formation.nominal, heard, world.sensor.common, seen, present)
 
 
-class _Paths:
-    """How rough the paths of many runs are."""
+class _Flown:
+    """How many runs fly, tick by tick."""
 
-    def __init__(self) -> None:
-        self._recent: list[Array] = []
-        self._squares: list[Array] = []
+    def __init__(self, runs: int) -> None:
+        self.errors: list[Array] = []
+        self._path: tuple[Array, ...] = ()
+        self._ticks, self._change, self._peak = 0, np.zeros(runs), np.zeros(runs)
 
-    def step(self, position: Array, present: Mask) -> None:
-        """Take in where agents are in a tick, shape (R, N, D), and who takes part, (R, N)."""
-        self._recent = [*(self._recent[-2:] or [position, position]), position]
-        self._squares.append(errors.change_of_step(np.stack(self._recent, axis=1), present) ** 2)
+    def step(self, position: Array, target: Array, steered: Array, present: Mask) -> None:
+        """Take in a tick: where agents are and should be, and what they fly, shape (R, N, D); who takes part, (R, N)."""
+        self._path = (*(self._path[-2:] or (position, position)), position)
+        tick = errors.tick_flown(self._path, target, steered, present)
+        self.errors.append(tick.error)
+        self._ticks, self._change = self._ticks + 1, self._change + tick.change
+        self._peak = np.maximum(self._peak, tick.longest)
 
-    def roughness(self) -> Array:
-        """Since this was asked last, shape (R,), in metres."""
-        found: Array = np.sqrt(np.mean(self._squares, axis=0))
-        self._squares = []
-        return found
+    def since(self) -> dict[str, Array]:
+        """The longest input, and how rough the paths are, since this was asked last, shape (R,)."""
+        said = {"peak": self._peak, "roughness": np.sqrt(self._change / self._ticks)}
+        self._ticks, self._change, self._peak = 0, np.zeros_like(self._change), np.zeros_like(self._peak)
+        return said
 
 
 class _Places:
@@ -296,12 +327,13 @@ def _reported(moment: Moment, awake: Mask, of_runs: Callable[[Any], Any]) -> dic
     return means
 
 
-def _shown(plan: Plan, moment: Moment) -> dict[str, Array]:
-    """Of the first run."""
-    size, nominal = plan.world.formation.agents, plan.world.formation.nominal
+def _shown(plan: Plan, moment: Moment, firsts: Sequence[int], of_runs: Callable[[Any], Any]) -> dict[str, Array]:
+    """Of these runs, the first of each flight, shapes (F, N, ...)."""
     said = {"position": moment.position, "input": moment.input, **moment.reports}
-    shown = {name: each[:size] for name, each in said.items() if name != NIS}
-    return shown if plan.world.pursuit is None else {**shown, "target": moment.target[0] - nominal[0]}
+    shown = {name: of_runs(each)[firsts] for name, each in said.items() if name != NIS}
+    if plan.world.pursuit is None:
+        return shown
+    return {**shown, "target": of_runs(moment.target)[firsts, 0] - plan.world.formation.nominal[0]}
 
 
 def _pursued(plan: Plan, awake: Mask, moment: Moment, of_runs: Callable[[Any], Any]) -> dict[str, Array]:

@@ -23,6 +23,11 @@ class _Telling:
     number: ClassVar[int] = 0
 
 
+def processors() -> int:
+    """How many there are, and so at how many pieces of work a pool is at a time."""
+    return os.cpu_count() or 1
+
+
 def tell(share: float) -> None:
     """Say which share of the work at hand is done, from within it."""
     _Telling.shares[_Telling.number] = share
@@ -48,7 +53,7 @@ def in_processes(
     others = set(multiprocessing.active_children())
     todo = list(given)
     shares = context.RawArray("d", len(todo))
-    pool = ProcessPoolExecutor(mp_context=context, initializer=_begin, initargs=(shares,))
+    pool = ProcessPoolExecutor(processors(), mp_context=context, initializer=_begin, initargs=(shares,))
     try:
         for waiting in [pool.submit(_work, work, number, one) for number, one in enumerate(todo)]:
             while not wait([waiting], timeout=_LOOKS_S).done:

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,6 +18,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
+from affinet.runtimes.side_by_side import Flight
 from affinet.scenario import files
 from affinet.scenario import loading as scenarios
 from affinet.scenario.explain import explained, named_in
@@ -26,10 +27,11 @@ from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.source import Source
 from affinet.scenario.units import Finite, NotNegative
 from affinet.studies import checks
-from affinet.studies.batch import Runs, fly_all
+from affinet.studies.batch import Runs, fly_together
 from affinet.studies.checks import Wrong
-from affinet.studies.pool import in_processes, tell
+from affinet.studies.pool import in_processes, processors, tell
 from affinet.studies.quantities import Quantity
+from affinet.studies.sharing import Piece, batches, flown_by_case, in_turn
 from analysis.models.arrays import Mask
 from netem.processes.user_code import UserCodeError
 
@@ -267,7 +269,7 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
 def fly(
     planned: Sequence[tuple[Case, Plan]], runs: int, watch: Callable[[Sequence[float]], None] = lambda _: None
 ) -> Iterator[Result]:
-    """So many runs of each case, as many cases at a time as there are processors; each as it is done.
+    """So many runs of each case, in batches over all processors; each case in its turn, as soon as it is done.
 
     Parameters
     ----------
@@ -275,12 +277,21 @@ def fly(
         The cases, and how many runs of each.
     watch
         Told from time to time which share of each case has flown.
+
+    Raises
+    ------
+    UserCodeError
+        When a user's own code does something wrong: in which case, as well as it can be known.
     """
-    with closing(in_processes(_fly, [(plan, runs) for _, plan in planned], watch)) as flown:
-        for case, plan in planned:
-            with _in_case(case):
-                done = next(flown)
-            yield Result(case.labels, plan, done)
+    shared = batches([plan for _, plan in planned], runs, processors())
+    given = [[_part(*planned[piece.case], piece) for piece in batch] for batch in shared]
+
+    def look(shares: Sequence[float]) -> None:
+        watch(flown_by_case(shares, shared, len(planned), runs))
+
+    with closing(in_processes(_fly, given, look)) as flown:
+        for (case, plan), whole in zip(planned, in_turn(shared, flown, len(planned)), strict=True):
+            yield Result(case.labels, plan, whole)
 
 
 def plans(study: Study, *, quick: bool) -> list[tuple[Case, Plan]]:
@@ -324,10 +335,27 @@ def _every(plan: Plan) -> int:
     return max(1, plan.world.ticks // _KEPT)
 
 
-def _fly(given: tuple[Plan, int]) -> Runs:
-    plan, runs = given
+def _part(case: Case, plan: Plan, piece: Piece) -> tuple[Case, Flight]:
     first = plan.scenario.seed
-    return fly_all(plan, range(first, first + runs), _every(plan), tell)
+    return case, Flight(plan, range(first + piece.runs.start, first + piece.runs.stop))
+
+
+def _fly(parts: Sequence[tuple[Case, Flight]]) -> list[Runs]:
+    flights = [flight for _, flight in parts]
+    try:
+        return fly_together(flights, _every(flights[0].plan), tell)
+    except UserCodeError as error:
+        if len(parts) > 1:
+            _fly_alone(parts, error.tick or 0)
+        error.during = f"case {', or '.join(checks.named(case.labels) for case, _ in parts)}"
+        raise
+
+
+def _fly_alone(parts: Sequence[tuple[Case, Flight]], last: int) -> None:
+    """Each up to this tick, in which all together failed: the one that fails alone is named."""
+    for case, (plan, seeds) in parts:
+        with _in_case(case):
+            fly_together([Flight(replace(plan, world=replace(plan.world, ticks=last + 1)), seeds)], _every(plan))
 
 
 def selected(one: Case | Result, labels: Mapping[str, str]) -> bool:

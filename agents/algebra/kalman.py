@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.kernels.kernel import Plain, kernel, scratch
+from analysis.kernels.kernel import Part, Plain, kernel, scratch
 from analysis.models.algebra import product, sum_over
 from analysis.models.arrays import Array, Integers, Mask, chosen
 from analysis.models.small import invert
@@ -103,31 +103,36 @@ def predict(mean: Array, covariance: Array, F: Array, Q: Array) -> tuple[Array, 
     return ahead
 
 
-@kernel("(S),(S,S),(O,O),(O,O)->(S),(S,S)", "dddd->dd")
-def _ahead(S: int, O: int) -> Plain:  # noqa: E741
-    D = S // O
-
-    def plain(mean: Array, P: Array, F: Array, Q: Array, ahead: Array, spread: Array) -> None:
-        FP = scratch(O, O)
-        for one in range(D):
+@Part
+def move(mean: Array, P: Array, F: Array, Q: Array, ahead: Array, spread: Array, FP: Array) -> None:
+    """One filter a step ahead: F x and F P F^T + Q, by derivatives, into `ahead` and `spread`; FP is room, (O, O)."""
+    O = len(F)  # noqa: E741
+    D = len(mean) // O
+    for one in range(D):
+        for order in range(O):
+            moved = 0.0
+            for higher in range(order, O):
+                moved += F[order, higher] * mean[higher * D + one]
+            ahead[order * D + one] = moved
+        for other in range(D):
             for order in range(O):
-                moved = 0.0
-                for higher in range(order, O):
-                    moved += F[order, higher] * mean[higher * D + one]
-                ahead[order * D + one] = moved
-            for other in range(D):
-                for order in range(O):
-                    for column in range(O):
-                        moved = 0.0
-                        for higher in range(order, O):
-                            moved += F[order, higher] * P[higher * D + one, column * D + other]
-                        FP[order, column] = moved
-                for order in range(O):
-                    for column in range(O):
-                        moved = Q[order, column] if one == other else 0.0
-                        for higher in range(column, O):
-                            moved += FP[order, higher] * F[column, higher]
-                        spread[order * D + one, column * D + other] = moved
+                for column in range(O):
+                    moved = 0.0
+                    for higher in range(order, O):
+                        moved += F[order, higher] * P[higher * D + one, column * D + other]
+                    FP[order, column] = moved
+            for order in range(O):
+                for column in range(O):
+                    moved = Q[order, column] if one == other else 0.0
+                    for higher in range(column, O):
+                        moved += FP[order, higher] * F[column, higher]
+                    spread[order * D + one, column * D + other] = moved
+
+
+@kernel("(S),(S,S),(O,O),(O,O)->(S),(S,S)", "dddd->dd")
+def _ahead(_: int, O: int) -> Plain:  # noqa: E741
+    def plain(mean: Array, P: Array, F: Array, Q: Array, ahead: Array, spread: Array) -> None:
+        move(mean, P, F, Q, ahead, spread, scratch(O, O))
 
     return plain
 
@@ -177,43 +182,52 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     return Corrected(*_corrected(mean, covariance, observed, R, usable))
 
 
+@Part
+def observe(mean: Array, P: Array, observed: Array, R: Array, corrected: Array, left: Array, room: Array) -> float:
+    """One filter observed, into `corrected` and `left`; its innovation squared and normalised. `room` is (4 D, D)."""
+    S, D = len(mean), len(observed)
+    doubt, precision, pull, gain = room[:D], room[D : 2 * D], room[2 * D : 3 * D], room[3 * D :]
+    for i in range(D):
+        for j in range(D):
+            doubt[i, j] = P[i, j] + R[i, j]
+    invert(doubt, precision)
+    surprise = 0.0
+    for i in range(D):
+        pull[i, 0] = 0.0
+        for j in range(D):
+            pull[i, 0] += precision[i, j] * (observed[j] - mean[j])
+        surprise += (observed[i] - mean[i]) * pull[i, 0]
+    for row in range(S):
+        moved = mean[row]
+        for i in range(D):
+            moved += P[row, i] * pull[i, 0]
+            gain[i, 0] = 0.0
+            for j in range(D):
+                gain[i, 0] += P[row, j] * precision[j, i]
+        corrected[row] = moved
+        for column in range(S):
+            known = P[row, column]
+            for i in range(D):
+                known -= gain[i, 0] * P[i, column]
+            left[row, column] = known
+    return surprise
+
+
 @kernel("(S),(S,S),(D),(D,D),()->(S),(S,S),()", "dddd?->ddd")
 def _corrected(S: int, D: int) -> Plain:
+    rows = 4 * D
+
     def plain(
         mean: Array, P: Array, observed: Array, R: Array, usable: bool, corrected: Array, left: Array, nis: Array
     ) -> None:
-        if not usable:
-            for row in range(S):
-                corrected[row] = mean[row]
-                for column in range(S):
-                    left[row, column] = P[row, column]
-            nis[0] = np.nan
+        if usable:
+            nis[0] = observe(mean, P, observed, R, corrected, left, scratch(rows, D))
             return
-        doubt, precision, pull, gain = scratch(D, D), scratch(D, D), scratch(D, 1), scratch(D, 1)
-        for i in range(D):
-            for j in range(D):
-                doubt[i, j] = P[i, j] + R[i, j]
-        invert(doubt, precision)
-        surprise = 0.0
-        for i in range(D):
-            pull[i, 0] = 0.0
-            for j in range(D):
-                pull[i, 0] += precision[i, j] * (observed[j] - mean[j])
-            surprise += (observed[i] - mean[i]) * pull[i, 0]
-        nis[0] = surprise
+        nis[0] = np.nan
         for row in range(S):
-            moved = mean[row]
-            for i in range(D):
-                moved += P[row, i] * pull[i, 0]
-                gain[i, 0] = 0.0
-                for j in range(D):
-                    gain[i, 0] += P[row, j] * precision[j, i]
-            corrected[row] = moved
+            corrected[row] = mean[row]
             for column in range(S):
-                known = P[row, column]
-                for i in range(D):
-                    known -= gain[i, 0] * P[i, column]
-                left[row, column] = known
+                left[row, column] = P[row, column]
 
     return plain
 

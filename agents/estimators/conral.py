@@ -101,7 +101,7 @@ class ConsensusLocalization(Estimator[Agreement]):
             "consensus": consensus.theta,
             "started": consensus.feasible,
         }
-        return state._replace(perceived=Perceived(measured, seen, local), consensus=consensus), {THETA: said}
+        return Agreement(Perceived(measured, seen, local), consensus, state.indicator), {THETA: said}
 
     def fuse(
         self,
@@ -111,16 +111,20 @@ class ConsensusLocalization(Estimator[Agreement]):
         own: Own,  # noqa: ARG002
     ) -> tuple[Agreement, Estimate]:
         """One step of consensus; complete the measurements by its map."""
-        said = heard[THETA]
-        voices = said.fresh & said.fields["started"]
-        fits = said.fresh & said.fields["feasible"]
-        indicator = self._indicated(state, said.fields["local"], fits)
-        consensus = self._step(state, said, voices)
-        shape, local = self._in_use(consensus), state.perceived.local
-        measured = shape._replace(gram=np.where(local.feasible[..., None, None], local.gram, shape.gram))
-        covariance = MAPS[self.constraint].covariance(measured, brief.relative, brief.sensor.common)
+        said, local, before = heard[THETA], state.perceived.local, state.consensus
+        fits, voices = said.fresh & said.fields["feasible"], said.fresh & said.fields["started"]
+        *indicated, theta, started, gram = _agreed(
+            *(local.theta, local.feasible, local.gram),
+            *(before.theta, before.feasible, before.gram, self._in_use(before).theta),
+            *(said.fields["local"], fits, said.fields["consensus"], voices),
+            *(state.indicator.heard, state.indicator.age, self.epsilon),
+        )
+        indicator, consensus = Indicator(*indicated), geometry.Fit(theta, started, before.gram)
+        shape = self._in_use(consensus)
+        behind = geometry.Fit(shape.theta, started, gram)
+        covariance = MAPS[self.constraint].covariance(behind, brief.relative, brief.sensor.common)
         estimate = complete(brief, state.perceived, shape, covariance, indicator.psi)
-        return state._replace(consensus=consensus, indicator=indicator), estimate
+        return Agreement(state.perceived, consensus, indicator), estimate
 
     def checks(self, swarm: SwarmBrief) -> Sequence[Finding]:
         """Whether the consensus (14) converges on the graph."""
@@ -135,67 +139,49 @@ class ConsensusLocalization(Estimator[Agreement]):
             says = f"epsilon {self.epsilon:g} is not below the bound {bound:.4f}: the consensus (14) diverges"
         return [Finding("consensus", "error", says)]
 
-    def _indicated(self, state: Agreement, theirs: Array, fits: Mask) -> Indicator:
-        """Against the agent's own fit, or the consensus where it has none."""
-        local, agreed, before = state.perceived.local, self._in_use(state.consensus), state.indicator
-        held_against = (local.theta, local.feasible, agreed.theta, agreed.feasible)
-        return Indicator(*_indicated(*held_against, theirs, fits, before.heard, before.age))
-
     def _in_use(self, consensus: geometry.Fit) -> geometry.Fit:
+        if self.constraint == "affine":  # every map is one
+            return consensus
         nearest = MAPS[self.constraint].nearest(consensus.theta)
         return consensus._replace(theta=np.where(consensus.feasible[..., None, None], nearest, 0.0))
 
-    def _step(self, state: Agreement, said: Heard, voices: Mask) -> geometry.Fit:
-        own, local = state.consensus, state.perceived.local
-        fits = said.fresh & said.fields["feasible"]
-        heard = (said.fields["consensus"], voices, said.fields["local"], fits)
-        theta, started = _stepped(own.theta, own.feasible, local.theta, local.feasible, *heard, self.epsilon)
-        return own._replace(theta=theta, feasible=started)
 
-
-@kernel("(D,D),(),(D,D),(),(n,D,D),(n),(),()->(),()", "d?d?d?dd->dd")
-def _indicated(_: int) -> Plain:
+@kernel(
+    "(D,D),(),(D,D),(D,D),(),(D,D),(D,D),(n,D,D),(n),(n,D,D),(n),(),(),()->(),(),(D,D),(),(D,D)",
+    "d?dd?ddd?d?ddd->ddd?d",
+)
+def _agreed(D: int) -> Plain:
     def plain(
         local: Array,
         feasible: bool,
-        agreed: Array,
-        started: bool,
-        theirs: Array,
-        fits: Mask,
-        heard: float,
-        age: float,
-        heard_now: Array,
-        age_now: Array,
-    ) -> None:
-        now = np.nan
-        if feasible:
-            now = disagreement(local, theirs, fits)
-        elif started:
-            now = disagreement(agreed, theirs, fits)
-        new = math.isfinite(now)
-        heard_now[0] = now if new else heard
-        age_now[0] = 0.0 if new else age + 1.0
-
-    return plain
-
-
-@kernel("(D,D),(),(D,D),(),(n,D,D),(n),(n,D,D),(n),()->(D,D),()", "d?d?d?d?d->d?")
-def _stepped(D: int) -> Plain:
-    """Equation (14); who has not started takes the mean of what the others agree on."""
-
-    def plain(
+        seen: Array,
         own: Array,
         started: bool,
-        local: Array,
-        feasible: bool,
-        consensus: Array,
-        voices: Mask,
+        nominal: Array,
+        in_use: Array,
         fitted: Array,
         fits: Mask,
+        consensus: Array,
+        voices: Mask,
+        heard: float,
+        age: float,
         epsilon: float,
+        heard_now: Array,
+        age_now: Array,
         theta: Array,
         running: Mask,
+        gram: Array,
     ) -> None:
+        # Indicator (16), against the agent's own fit, or the consensus where it has none.
+        indicated = np.nan
+        if feasible:
+            indicated = disagreement(local, fitted, fits)
+        elif started:
+            indicated = disagreement(in_use, fitted, fits)
+        new = math.isfinite(indicated)
+        heard_now[0] = indicated if new else heard
+        age_now[0] = 0.0 if new else age + 1.0
+        # Consensus (14); who has not started takes the mean of what the others agree on.
         number, weight = 0, 1 if feasible else 0
         for edge in range(len(voices)):
             number += voices[edge]
@@ -212,6 +198,7 @@ def _stepped(D: int) -> Plain:
                         drawn += fitted[edge, i, j]
                 stepped = own[i, j] + epsilon * (drawn + agreed - weight * own[i, j])
                 theta[i, j] = stepped if started else agreed / max(number, 1)
+                gram[i, j] = seen[i, j] if feasible else nominal[i, j]
 
     return plain
 

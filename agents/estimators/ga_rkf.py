@@ -16,6 +16,7 @@ import numpy as np
 
 from agents.algebra import kalman
 from agents.algebra.constraints import Constraint
+from agents.algebra.kalman import move, observe
 from agents.brief import Brief, Gap, Own
 from agents.estimate import Estimate
 from agents.estimators.base import Estimator
@@ -24,7 +25,7 @@ from agents.estimators.ral import Perceived, RelativeAffineLocalization
 from agents.estimators.rkf import EdgeFilters, Tracks
 from agents.exchange import Channels, Fields, Heard
 from agents.swarm import SwarmBrief
-from analysis.kernels.kernel import Plain, kernel
+from analysis.kernels.kernel import Plain, kernel, scratch
 from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 
@@ -77,14 +78,18 @@ class GeometryAwareFilter(EdgeFilters, Estimator[Fusion]):
 
     def fuse(self, brief: Brief, state: Fusion, heard: Mapping[str, Heard], own: Own) -> tuple[Fusion, Estimate]:
         """Correct every edge by its measurement, or else by its place in the perceived shape."""
-        seen = _perceived(state.shape).seen
+        seen, tracks = _perceived(state.shape).seen, state.tracks
         shape, observed = self._shaper.fuse(brief, state.shape, heard, own)
         # What lies outside its class a constrained map cannot see: alone it would be believed absolutely there.
         unseen = np.zeros_like(brief.sensor.common) if self.constraint == "affine" else brief.sensor.common
-        R, usable = _doubted(observed.covariance, seen, observed.known, observed.psi, unseen, self.penalty)
-        corrected = kalman.correct(*self.ahead(brief, state.tracks), observed.relative, R, usable)
-        nis = np.where(seen, corrected.nis, np.nan)  # what the shape says is no measurement
-        tracks = Tracks(*corrected._replace(nis=nis), state.tracks.known | usable)
+        F, Q = kalman.motion(self.model, brief.dt, self.sigma_w)
+        tracks = Tracks(
+            *_filtered(
+                *(tracks.mean, tracks.covariance, tracks.known, F, Q),
+                *(observed.relative, observed.covariance, observed.known, seen),
+                *(observed.psi[..., None], unseen, self.penalty),
+            )
+        )
         filtered = self.estimate(brief, tracks, observed.psi)
         reports = {**filtered.reports, **observed.reports}
         return Fusion(tracks, shape), filtered._replace(feasible=observed.feasible, reports=reports)
@@ -104,29 +109,47 @@ def _perceived(shape: Perceived | Agreement) -> Perceived:
     return shape.perceived if isinstance(shape, Agreement) else shape
 
 
-@kernel("(n,D,D),(n),(n),(),(D,D),()->(n,D,D),(n)", "d??dd?->d?")
-def _doubted(D: int) -> Plain:
-    """The covariances of what is observed, and where it may be used: (6)."""
+@kernel("(S),(S,S),(),(O,O),(O,O),(D),(D,D),(),(),(),(D,D),()->(S),(S,S),(),()", "dd?dddd??dd?->ddd?")
+def _filtered(S: int, O: int, D: int) -> Plain:  # noqa: E741
+    """One edge a tick later: predicted, and corrected by its measurement, or else by what the shape says (6)."""
+    rows = 4 * D
 
     def plain(
+        mean: Array,
+        P: Array,
+        known: bool,
+        F: Array,
+        Q: Array,
+        observed: Array,
         covariance: Array,
-        seen: Mask,
-        known: Mask,
+        placed: bool,
+        seen: bool,
         psi: float,
         unseen: Array,
         penalty: bool,
-        R: Array,
-        usable: Mask,
+        corrected: Array,
+        left: Array,
+        nis: Array,
+        known_now: Mask,
     ) -> None:
         trusted = math.isfinite(psi)
-        for edge in range(len(seen)):
-            usable[edge] = seen[edge] or (known[edge] and trusted)
-            for i in range(D):
-                for j in range(D):
-                    R[edge, i, j] = covariance[edge, i, j]
-                    if not seen[edge]:
-                        R[edge, i, j] += unseen[i, j]
-                        if penalty and trusted and i == j:
-                            R[edge, i, j] += psi
+        nis[0] = np.nan
+        known_now[0] = known
+        if not (seen or (placed and trusted)):
+            move(mean, P, F, Q, corrected, left, scratch(O, O))
+            return
+        ahead, spread, R = scratch(1, S)[0], scratch(S, S), scratch(D, D)
+        for i in range(D):
+            for j in range(D):
+                R[i, j] = covariance[i, j]
+                if not seen:
+                    R[i, j] += unseen[i, j]
+                    if penalty and trusted and i == j:
+                        R[i, j] += psi
+        move(mean, P, F, Q, ahead, spread, scratch(O, O))
+        surprise = observe(ahead, spread, observed, R, corrected, left, scratch(rows, D))
+        if seen:  # what the shape says is no measurement
+            nis[0] = surprise
+        known_now[0] = True
 
     return plain

@@ -92,7 +92,7 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
     psi
         Its convergence indicator, shape (...).
     """
-    relative, covariance, known = _completed(
+    relative, covariance, known, theta = _completed(
         perceived.measured,
         perceived.seen,
         brief.sensor.common,
@@ -102,11 +102,10 @@ def complete(brief: Brief, perceived: Perceived, shape: geometry.Fit, geometric:
         brief.relative,
         brief.present,
     )
-    theta = np.where(shape.feasible[..., None, None], shape.theta, np.nan)
     return Estimate(relative, known, covariance, psi, feasible=perceived.local.feasible, reports={THETA: theta})
 
 
-@kernel("(n,D),(n),(D,D),(D,D),(),(n,D,D),(n,D),(n)->(n,D),(n,D,D),(n)", "d?dd?dd?->dd?")
+@kernel("(n,D),(n),(D,D),(D,D),(),(n,D,D),(n,D),(n)->(n,D),(n,D,D),(n),(D,D)", "d?dd?dd?->dd?d")
 def _completed(D: int) -> Plain:
     def plain(
         measured: Array,
@@ -120,7 +119,11 @@ def _completed(D: int) -> Plain:
         relative: Array,
         covariance: Array,
         known: Mask,
+        reported: Array,
     ) -> None:
+        for i in range(D):
+            for j in range(D):
+                reported[i, j] = theta[i, j] if feasible else np.nan
         for edge in range(len(seen)):
             known[edge] = present[edge] and (seen[edge] or feasible)
             for i in range(D):

@@ -7,7 +7,7 @@ import numpy as np
 from agents.brief import Brief, Reading
 from agents.estimate import Estimate
 from analysis.kernels.kernel import Plain, kernel
-from analysis.models.affine import Manoeuvre
+from analysis.models.affine import Manoeuvre, placed, travelling
 from analysis.models.arrays import Array, Mask
 
 
@@ -23,8 +23,20 @@ def pilot(brief: Brief, mission: Manoeuvre, gain: float, tick: Reading, position
     position
         The leader's own, shape (..., D), in metres.
     """
-    astray = mission.target(tick, brief.nominal) - position
-    return mission.velocity(tick, brief.nominal, brief.dt) + gain * astray
+    led: Array = _piloted(mission.theta, mission.offset, tick, brief.nominal, position, brief.dt, gain)
+    return led
+
+
+@kernel("(t,D,D),(t,D),(),(D),(D),(),()->(D)", "ddldddd->d")
+def _piloted(D: int) -> Plain:
+    def plain(
+        theta: Array, offset: Array, tick: int, nominal: Array, position: Array, dt: float, gain: float, led: Array
+    ) -> None:
+        for axis in range(D):
+            behind = placed(theta, offset, tick, nominal, axis) - position[axis]
+            led[axis] = travelling(theta, offset, tick, nominal, dt, axis) + gain * behind
+
+    return plain
 
 
 def hold_distances(brief: Brief, gain: float, estimate: Estimate) -> Array:

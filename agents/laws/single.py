@@ -16,10 +16,11 @@ from agents.brief import Brief, Own, Reading
 from agents.estimate import Estimate
 from agents.exchange import Heard
 from agents.laws import heard_late
-from agents.laws.base import Law, Nothing, by_degree, stress_force, weighted
+from agents.laws.base import Law, Nothing, stress_force
 from agents.swarm import SwarmBrief
 from agents.wants import Wants
-from analysis.models.arrays import Array
+from analysis.kernels.kernel import Plain, kernel
+from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 from analysis.models.unsuited import Unsuited
 
@@ -180,8 +181,8 @@ class VaryingVelocity(Law[LastHeard]):
         """Move as the neighbours do, and fall toward the formation."""
         heard = np.where(inputs.fresh[..., None], inputs.fields["velocity"], state.velocity)
         theirs = self._neighbours_velocity(brief, tick, own, estimate, heard)
-        law = by_degree(weighted(brief.stress, theirs) - self.alpha * stress_force(brief, estimate), brief.degree)
-        return LastHeard(heard), (1.0 - self.relaxation) * own.input + self.relaxation * law
+        edges = (brief.stress, estimate.known, estimate.relative, theirs)
+        return LastHeard(heard), _moved_on(*edges, brief.degree, own.input, self.alpha, self.relaxation)
 
     def _neighbours_velocity(self, brief: Brief, tick: Reading, own: Own, estimate: Estimate, heard: Array) -> Array:
         if self.source == "communicated":
@@ -219,3 +220,30 @@ class VaryingVelocity(Law[LastHeard]):
             held = held + self.relaxation * (identity - share)
         pull = -self.relaxation * self.alpha * share
         return np.block([[identity + dt * pull, dt * held], [pull, held]])
+
+
+@kernel("(n),(n),(n,D),(n,D),(),(D),(),()->(D)", "d?dddddd->d")
+def _moved_on(D: int) -> Plain:
+    """(1 - eta) u_before + eta u_law; who weighs nobody, as leaders, has no law."""
+
+    def plain(
+        stress: Array,
+        known: Mask,
+        relative: Array,
+        theirs: Array,
+        degree: float,
+        before: Array,
+        alpha: float,
+        relaxation: float,
+        moved_on: Array,
+    ) -> None:
+        for axis in range(D):
+            velocity, force = 0.0, 0.0
+            for edge in range(len(known)):
+                velocity += stress[edge] * theirs[edge, axis]
+                if known[edge]:
+                    force += stress[edge] * relative[edge, axis]
+            law = 0.0 if degree == 0.0 else (velocity - alpha * force) / degree
+            moved_on[axis] = (1.0 - relaxation) * before[axis] + relaxation * law
+
+    return plain

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import prod
+from types import MappingProxyType
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from agents.estimate import Estimate
 from agents.exchange import Channels, Field, Fields
 from netem.core import channels
+from netem.loading.given import protect
 from netem.loading.returned import BOOL, FLOAT, Shape, WrongReturn, array, is_array, kind, shown, written
 
 _NUMBERS = "biuf"
@@ -74,16 +76,32 @@ def fresh(given: Any, batch: Shape, name: str = "the state") -> None:
         raise WrongReturn(f"{name} must be {what} that begins with the batch axes, got {shown(given, batch)}")
 
 
-def state(before: Any, given: Any, batch: Shape, name: str = "the state") -> None:
-    """Refuse a state that has not the form of the state before it."""
+def state(before: Any, given: Any, batch: Shape) -> None:
+    """Refuse a state that has not the form of the state before it; nobody can write to one that has, from now on."""
+    if not _kept(before, given):
+        _refuse(before, given, batch, "the state")
+
+
+def _kept(before: Any, given: Any) -> bool:
+    if given is before:
+        return True
     if isinstance(before, tuple):
-        if type(given) is not type(before):
-            raise WrongReturn(f"{name} must be a {type(before).__name__}, as before, got {shown(given, batch)}")
-        for field, old, new in zip(before._fields, before, given, strict=True):  # type: ignore[attr-defined]
-            if new is not old:
-                state(old, new, batch, field if name == "the state" else f"{name}.{field}")
-    elif not is_array(given) or given.shape != before.shape or given.dtype != before.dtype:
+        return type(given) is type(before) and all(map(_kept, before, given))
+    if not is_array(given) or given.shape != before.shape or given.dtype != before.dtype:
+        return False
+    protect(given)
+    return True
+
+
+def _refuse(before: Any, given: Any, batch: Shape, name: str) -> NoReturn:
+    """What of the state it is that has another form."""
+    if not isinstance(before, tuple):
         raise WrongReturn(f"{name} must stay what it was, {shown(before, batch)}, got {shown(given, batch)}")
+    if type(given) is not type(before):
+        raise WrongReturn(f"{name} must be a {type(before).__name__}, as before, got {shown(given, batch)}")
+    parts = zip(before._fields, before, given, strict=True)  # type: ignore[attr-defined]
+    field, old, new = next(part for part in parts if not _kept(*part[1:]))
+    _refuse(old, new, batch, field if name == "the state" else f"{name}.{field}")
 
 
 def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
@@ -97,13 +115,14 @@ def said(wanted: Channels, given: Any, batch: Shape) -> Mapping[str, Fields]:
         if not isinstance(told, Mapping) or told.keys() != fields.keys():
             _differ(f"what to broadcast on {channel!r}", "fields", fields, told)
         for name, field in fields.items():
-            axes = ", ".join(map(str, field.shape))
-            array(f"{channel}.{name}", told[name], axes, field.shape, batch, BOOL if _is_truth(field) else FLOAT)
+            value, dtype = told[name], BOOL if _is_truth(field) else FLOAT
+            if type(value) is not np.ndarray or value.shape != batch + field.shape or value.dtype != dtype:
+                array(f"{channel}.{name}", value, ", ".join(map(str, field.shape)), field.shape, batch, dtype)
     return given
 
 
 def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapping[str, Shape] | None) -> Estimate:
-    """An estimate of n slots in D dimensions, if it is one, and its reports have the shapes (..., *) that are known of them."""
+    """An estimate of n slots, if it is one and its reports have the shapes known of them; nobody writes to it from now on."""
     if not isinstance(given, Estimate):
         raise WrongReturn(f"must return an Estimate, got {kind(given)}")
     edges = (slots, dimension)
@@ -116,7 +135,8 @@ def estimate(given: Any, slots: int, dimension: int, batch: Shape, reports: Mapp
     if given.feasible is not None:
         array("feasible", given.feasible, "", (), batch, BOOL)
     _reports(given.reports, batch, reports)
-    return given
+    protect(given)
+    return given if type(given.reports) is MappingProxyType else given._replace(reports=MappingProxyType(given.reports))
 
 
 def _reports(given: Any, batch: Shape, wanted: Mapping[str, Shape] | None) -> None:

@@ -47,7 +47,7 @@ def flat(says: str, mean_errors: Array, factor: float, unit: str) -> ClaimVerdic
     ]
     largest = max(ratios, key=lambda one: -np.inf if np.isnan(one.found) else one.found)
     found = f"largest over smallest {largest}, allowed {factor:g}: {means} {unit}".rstrip()
-    return ClaimVerdict(says, all_of(one.decide(most=factor) for one in ratios), found)
+    return ClaimVerdict(says, all_of(one.decide(least=0.0, most=factor) for one in ratios), found)
 
 
 def approaches(says: str, mean_errors: Array, others: Array, least: float) -> ClaimVerdict:
@@ -172,7 +172,7 @@ def exponential(says: str, seconds: Array, error: Array, span: Span) -> ClaimVer
     straight = (falls.explained >= _STRAIGHT) & (falls.rate > 0.0)
     those = straight & above & (falls.times >= 1.0)
     open_still = straight & (above | unsure) & ~those
-    nowhere = np.isnan(error[:, inside]).any(axis=1)
+    nowhere = np.isnan(error[:, inside]).any(axis=1) | (error[:, inside] == 0.0).any(axis=1)  # 0 has no logarithm
     rate = f", by {falls.rate[those].mean():.3g} 1/s" if those.any() else ""
     do = f"fall along a line (R² at least {_STRAIGHT:g}), to 1/e at least, by no power law below order {_HIGHEST_ORDER:g}{rate}"
     return _of_most(says, those, open_still | nowhere, do)
@@ -204,9 +204,10 @@ def below_in_mean(says: str, seconds: Array, values: Array, bound: Array, define
         Where there is a value at all, shape (R, T, N): the mean is over these; two runs at a moment are the fewest.
     """
     number = defined.sum(axis=0)
-    excess = np.where(defined, values - bound, 0.0)
-    mean = excess.sum(axis=0) / np.maximum(number, 1)
-    variance = np.where(defined, whole_power(excess - mean, 2), 0.0).sum(axis=0) / np.maximum(number - 1, 1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        excess = np.where(defined, values - bound, 0.0)
+        mean = excess.sum(axis=0) / np.maximum(number, 1)
+        variance = np.where(defined, whole_power(excess - mean, 2), 0.0).sum(axis=0) / np.maximum(number - 1, 1)
     error = np.where(number > 1, np.sqrt(variance / np.maximum(number, 1)), 1.0)
     reach = intervals.student(number, mean.size) * error
     above = np.argwhere(mean - reach > 0.0)

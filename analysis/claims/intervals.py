@@ -99,6 +99,8 @@ def ratio(values: Array, others: Array, *, paired: bool, tests: int = 1) -> Inte
         How many intervals are to hold at once (Bonferroni).
     """
     both = _Both.of(values, others, paired=paired, tests=tests)
+    if both.other == both.other_variance == 0.0:
+        return _over_nothing(mean(values, tests))
     found = both.mean / both.other if both.other and np.isfinite(both.other) else np.nan
     if not np.isfinite(found) or both.quantile == np.inf:
         return _unsure(found)
@@ -110,6 +112,13 @@ def ratio(values: Array, others: Array, *, paired: bool, tests: int = 1) -> Inte
     under = middle * middle - (both.mean * both.mean - square * both.variance) * divisor
     reach = np.sqrt(max(under, 0.0))
     return Interval(found, (middle - reach) / divisor, (middle + reach) / divisor)
+
+
+def _over_nothing(one: Interval) -> Interval:
+    """What a number is over one that is 0 in all runs: infinite, if it is not 0 itself."""
+    if one.low > 0.0 or one.high < 0.0:
+        return _unsure(float(np.copysign(np.inf, one.found)))
+    return _unsure(np.nan)
 
 
 def student(runs: Integers, tests: int) -> Array:

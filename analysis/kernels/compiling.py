@@ -16,12 +16,13 @@ import numba.np.arrayobj
 import numpy as np
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import NumbaTypeError
 from numba.extending import intrinsic
 
 from analysis.kernels.kernel import Kernel, Part, scratch
 from analysis.kernels.machine_code import ENTRY
 
-_ROOM = 81  # numbers
+_MOST_ROOM = 4096  # numbers, which any thread's stack has
 _HOW: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 # Compiled functions of Numba's are called with room for a result and for an error; here there is neither.
@@ -87,7 +88,7 @@ def loop(arguments, sizes, strides, unused):
     return known["loop"]
 
 
-_KINDS = {"d": "np.float64", "?": "np.bool_", "l": "np.int64", "L": "np.uint64"}
+_KINDS = {"d": "np.float64", "?": "np.bool_", "l": "np.int64", "L": "np.uint64", "B": "np.uint8"}
 
 
 def _bound(plain: Any) -> FunctionType:
@@ -122,20 +123,25 @@ def _forget(_: Any) -> Any:
     return types.void(), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]
 def _room(_: Any, rows: Any, columns: Any) -> Any:
     """On the stack of the kernel: memory of its own would take as long as the work of a small one."""
+    if not (isinstance(rows, types.IntegerLiteral) and isinstance(columns, types.IntegerLiteral)):
+        raise NumbaTypeError("scratch takes sizes that are constants of the kernel: axes in capitals, or numbers")
+    shape = rows.literal_value, columns.literal_value
+    if shape[0] * shape[1] > _MOST_ROOM:
+        raise NumbaTypeError(f"scratch has room for {_MOST_ROOM} numbers, and not for {shape[0]} x {shape[1]}")
     array = types.Array(types.float64, 2, "C")
 
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        shape = [context.cast(builder, *one, types.intp) for one in zip(given, signature.args, strict=True)]
+    def generate(context: Any, builder: Any, *_: Any) -> Any:
+        constants = [context.get_constant(types.intp, size) for size in shape]
         width = context.get_constant(types.intp, 8)
         room = context.make_array(array)(context, builder)
         numba.np.arrayobj.populate_array(
             room,
-            data=cgutils.alloca_once(builder, context.get_value_type(types.float64), size=_ROOM),
-            shape=shape,
-            strides=[builder.mul(shape[1], width), width],
+            data=cgutils.alloca_once(builder, context.get_value_type(types.float64), size=max(1, shape[0] * shape[1])),
+            shape=constants,
+            strides=[builder.mul(constants[1], width), width],
             itemsize=width,
             meminfo=None,
         )

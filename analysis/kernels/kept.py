@@ -6,19 +6,22 @@ the compiler, and the CPU.
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import tempfile
 import warnings
 from collections.abc import Callable
+from dis import get_instructions
 from functools import cache
 from hashlib import blake2b
 from importlib.metadata import version
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import CodeType, FunctionType
 from typing import Any
 
 import llvmlite.binding as llvm
+import numpy as np
 
 from analysis.kernels.kernel import Kernel, Part
 from analysis.kernels.machine_code import loaded
@@ -110,8 +113,7 @@ def _digest(kernel: Kernel, sizes: tuple[int, ...]) -> str:
 @cache
 def _compiler() -> tuple[str, ...]:
     return (
-        version("numba"),
-        version("llvmlite"),
+        *map(version, ("numba", "llvmlite", "numpy")),
         sys.version,
         llvm.get_host_cpu_name(),
         llvm.get_host_cpu_features().flatten(),
@@ -119,11 +121,27 @@ def _compiler() -> tuple[str, ...]:
 
 
 def written(plain: Any) -> list[Any]:
-    """All that decides what a plain function does: its code, and what it finds about it by name."""
+    """All that decides what a plain function does: its code, and what it finds about it by name.
+
+    Raises
+    ------
+    TypeError
+        When it holds what may change without anybody noticing here, or what compiled code cannot do.
+    """
     code, known = plain.__code__, plain.__globals__
+    if plain.__defaults__ or plain.__kwdefaults__:
+        raise TypeError(f"a kernel has no defaults: {plain.__qualname__} has")
+    if any(step.opname == "RAISE_VARARGS" for step in get_instructions(code)):
+        raise TypeError(f"a kernel raises nothing, as nobody would hear of it: {plain.__qualname__} does")
     closure = [cell.cell_contents for cell in plain.__closure__ or ()]
     of_names = [_written(known[name]) for name in code.co_names if name in known]
-    return [code.co_code, code.co_consts, code.co_names, [_written(held) for held in closure], of_names]
+    constants = [_code(one) if isinstance(one, CodeType) else one for one in code.co_consts]
+    return [code.co_code, constants, code.co_names, [_written(held) for held in closure], of_names]
+
+
+def _code(code: CodeType) -> list[Any]:
+    """Of a function within it, whatever address it has."""
+    return [code.co_code, [_code(one) if isinstance(one, CodeType) else one for one in code.co_consts], code.co_names]
 
 
 def _written(held: Any) -> Any:
@@ -131,4 +149,12 @@ def _written(held: Any) -> Any:
         return written(held.plain)
     if isinstance(held, FunctionType):
         raise TypeError(f"a kernel calls {held.__qualname__}, which is no Part: only parts are compiled with it")
-    return held.__name__ if isinstance(held, ModuleType) else held
+    if held is np or held is math:
+        return held.__name__  # whose version is known
+    if isinstance(held, np.ndarray):
+        return [held.dtype.str, held.shape, held.tobytes()]
+    if isinstance(held, tuple):
+        return [_written(one) for one in held]
+    if isinstance(held, (bool, int, float, np.generic)):
+        return [type(held).__name__, held]
+    raise TypeError(f"a kernel holds {held!r}: give it numbers, arrays of them, and parts")

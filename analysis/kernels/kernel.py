@@ -35,7 +35,7 @@ class Part:
 
 @Part
 def scratch(rows: int, columns: int) -> Any:
-    """Room for at most 81 numbers that a kernel needs while it works, shape (rows, columns), with anything in it."""
+    """Room for numbers that a kernel needs while it works, shape (rows, columns), with anything in it; sizes are constants."""
     return np.empty((rows, columns))
 
 
@@ -51,7 +51,8 @@ class Kernel:
         The core axes of arguments and results, as those of NumPy's generalised universal functions: "(n,D),(n)->(D,D)". It is
         compiled for each size of the axes in capitals, `sizes`.
     types
-        Their types, by NumPy's letters: "d" float64, "?" bool, "l" int64, "L" uint64; "d?->d".
+        Their types, by NumPy's letters: "d" float64, "?" bool, "l" int64, "L" uint64, "B" uint8;
+        "d?->d".
     """
 
     def __init__(self, factory: Factory, layout: str, types: str) -> None:
@@ -70,6 +71,8 @@ class Kernel:
 
     def __call__(self, *given: Any) -> Any:
         """What comes of arrays, their leading axes broadcast against each other: an array, or as many as there are results."""
+        if len(given) != self.arguments:
+            raise TypeError(f"{self.name} takes {self.arguments} arrays, not {len(given)}")
         for axes, array in zip(self._axes, given, strict=True):
             if axes and not array.flags.c_contiguous:
                 given = tuple(map(_compact, given, self._axes))

@@ -37,7 +37,9 @@ def of_errors(estimate: Array, true: Array, covariance: Array, known: Mask) -> N
     known
         Which edges are estimated, shape (..., N, n).
     """
-    return _averaged(nees(np.where(known[..., None], estimate - true, 0.0), covariance), known)
+    normalised = np.zeros(known.shape)
+    normalised[known] = nees((estimate - true)[known], covariance[known])  # LAPACK is not asked of padding
+    return _averaged(normalised, known)
 
 
 def of_innovations(nis: Array, seen: Mask) -> Normalised:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from analysis.kernels.kernel import Plain, kernel
@@ -75,20 +78,78 @@ def procrustes_error(position: Array, nominal: Array, present: Mask) -> Array:
     return np.where(finite, np.sqrt(squared) / number, np.nan)
 
 
-def change_of_step(position: Array, present: Mask) -> Array:
-    """How much the last step of agents differs from the one before, root mean square over those present, shape (...), in m.
-
-    It is what makes a path rough: along a smooth one it goes with the square of the tick.
+class TickFlown(NamedTuple):
+    """What is followed of a swarm tick by tick, shape (...) each.
 
     Parameters
     ----------
-    position
-        In three ticks in a row, shape (..., 3, N, D), in metres.
+    error
+        Tracking error (15), in square metres; infinite where somebody present has left the numbers, NaN where nobody is.
+    change
+        Mean square over those present of how much their last step differs from the one before, in square metres: it is what
+        makes a path rough, and goes with the fourth power of the tick along a smooth one.
+    longest
+        The longest input of any agent, NaN where one is no number.
+    """
+
+    error: Array
+    change: Array
+    longest: Array
+
+
+def tick_flown(path: Sequence[Array], target: Array, steered: Array, present: Mask) -> TickFlown:
+    """How swarms have flown a tick.
+
+    Parameters
+    ----------
+    path
+        Where the agents were two ticks ago, in the tick before, and are now, shape (..., N, D) each, in metres.
+    target
+        Where they should be, shape (..., N, D), in metres.
+    steered
+        Their inputs, shape (..., N, D).
     present
         Agents that take part, shape (..., N).
     """
-    last, step = position[..., 2, :, :], position[..., 1, :, :] - position[..., 0, :, :]
-    return np.sqrt(tracking_error(last - position[..., 1, :, :], step, present))
+    return TickFlown(*_tick_flown(*path, target, steered, present))
+
+
+@kernel("(n,D),(n,D),(n,D),(n,D),(n,D),(n)->(),(),()", "ddddd?->ddd")
+def _tick_flown(D: int) -> Plain:
+    def plain(
+        earlier: Array,
+        before: Array,
+        position: Array,
+        target: Array,
+        steered: Array,
+        present: Mask,
+        error: Array,
+        change: Array,
+        longest: Array,
+    ) -> None:
+        number, lost, total, changed, most = 0, False, 0.0, 0.0, 0.0
+        for agent in range(len(present)):
+            squared = 0.0
+            for axis in range(D):
+                squared += steered[agent, axis] * steered[agent, axis]
+            if not squared <= most and most == most:  # what is no number stays
+                most = squared
+            if present[agent]:
+                number += 1
+                for axis in range(D):
+                    here = position[agent, axis]
+                    astray = here - target[agent, axis]
+                    total += astray * astray
+                    turned = (here - before[agent, axis]) - (before[agent, axis] - earlier[agent, axis])
+                    changed += turned * turned
+                    if here - here != 0.0:
+                        lost = True
+        root = np.sqrt(changed / number) if number else np.nan
+        error[0] = np.inf if lost else (total / number if number else np.nan)
+        change[0] = root * root
+        longest[0] = np.sqrt(most)
+
+    return plain
 
 
 def rate_of_fall(seconds: Array, error: Array) -> Array:

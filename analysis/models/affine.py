@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.kernels.kernel import Plain, kernel
+from analysis.kernels.kernel import Part, Plain, kernel
 from analysis.models.arrays import Array, Integers
 
 
@@ -35,23 +35,54 @@ class Manoeuvre:
 
     def velocity(self, tick: int | Integers, nominal: Array, dt: float) -> Array:
         """Mean target velocity from this tick to the next, shape (..., D), in metres per second."""
-        travelled: Array = self.target(tick + 1, nominal) - self.target(tick, nominal)
-        return travelled / dt
+        velocity: Array = _velocities(self.theta, self.offset, np.asarray(tick), nominal, dt)
+        return velocity
 
     def acceleration(self, tick: int | Integers, nominal: Array, dt: float) -> Array:
         """Second difference of the target about this tick, shape (..., D), in metres per second squared."""
-        gained: Array = self.velocity(tick, nominal, dt) - self.velocity(np.asarray(tick) - 1, nominal, dt)
-        return gained / dt
+        acceleration: Array = _accelerations(self.theta, self.offset, np.asarray(tick), nominal, dt)
+        return acceleration
+
+
+@Part
+def placed(theta: Array, offset: Array, tick: int, nominal: Array, axis: int) -> float:
+    """A coordinate of the target in a tick of an agent at a nominal position (D,) (paper 000, eq. 3)."""
+    reached, turned = min(max(tick, 0), len(theta) - 1), 0.0
+    for other in range(len(nominal)):
+        turned += theta[reached, axis, other] * nominal[other]
+    return float(turned + offset[reached, axis])
+
+
+@Part
+def travelling(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, axis: int) -> float:
+    """A coordinate of its mean velocity from this tick to the next, in metres per second."""
+    here = placed(theta, offset, tick, nominal, axis)
+    return (placed(theta, offset, tick + 1, nominal, axis) - here) / dt
 
 
 @kernel("(t,D,D),(t,D),(),(D)->(D)", "ddld->d")
 def _targets(D: int) -> Plain:
     def plain(theta: Array, offset: Array, tick: int, nominal: Array, target: Array) -> None:
-        reached = min(max(tick, 0), len(theta) - 1)
-        for i in range(D):
-            placed = 0.0
-            for j in range(D):
-                placed += theta[reached, i, j] * nominal[j]
-            target[i] = placed + offset[reached, i]
+        for axis in range(D):
+            target[axis] = placed(theta, offset, tick, nominal, axis)
+
+    return plain
+
+
+@kernel("(t,D,D),(t,D),(),(D),()->(D)", "ddldd->d")
+def _velocities(D: int) -> Plain:
+    def plain(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, velocity: Array) -> None:
+        for axis in range(D):
+            velocity[axis] = travelling(theta, offset, tick, nominal, dt, axis)
+
+    return plain
+
+
+@kernel("(t,D,D),(t,D),(),(D),()->(D)", "ddldd->d")
+def _accelerations(D: int) -> Plain:
+    def plain(theta: Array, offset: Array, tick: int, nominal: Array, dt: float, acceleration: Array) -> None:
+        for axis in range(D):
+            before = travelling(theta, offset, tick - 1, nominal, dt, axis)
+            acceleration[axis] = (travelling(theta, offset, tick, nominal, dt, axis) - before) / dt
 
     return plain

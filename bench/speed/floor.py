@@ -1,4 +1,4 @@
-"""One process of a floor: the messages of a tick, and nobody computes (`rounds.py` starts these)."""
+"""One process of a floor: the messages of a tick, and nobody computes (`floors.py` starts these)."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from speed.started import all_of
 
 from affinet.planning.plan import Plan
 from netem.wire import messages
+from netem.wire.arrays import CODE, TRUTH, packed
 from netem.wire.session import HUB, WORLD, agent_name, socket_folder
 
 TRANSPORTS = ("pipes", "ZeroMQ", "Zenoh", "Ray actors")
@@ -57,12 +58,12 @@ def sizes(plan: Plan) -> dict[str, int]:
     agents = plan.world.formation.agents
     degree = round(links / agents)
     heard = round(degree * plan.scenario.network.availability)
-    nothing = np.empty((0, 5), dtype=np.int64)
-    map_ = number(size=(dimension, dimension))
+    nothing = b""
+    map_ = packed(number(size=(dimension, dimension)))
     said: dict[str, dict[str, Any]] = {
-        "input": {"velocity": number(size=dimension)},
-        "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
-        "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
+        "input": {"velocity": packed(number(size=dimension))},
+        "measurement": {"neighbours": [1] * heard, "measured": packed(number(size=(heard, dimension)))},
+        "theta": {"local": map_, "feasible": b"\1", "consensus": map_, "started": b"\1"},
     }
     broadcasts = [
         messages.pack(messages.Broadcast(k=_TICK, src=1, channel=name, seq=_TICK, payload=fields))
@@ -75,8 +76,8 @@ def sizes(plan: Plan) -> dict[str, int]:
                 src=WORLD,
                 seq=_TICK,
                 last=False,
-                measured=number(size=(links, dimension)),
-                position=number(size=(agents, 2)),
+                measured=packed(number(size=(links, dimension))),
+                position=packed(number(size=(agents, 2))),
                 motion=None,
                 sightings=None,
                 fired=[],
@@ -89,7 +90,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 seq=_TICK,
                 clock=_TICK,
                 neighbours=[1] * heard,
-                measured=number(size=(heard, 2)),
+                measured=packed(number(size=(heard, 2))),
                 position=None,
                 motion=None,
                 sighting=None,
@@ -101,10 +102,10 @@ def sizes(plan: Plan) -> dict[str, int]:
                 k=_TICK,
                 src=1,
                 seq=_TICK,
-                input=number(size=dimension),
-                estimate=number(size=(degree, dimension)),
-                known=np.ones(degree, dtype=bool),
-                covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
+                input=packed(number(size=dimension)),
+                estimate=packed(number(size=(degree, dimension))),
+                known=packed(np.ones(degree), TRUTH),
+                covariance=packed(number(size=(degree, dimension * (dimension + 1) // 2))),
                 psi=0.1,
                 feasible=True,
                 reports={},
@@ -116,7 +117,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 k=_TICK,
                 src=HUB,
                 seq=_TICK,
-                verdicts=np.ones((4, links), np.uint8),
+                verdicts=packed(np.ones((4, links)), CODE),
                 odd=nothing,
                 apart=nothing,
                 late=0,

@@ -137,7 +137,7 @@ class Zenoh:
         from netem.wire.session import Login, client, hub
 
         self._keys, given = Keys("floor"), Login(*login)
-        config = hub(given, users, self._keys, range(1, agents + 1)) if routes else client(given)
+        config = hub(given, users, self._keys, range(1, agents + 1), {}) if routes else client(given)
         self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         self._fifo, self._publishers = zenoh.handlers.FifoChannel, list[Any]()
 

@@ -95,22 +95,22 @@ class Conditions:
         """Faults by which agents lie."""
         return tuple(one.fault for one in self.under(Verb.LIE))
 
-    @property
+    @cached_property
     def absent(self) -> Mask:
         """Agents that take no part: dead or departed, shape (N,)."""
         return self.dead | self.departed
 
-    @property
+    @cached_property
     def idle(self) -> Mask:
         """Agents whose processes neither hear nor speak, shape (N,)."""
         return self.dead | self.paused
 
-    @property
+    @cached_property
     def still(self) -> Mask:
         """Agents whose bodies hold where they are, shape (N,)."""
         return self.absent & ~self.coasting
 
-    @property
+    @cached_property
     def coasting(self) -> Mask:
         """Agents whose bodies fly on with the input they had, shape (N,)."""
         return ((self.paused & ~self.departed) | self.drifting) & ~self.dead
@@ -212,10 +212,10 @@ class Timeline:
     def clock(self, tick: int) -> Integers:
         """What each agent's clock says in this tick, in ticks, shape (N,)."""
         reading = np.full(self.links.agents, tick)
-        for number in self._in_force[bisect_right(self._boundaries, tick) - 1]:
-            if (fault := self.faults[number]).verb is Verb.CLOCK:
-                reading += self._agent_masks[number] * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
-        return np.maximum(reading, 0)
+        wrong = self.at(tick).under(Verb.CLOCK)
+        for fault, _, agents in wrong:
+            reading += agents * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
+        return np.maximum(reading, 0) if wrong else reading
 
     def held(self, fault: int) -> Mask:
         """Links on which fault number `fault` acts, shape (L,)."""

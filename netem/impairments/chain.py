@@ -13,13 +13,12 @@ from functools import cached_property, reduce
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Integers, Mask
 
 # Probabilities that a user writes add up to 1 within this.
 ROUNDING = 1e-9
-# Up to so many, all steps are computed from all states at once; beyond, from the state that is.
-_FEW_STATES = 4
 
 
 @dataclass(frozen=True)
@@ -176,6 +175,16 @@ class ChainLayer:
             loss[row, :own], extra_delay[row, :own] = chain.loss, chain.extra_delay
         return cls(lane, cumulative, start, loss, extra_delay, by_packet, sensing, comms)
 
+    @cached_property
+    def moves(self) -> bool:
+        """Whether any link has more than one state."""
+        return self.loss.shape[-1] > 1
+
+    @cached_property
+    def delays(self) -> bool:
+        """Whether a state of any link makes messages late."""
+        return bool(self.extra_delay.any())
+
     def begin(self, draw: Array) -> Integers:
         """States before the first step, for uniform draws (..., L)."""
         return _pick(self.start, draw)
@@ -190,30 +199,18 @@ class ChainLayer:
         draws
             Uniform, shape (T, ..., L).
         """
-        states = np.empty(draws.shape, dtype=np.int64)
-        if self.cumulative.shape[-1] == 1:
-            states[:] = state
-            return states, state
-        links = np.arange(state.shape[-1])
-        if self.cumulative.shape[-1] > _FEW_STATES:
-            for row, draw in enumerate(draws):
-                states[row] = state
-                state = _pick(self.cumulative[links, state], draw)
-            return states, state
-        following = _pick(self.cumulative, draws[..., None])  # from whichever state it is in, (T, ..., L, S)
-        for row, leads_to in enumerate(following):
-            states[row] = state
-            state = np.take_along_axis(leads_to, state[..., None], axis=-1)[..., 0]
-        return states, state
+        steps = len(draws)
+        walked, after = _walked(draws.reshape(steps, -1), state.reshape(-1), self.cumulative)
+        return walked.reshape(steps, *state.shape), after.reshape(state.shape)
 
     def lost(self, state: Integers, draw: Array) -> Mask:
         """True where a message is lost in these states, for uniform draws (..., L)."""
-        decided: Mask = draw < self.loss[np.arange(state.shape[-1]), state]
+        decided: Mask = _lost(state, draw, self.loss)
         return decided
 
     def adds(self, state: Integers) -> Array:
         """Extra delay in these states, in seconds, shape (..., L)."""
-        seconds: Array = self.extra_delay[np.arange(state.shape[-1]), state]
+        seconds: Array = _of_state(state, self.extra_delay)
         return seconds
 
 
@@ -226,3 +223,40 @@ def _summed(probabilities: Array) -> Array:
 def _pick(cumulative: Array, draw: Array) -> Integers:
     chosen: Integers = (draw[..., None] >= cumulative).sum(axis=-1)
     return chosen
+
+
+@kernel("(t,n),(n),(l,s,s)->(t,n),(n)", "dld->ll")
+def _walked() -> Plain:
+    def plain(draws: Array, state: Integers, cumulative: Array, states: Integers, after: Integers) -> None:
+        links, last = len(cumulative), cumulative.shape[1] - 1  # which is what is left over
+        for place in range(len(state)):
+            after[place] = state[place]
+        for step in range(len(draws)):
+            for first in range(0, len(state), links):
+                for link in range(links):
+                    place = first + link
+                    now, following = after[place], 0
+                    for chosen in range(last):
+                        if draws[step, place] >= cumulative[link, now, chosen]:
+                            following += 1
+                    states[step, place], after[place] = now, following
+
+    return plain
+
+
+@kernel("(l),(l),(l,s)->(l)", "ldd->?")
+def _lost() -> Plain:
+    def plain(state: Integers, draw: Array, loss: Array, lost: Mask) -> None:
+        for link in range(len(state)):
+            lost[link] = draw[link] < loss[link, state[link]]
+
+    return plain
+
+
+@kernel("(l),(l,s)->(l)", "ld->d")
+def _of_state() -> Plain:
+    def plain(state: Integers, values: Array, held: Array) -> None:
+        for link in range(len(state)):
+            held[link] = values[link, state[link]]
+
+    return plain

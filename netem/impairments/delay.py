@@ -13,6 +13,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import exp, log, power, whole_power
 
@@ -103,9 +104,27 @@ class MessageDelay:
         return 1.0 + float(np.sqrt(1.0 + whole_power(self.mean / self.jitter, 2)))
 
 
-def ticks(seconds: Array, dt: float) -> Integers:
-    """Whole ticks until the first exchange at or after the delay."""
-    return np.ceil(np.minimum(seconds / dt - _SLACK, _NEVER)).astype(np.int64)
+def ticks(seconds: Array, dt: float, least: int = 0) -> Integers:
+    """Whole ticks until the first exchange at or after each delay, and no less than the least."""
+    whole: Integers = _ticks(seconds, dt, least)
+    return whole
+
+
+@kernel("(),(),()->()", "ddl->l")
+def _ticks() -> Plain:
+    def plain(seconds: float, dt: float, least: int, whole: Integers) -> None:
+        ahead = seconds / dt - _SLACK
+        if ahead <= 0.0:
+            whole[0] = 0
+        elif not ahead < _NEVER:
+            whole[0] = int(_NEVER)
+        else:
+            whole[0] = int(ahead)
+            if whole[0] < ahead:
+                whole[0] += 1
+        whole[0] = max(whole[0], least)
+
+    return plain
 
 
 def correlated(before: Array, fresh: Array, correlation: float) -> Array:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Mask
 
 
@@ -52,13 +53,7 @@ class Rate:
         offered
             Shape (C, L).
         """
-        sizes = bits[:, None] * offered
-        owed, overflow = np.empty_like(sizes), np.empty_like(offered)
-        for row, size in enumerate(sizes):
-            after = debt + size
-            refused = np.greater(after, self.queue, out=overflow[row])
-            owed[row] = debt = np.where(refused, debt, after)
-        return Admission(debt, overflow & offered, np.maximum(owed, 0.0) / self.rate)
+        return Admission(*_admitted(debt, bits, offered, self.queue, self.rate))
 
 
 class Admission(NamedTuple):
@@ -67,3 +62,21 @@ class Admission(NamedTuple):
     debt: Array
     overflow: Mask
     wait: Array
+
+
+@kernel("(l),(c),(c,l),(l),(l)->(l),(c,l),(c,l)", "dd?dd->d?d")
+def _admitted() -> Plain:
+    def plain(
+        debt: Array, bits: Array, offered: Mask, queue: Array, rate: Array, owed: Array, overflow: Mask, wait: Array
+    ) -> None:
+        for link in range(len(debt)):
+            owed[link] = debt[link]
+            for channel in range(len(bits)):
+                after = owed[link] + bits[channel] if offered[channel, link] else owed[link]
+                refused = after > queue[link]
+                overflow[channel, link] = refused and offered[channel, link]
+                if not refused:
+                    owed[link] = after
+                wait[channel, link] = (owed[link] if owed[link] > 0.0 else 0.0) / rate[link]
+
+    return plain

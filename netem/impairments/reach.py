@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.elementary import power
 
@@ -74,6 +75,17 @@ class Reach:
 
 def squared_distances(src: Integers, dst: Integers, position: Array) -> Array:
     """Squared length of links between rows `src` and `dst` (L,) of positions (..., N, D), in square metres, shape (..., L)."""
-    apart = position[..., src, :] - position[..., dst, :]
-    squared: Array = (apart * apart).sum(axis=-1)
+    squared: Array = _squared(src, dst, position)
     return squared
+
+
+@kernel("(l),(l),(n,D)->(l)", "lld->d")
+def _squared(dimension: int) -> Plain:
+    def plain(src: Integers, dst: Integers, position: Array, squared: Array) -> None:
+        for link in range(len(src)):
+            squared[link] = 0.0
+            for axis in range(dimension):
+                apart = position[src[link], axis] - position[dst[link], axis]
+                squared[link] += apart * apart
+
+    return plain

@@ -1,4 +1,7 @@
-"""What is given to a user's own code: arrays that it can read and not write, since others hold the same ones."""
+"""What is given to a user's own code: arrays that it can read and not write, since others hold the same ones.
+
+What is made for it alone, or by it, is protected where it is; what others still write to is given as a view.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +30,14 @@ def readonly(given: Any) -> Any:
 def protect(given: Any) -> None:
     """Make the arrays in a value that lasts, in its fields and theirs, such that nobody can write to them."""
     if isinstance(given, np.ndarray):
-        given.flags.writeable = False
-    elif is_dataclass(given) and not isinstance(given, type):
-        for field in fields(given):
-            protect(getattr(given, field.name))
+        if given.flags.writeable:  # asking costs less than telling
+            given.setflags(write=False)
     elif isinstance(given, tuple):
         for part in given:
             protect(part)
+    elif isinstance(given, Mapping):
+        for part in given.values():
+            protect(part)
+    elif is_dataclass(given) and not isinstance(given, type):
+        for field in fields(given):
+            protect(getattr(given, field.name))

@@ -6,9 +6,10 @@ from tick to tick whether or not a message is sent.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from analysis.models.arrays import Array, Integers, Mask
@@ -19,8 +20,11 @@ from netem.impairments.chain import ChainLayer
 from netem.impairments.corrupt import Marks
 from netem.impairments.profile import Profile
 from netem.impairments.reach import Reach, ReachLaw
+from netem.medium.verdict import PASSED, Verdict, VerdictCodes, also_held
 
 _SPAN = 64
+
+_CLOSED, _LOST = np.uint8(Verdict.CLOSED), np.uint8(Verdict.LOST)
 
 
 class TickImpairments(NamedTuple):
@@ -28,22 +32,23 @@ class TickImpairments(NamedTuple):
 
     Parameters
     ----------
-    closed, lost
-        Links whose turn it is not, and losses, shape (C, L), or (1, L) where all channels are alike.
+    held
+        What holds a message: CLOSED where it is not the link's turn, LOST, or PASSED, shape (C, L), or (1, L) where all
+        channels are alike.
     delay_s, delay_ticks
-        What a message waits in the air, shape (C, L), in seconds and, no less than the least delay, in ticks.
+        What a message waits in the air if it is no measurement, in seconds and, no less than the least delay, in ticks, shape
+        (C', L), or (1, L) where nothing waits.
     copied, copy_delay_s
-        Messages that arrive twice, and what their copies wait, in seconds, shape (C, L).
+        Messages that arrive twice if they are no measurements, and what their copies wait, in seconds, likewise.
     mark
-        Corruption, shape (C, L).
+        Corruption of what is no measurement, likewise.
     squared_limit
         Square of the distance up to which a message passes, in square metres, shape (C, L) or (1, L); infinite without.
     jams
         Whether each jammer is on, shape (zones,).
     """
 
-    closed: Mask
-    lost: Mask
+    held: VerdictCodes
     delay_s: Array
     delay_ticks: Integers
     copied: Mask
@@ -72,6 +77,8 @@ class ImpairmentsByTick:
         self._seed, self._links, self._profile = links.seeds(seed), links, profile
         self._codes = codes
         self._sensing, self._comms = sensing, ~sensing[:, None]
+        self._still = _still(len(links), profile.least_delay)
+        self._loss_lanes = max((2 * layer.lane + 1 + layer.moves for layer in profile.chains), default=0)
         self._rows: TickImpairments
         self._rewind()
 
@@ -97,43 +104,45 @@ class ImpairmentsByTick:
         return 1 + max((layer.lane for layer in self._profile.chains), default=-1)
 
     def _next(self, ticks: Integers) -> TickImpairments:
-        profile, shape = self._profile, (len(ticks), len(self._codes), len(self._links))
-        lost, extra_s = self._chains(ticks)
+        profile = self._profile
+        held, extra_s = self._chains(ticks)
         for trace_lost, on in self._traces(ticks):
-            lost = lost | (trace_lost & on)
-        delay_s = extra_s + self._delays(ticks)
-        copied, copy_s = self._copies(ticks, shape)
-        mark = np.zeros(shape, dtype=np.uint8)
-        if profile.corrupt.any():
-            mark = corrupt.marks(profile.corrupt, self.draw(Purpose.CORRUPTION, ticks, 1)[..., 0])
-        jam_draws = self._jam_draws(ticks)
+            held = also_held(held, trace_lost & on, _LOST)
+        for schedule in profile.schedules:
+            closed = schedule.closed(ticks)[:, None] & self.on(schedule.sensing, schedule.comms)
+            held = also_held(held, closed, _CLOSED)
+        delay_s = self._delays(ticks, extra_s)
+        copied, copy_s = self._copies(ticks, extra_s)
         return TickImpairments(
-            closed=self._closed(ticks),
-            lost=lost,
-            delay_s=np.where(self._comms, delay_s, 0.0),
+            held=held,
+            delay_s=delay_s,
             delay_ticks=self._ticks(delay_s),
-            copied=copied & self._comms,
-            copy_delay_s=np.where(self._comms, copy_s + extra_s, 0.0),
-            mark=np.where(self._comms, mark, np.uint8(0)),
+            copied=copied,
+            copy_delay_s=copy_s,
+            mark=self._marks(ticks),
             squared_limit=self._squared_limits(ticks),
-            jams=jam_draws < np.array([zone.share for zone in profile.zones]),
+            jams=self._jams(ticks),
         )
 
-    def _jam_draws(self, ticks: Integers) -> Array:
-        zones = len(self._profile.zones)
-        return uniform(self._seed, Purpose.JAMMING, tick=ticks, lanes=zones) if zones else np.empty((len(ticks), 0))
+    def _jams(self, ticks: Integers) -> Mask:
+        shares = np.array([zone.share for zone in self._profile.zones])
+        if not len(shares):
+            return self._still.jams
+        jams: Mask = uniform(self._seed, Purpose.JAMMING, tick=ticks, lanes=len(shares)) < shares
+        return jams
 
-    def _chains(self, ticks: Integers) -> tuple[Mask, Array]:
-        layers = self._profile.chains
-        lost = np.zeros((len(ticks), 1, len(self._links)), dtype=bool)
-        extra = np.zeros((len(ticks), len(self._codes), len(self._links)))
-        draws = self.draw(Purpose.LOSS, ticks, 2 * self._lanes)
-        for n, layer in enumerate(layers):
+    def _chains(self, ticks: Integers) -> tuple[VerdictCodes, Array]:
+        held, extra_s = self._still.held, self._still.delay_s
+        draws = self.draw(Purpose.LOSS, ticks, self._loss_lanes)
+        for n, layer in enumerate(self._profile.chains):
             by_time, on = ~layer.by_packet, self.on(layer.sensing, layer.comms)
-            states, self._states[n] = layer.walk(self._states[n], draws[..., 2 * layer.lane + 1])
-            lost = lost | (layer.lost(states, draws[..., 2 * layer.lane]) & by_time & on)
-            extra += layer.adds(states) * (by_time & self.acts(layer))
-        return lost, extra
+            states = np.broadcast_to(self._states[n], draws.shape[:-1])
+            if layer.moves:
+                states, self._states[n] = layer.walk(self._states[n], draws[..., 2 * layer.lane + 1])
+            held = also_held(held, layer.lost(states, draws[..., 2 * layer.lane]) & (by_time & on), _LOST)
+            if layer.delays:
+                extra_s = extra_s + layer.adds(states) * (by_time & self.acts(layer))
+        return held, extra_s
 
     def _traces(self, ticks: Integers) -> list[tuple[Mask, Mask]]:
         traces = self._profile.traces
@@ -142,21 +151,20 @@ class ImpairmentsByTick:
         draw = self.draw(Purpose.TRACE, ticks, 1)[..., 0]
         return [(trace.lost(ticks, draw), self.on(trace.sensing, trace.comms)) for trace in traces]
 
-    def _closed(self, ticks: Integers) -> Mask:
-        closed = np.zeros((len(ticks), 1, len(self._links)), dtype=bool)
-        for schedule in self._profile.schedules:
-            closed = closed | (schedule.closed(ticks)[:, None] & self.on(schedule.sensing, schedule.comms))
-        return closed
-
-    def _delays(self, ticks: Integers) -> Array:
-        total = np.zeros((len(ticks), len(self._codes), len(self._links)))
+    def _delays(self, ticks: Integers, extra_s: Array) -> Array:
         if not self._profile.delays:
-            return total
+            return extra_s
         draws = self.draw(Purpose.DELAY, ticks, 2)
+        total = np.zeros(draws.shape[:-1])
         for n, law in enumerate(self._profile.delays):
             share = self._swelling(n, law.correlation, draws[..., 0]) if law.correlation else draws[..., 0]
             total += np.where(law.rows, law.quantile(share), 0.0)
-        return np.where(draws[..., 1] < self._profile.reorder, 0.0, total)
+        return extra_s + np.where(draws[..., 1] < self._profile.reorder, 0.0, total)
+
+    def _ticks(self, seconds: Array) -> Integers:
+        if seconds is self._still.delay_s:
+            return self._still.delay_ticks
+        return delay.ticks(seconds, self._profile.dt, self._profile.least_delay)
 
     def _swelling(self, n: int, correlation: float, draw: Array) -> Array:
         """Uniform numbers again, but each like the one before it."""
@@ -167,34 +175,43 @@ class ImpairmentsByTick:
         share: Array = ndtr(swell)
         return share
 
-    def _copies(self, ticks: Integers, shape: tuple[int, ...]) -> tuple[Mask, Array]:
+    def _copies(self, ticks: Integers, extra_s: Array) -> tuple[Mask, Array]:
         if not self._profile.duplicate.any():
-            return np.zeros(shape, dtype=bool), np.zeros(shape)
+            return self._still.copied, extra_s
         draws = self.draw(Purpose.DUPLICATE, ticks, 2)
-        seconds = np.zeros(shape)
+        seconds = np.zeros(draws.shape[:-1])
         for law in self._profile.delays:
             seconds += np.where(law.rows, law.quantile(draws[..., 1]), 0.0)
-        return draws[..., 0] < self._profile.duplicate, seconds
+        return draws[..., 0] < self._profile.duplicate, seconds + extra_s
+
+    def _marks(self, ticks: Integers) -> Marks:
+        if not self._profile.corrupt.any():
+            return self._still.mark
+        return corrupt.marks(self._profile.corrupt, self.draw(Purpose.CORRUPTION, ticks, 1)[..., 0])
 
     def _squared_limits(self, ticks: Integers) -> Array:
-        limit = np.full((len(ticks), 1, len(self._links)), np.inf)
+        if not self._profile.reaches:
+            return self._still.squared_limit
+        limit = self._still.squared_limit
         for reach in self._profile.reaches:
-            draw = self.draw(Purpose.REACH, ticks, 1)[..., 0] if reach.law is ReachLaw.RAMP else np.zeros(1)
-            shadow = self._shadows(ticks, reach) if reach.law is ReachLaw.LOG_DISTANCE else np.zeros(1)
-            limit = np.where(self.on(reach.sensing, reach.comms), np.minimum(limit, reach.limit(draw, shadow)), limit)
+            farthest = np.minimum(limit, self._limit(ticks, reach))
+            limit = np.where(self.on(reach.sensing, reach.comms), farthest, limit)
         return limit * limit
 
-    def _shadows(self, ticks: Integers, reach: Reach) -> Array:
-        """Standard normal, the same both ways and for a spell of ticks, shape (T, 1, L)."""
+    def _limit(self, ticks: Integers, reach: Reach) -> Array:
+        """The distance in metres up to which each message passes, shape (T, C', L)."""
+        if reach.law is ReachLaw.RAMP:
+            return reach.limit(self.draw(Purpose.REACH, ticks, 1)[..., 0], np.zeros(1))
+        spells, place = np.unique(ticks // reach.coherence, return_inverse=True)
+        return reach.limit(np.zeros(1), self._shadows(spells))[place, None]
+
+    def _shadows(self, spells: Integers) -> Array:
+        """Standard normal, the same both ways, shape (S, L)."""
         src, dst = self._links.ends.values()
         low, high = np.minimum(src, dst), np.maximum(src, dst)
-        spells, place = np.unique(ticks // reach.coherence, return_inverse=True)
-        shadows: Array = ndtri(uniform(self._seed, Purpose.SHADOWING, tick=spells[:, None], src=low, dst=high))
-        return shadows[place, None, :, 0]
-
-    def _ticks(self, seconds: Array) -> Integers:
-        whole = np.maximum(delay.ticks(seconds, self._profile.dt), self._profile.least_delay)
-        return np.where(self._comms, whole, 0)
+        draws = uniform(self._seed, Purpose.SHADOWING, tick=spells[:, None], src=low, dst=high)
+        shadows: Array = ndtri(draws[..., 0])
+        return shadows
 
     def acts(self, layer: ChainLayer) -> Mask:
         """On which rows of what is drawn a chain delays messages, shape (C', 1): one row for all stands for communication."""
@@ -217,3 +234,21 @@ class ImpairmentsByTick:
             channel=self._codes[:, None],
             lanes=lanes,
         )
+
+
+def _still(links: int, least_delay: int) -> TickImpairments:
+    """The ticks of an air without impairments; those of a profile share what it leaves as it is."""
+
+    def always(value: Any) -> NDArray[Any]:
+        return np.broadcast_to(np.full(links, value), (_SPAN, 1, links))
+
+    return TickImpairments(
+        held=always(PASSED),
+        delay_s=always(0.0),
+        delay_ticks=always(least_delay),
+        copied=always(False),
+        copy_delay_s=always(0.0),
+        mark=always(np.uint8(0)),
+        squared_limit=always(np.inf),
+        jams=np.zeros((_SPAN, 0), dtype=bool),
+    )

@@ -1,7 +1,8 @@
 """Messages in flight: what is under way, and how it arrives.
 
 A loss acts on a message when it is offered. What happens to messages under way afterwards is decided here: those whose receiver
-dies or departs are dropped, and a cut or partition drops, delivers or holds them, as it says.
+dies or departs are dropped, and a cut or partition drops, delivers or holds them, as it says. The kernels that sort messages
+under way are in `under_way.py`.
 """
 
 from __future__ import annotations
@@ -10,23 +11,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Integers, Mask
-from netem.impairments.corrupt import Mark, Marks
-from netem.medium.verdict import PASSED, Verdict, VerdictCodes
+from netem.impairments.corrupt import Marks
+from netem.medium.under_way import CELL, DUE, FIELDS, NUMBER, SENT, in_order, newest_in, parted, set_out
+from netem.medium.verdict import Verdict, VerdictCodes, passed
 
-# Rows of `MediumState.under_way`.
-_DUE, _SENT, _CELL, _CONTENT, _MARK, _NUMBER = range(6)
-_MARK_BITS = 3
 # Columns of `Entry.odd` and `Entry.dropped`.
 _COPY_DUE, _WHY = 4, 4
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
-_DELIVERED, _DELAYED, _STALE = int(Verdict.DELIVERED), int(Verdict.DELAYED), int(Mark.STALE)
+_DELIVERED, _DELAYED = int(Verdict.DELIVERED), int(Verdict.DELAYED)
 
-_NO_CELLS = np.empty(0, dtype=np.int64)
 _NO_DROPPED = np.empty((0, 5), dtype=np.int64)
 _NOTHING_ODD = np.empty((0, 5), dtype=np.int64)
 _NO_RELEASED = np.empty((0, 4), dtype=np.int64)
+_A_ROW = np.empty(4, dtype=np.int64)
 _NOTHING = (np.empty((0, 4), dtype=np.int64), 0, _NO_DROPPED, _NO_RELEASED)
 
 
@@ -93,7 +93,7 @@ class MediumState(NamedTuple):
 
     def oldest_sent(self, tick: int) -> int:
         """When the oldest message under way was sent, or now."""
-        return int(self.under_way[_SENT].min(initial=tick))
+        return int(self.under_way[SENT].min()) if self.in_flight else tick
 
 
 class Delivery(NamedTuple):
@@ -174,28 +174,26 @@ def deliver(
     doom, holds
         Why messages under way on each link are dropped, or PASSED, and where they wait, shape (L,).
     """
-    on_time = verdicts.kind == _DELIVERED
-    plain = on_time & (verdicts.mark == 0)
-    delayed, copied = np.flatnonzero(verdicts.kind == _DELAYED), np.flatnonzero(verdicts.copy_due >= 0)
-    marked = np.flatnonzero(on_time & ~plain)
-    if not (state.in_flight or len(delayed) or len(copied) or len(marked)):
-        return state, Delivery(np.where(plain, tick, -1), verdicts.mark, plain, *_NOTHING)
-    rows = np.concatenate([state.under_way, _setting_out(tick, state, verdicts, delayed, copied)], axis=1)
-    dropped, rows = _drop(rows, doom)
-    arrives = rows[_DUE] <= tick
-    if holds.any():
-        arrives &= ~holds[rows[_CELL] % len(holds)]
-    arriving, waiting = (rows.take(np.flatnonzero(which), axis=1) for which in (arrives, ~arrives))
-    held = arriving[_DUE] < tick
-    released = _messages(arriving[:, held], len(doom)) if held.any() else _NO_RELEASED
-    late = arriving.shape[1]
-    if len(marked):
-        corrupted = _setting_out(tick, state, verdicts, marked, _NO_CELLS)
-        arriving = np.concatenate([arriving, corrupted], axis=1)
-    newest, mark, apart = _sorted_in(np.where(plain, tick, -1), arriving)
-    if len(dropped):
+    plain, newest, late, marked = _plainly(tick, verdicts.kind, verdicts.mark, verdicts.copy_due)
+    if not (late or marked or state.in_flight):
+        return state, Delivery(newest, verdicts.mark, plain, *_NOTHING)
+    apart = set_out(tick, *verdicts, state.offered, np.empty((FIELDS, late + marked), dtype=np.int64))
+    under_way = np.concatenate([state.under_way, apart[:, :late]], axis=1)
+    columns, _, waiting, arriving, held = parted(tick, under_way, doom, holds)
+    arrived, lost = columns[:, waiting : waiting + arriving], columns[:, waiting + arriving :]
+    dropped, released = _NO_DROPPED, _NO_RELEASED
+    if lost.size:
+        dropped = np.column_stack([_messages(lost, len(doom)), doom[lost[CELL] % len(doom)]])
         state = state._replace(last_due=_without(state.last_due, dropped))
-    return state._replace(under_way=waiting), Delivery(newest, mark, plain, apart, late, dropped, released)
+    if held:
+        released = _messages(arrived[:, arrived[DUE] < tick], len(doom))
+    if marked:
+        arrived = np.concatenate([arrived, apart[:, late:]], axis=1)
+    newest, mark, order = newest_in(newest, arrived)
+    rows = in_order(np.sort(order), *newest.shape, _A_ROW)
+    return state._replace(under_way=columns[:, :waiting]), Delivery(
+        newest, mark, plain, rows, int(arriving), dropped, released
+    )
 
 
 def newest_of(plain: Integers, apart: Integers) -> Integers:
@@ -215,35 +213,12 @@ def newest_of(plain: Integers, apart: Integers) -> Integers:
 
 def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
-    passed = (verdicts.kind == _DELIVERED) | (verdicts.kind == _DELAYED)
-    odd = passed & ((verdicts.due != tick) | (verdicts.mark != 0) | (verdicts.copy_due >= 0))
-    if not odd.any():
+    odd, number = _odd(tick, *verdicts)
+    if not number:
         return _NOTHING_ODD
     channel, link = np.nonzero(odd)
     details = [field[channel, link] for field in (verdicts.due, verdicts.mark, verdicts.copy_due)]
     return np.stack([channel, link, *details], axis=-1).astype(np.int64)
-
-
-def _setting_out(tick: int, state: MediumState, verdicts: Verdicts, passed: Integers, copied: Integers) -> Integers:
-    """Messages that passed, and copies, by their cells, as columns of `MediumState.under_way`."""
-    whole = len(passed)
-    rows = np.zeros((6, whole + len(copied)), dtype=np.int64)
-    rows[_CELL, :whole], rows[_CELL, whole:] = passed, copied
-    rows[_DUE, :whole], rows[_DUE, whole:] = verdicts.due.take(passed), verdicts.copy_due.take(copied)
-    rows[_MARK, :whole] = verdicts.mark.take(passed)
-    rows[_SENT] = tick
-    rows[_CONTENT] = tick - (rows[_MARK] == _STALE)
-    rows[_NUMBER] = state.offered.take(rows[_CELL]) - 1
-    return rows
-
-
-def _drop(rows: Integers, doom: VerdictCodes) -> tuple[Integers, Integers]:
-    """The messages dropped, as rows of `Delivery.dropped`, and the columns of the others."""
-    if doom.min() == PASSED:
-        return _NO_DROPPED, rows
-    why = doom[rows[_CELL] % len(doom)]
-    lost = why != PASSED
-    return np.column_stack([_messages(rows[:, lost], len(doom)), why[lost]]), rows[:, ~lost]
 
 
 def _without(last_due: Integers, dropped: Integers) -> Integers:
@@ -255,19 +230,56 @@ def _without(last_due: Integers, dropped: Integers) -> Integers:
 
 def _messages(columns: Integers, links: int) -> Integers:
     """Rows of (sent tick, channel row, link row, number)."""
-    channel, link = np.divmod(columns[_CELL], links)
-    return np.stack([columns[_SENT], channel, link, columns[_NUMBER]], axis=-1)
+    channel, link = np.divmod(columns[CELL], links)
+    return np.stack([columns[SENT], channel, link, columns[NUMBER]], axis=-1)
 
 
-def _sorted_in(plain: Integers, arriving: Integers) -> tuple[Integers, Marks, Integers]:
-    """What is newest in each cell, how it is corrupted, and all that arrives apart, sorted, as rows of `Delivery.apart`."""
-    channels, links = plain.shape
-    content, cell, how = arriving[_CONTENT], arriving[_CELL], arriving[_MARK]
-    channel, link = np.divmod(cell, links)
-    # One number each, in the order of content, link, channel and mark.
-    order = np.argsort(((content * links + link) * channels + channel) << _MARK_BITS | how)
-    newest = np.where(plain >= 0, plain << _MARK_BITS, -1)
-    np.maximum.at(newest.reshape(-1), cell, content << _MARK_BITS | how)
-    mark = np.where(newest >= 0, newest & (1 << _MARK_BITS) - 1, 0).astype(np.uint8)
-    apart = np.stack([content, link, channel, how], axis=-1)[order]
-    return newest >> _MARK_BITS, mark, apart
+@kernel("(),(c,l),(c,l),(c,l)->(c,l),(c,l),(),()", "lBBl->?lll")
+def _plainly() -> Plain:
+    """What arrives as it is; how many messages and copies set out for later, and how many arrive corrupted."""
+
+    def plain(
+        tick: int,
+        kind: VerdictCodes,
+        mark: Marks,
+        copy_due: Integers,
+        plain: Mask,
+        newest: Integers,
+        late: Integers,
+        marked: Integers,
+    ) -> None:
+        late[0], marked[0] = 0, 0
+        for channel in range(kind.shape[0]):
+            for link in range(kind.shape[1]):
+                on_time = kind[channel, link] == _DELIVERED
+                as_it_is = on_time and mark[channel, link] == 0
+                plain[channel, link] = as_it_is
+                newest[channel, link] = tick if as_it_is else -1
+                late[0] += int(kind[channel, link] == _DELAYED) + int(copy_due[channel, link] >= 0)
+                marked[0] += int(on_time and not as_it_is)
+
+    return plain
+
+
+@kernel("(),(c,l),(c,l),(c,l),(c,l)->(c,l),()", "lBlBl->?l")
+def _odd() -> Plain:
+    """Where a message passed late, twice or corrupted, and how often."""
+
+    def plain(
+        tick: int,
+        kind: VerdictCodes,
+        due: Integers,
+        mark: Marks,
+        copy_due: Integers,
+        odd: Mask,
+        number: Integers,
+    ) -> None:
+        number[0] = 0
+        for channel in range(kind.shape[0]):
+            for link in range(kind.shape[1]):
+                late, twice = due[channel, link] != tick, copy_due[channel, link] >= 0
+                strange = late or twice or mark[channel, link] != 0
+                odd[channel, link] = strange and passed(kind[channel, link])
+                number[0] += int(odd[channel, link])
+
+    return plain

@@ -1,7 +1,8 @@
 """What one profile makes of the messages of a tick: which it loses, and how the others arrive.
 
 The layers are independent: each says what it holds, a message passes when none holds it, and it is booked under the strongest
-that does, in the order of `verdict.STRONGEST_FIRST`. To add a loss, see docs/extending.md.
+that does, in the order of `verdict.STRONGEST_FIRST`: layers say it in `LinkModel.judge`, and `_decided` decides, message by
+message. To add a loss, see docs/extending.md.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels as channel_names
 from netem.core.draws import Purpose, Seed, uniform
@@ -22,14 +24,14 @@ from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
 from netem.medium.in_flight import MediumState, Verdicts
 from netem.medium.own_losses import OwnLosses
-from netem.medium.verdict import PASSED, Verdict, VerdictCodes, stronger
+from netem.medium.verdict import PASSED, Verdict, VerdictCodes, also_held, passed, stronger, strongest
 
 _SHARED_DRAW = 0
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _SILENT, _DELIVERED, _DELAYED = (np.uint8(kind) for kind in (Verdict.SILENT, Verdict.DELIVERED, Verdict.DELAYED))
-_CLOSED, _RANGE, _JAMMED = (np.uint8(kind) for kind in (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED))
-_LISTED, _LOST, _OVERFLOW = (np.uint8(kind) for kind in (Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW))
+_RANGE, _JAMMED, _LISTED = (np.uint8(kind) for kind in (Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED))
+_LOST, _OVERFLOW = np.uint8(Verdict.LOST), np.uint8(Verdict.OVERFLOW)
 _STALE = np.uint8(Mark.STALE)
 
 
@@ -46,14 +48,6 @@ class Memory(NamedTuple):
 
     debt: Array
     chains: tuple[Integers, ...]
-
-
-class _Packets(NamedTuple):
-    """What chains that step with the messages make of a tick: their states, the losses, and extra delay in seconds (C', L)."""
-
-    states: tuple[Integers, ...]
-    lost: Mask
-    extra_s: Array
 
 
 class LinkModel:
@@ -74,7 +68,7 @@ class LinkModel:
         self._seed, self._links = links.seeds(seed), links
         self._shape = (len(channels), len(links))
         self._sensing = np.array([name == channel_names.SENSE for name in channels])
-        self._comms = ~self._sensing[:, None]
+        self._measured = self._sensing[:, None]
         self._names = np.array([channel_names.code(name) for name in channels], dtype=np.int64)
         self._codes = np.array([_SHARED_DRAW]) if profile.coupled else self._names
         self._by_tick = ImpairmentsByTick(seed, links, profile, self._codes, self._sensing)
@@ -85,10 +79,13 @@ class LinkModel:
         self._packet_layers = [n for n, layer in enumerate(profile.chains) if layer.by_packet.any()]
         self._packet_lanes = 1 + max((profile.chains[n].lane for n in self._packet_layers), default=-1)
         orderly = [law.rows for law in profile.delays if law.ordered]
-        self._ordered = np.logical_or.reduce([np.zeros(self._shape[1], dtype=bool), *orderly]) & self._comms
+        self._ordered = np.logical_or.reduce([np.zeros(self._shape[1], dtype=bool), *orderly]) & ~self._measured
         self.keeps_order = bool(orderly)
         self._bits = np.where(self._sensing, 0.0, profile.message_bits)
         self._sender, self._receiver = links.src - 1, links.dst - 1
+        self._spatial = profile.spatial
+        self._listed_link, self._listed_number, sensing, comms = profile.listed.reshape(-1, 4).T
+        self._listed_on = np.where(self._measured, sensing, comms).astype(bool)
         self._corrupts, self._doubles = bool(profile.corrupt.any()), bool(profile.duplicate.any())
         self._unmarked, self._single = np.zeros(self._shape, dtype=np.uint8), np.full(self._shape, -1)
 
@@ -126,25 +123,25 @@ class LinkModel:
             By which the timeline delays communication, shape (L,), in seconds, if it does.
         """
         impairments = self._by_tick.at(tick)
-        packets = self._packet_chains(memory, tick, offered)
-        reason = np.full(self._shape, PASSED)
-        for kind, held in self._layers(state, tick, impairments, packets, position):
-            np.copyto(reason, kind, where=held)
-        if (imposed != PASSED).any():
-            reason = stronger(reason, imposed)
-        passed = offered & (reason == PASSED)
-        extra_s = packets.extra_s if delay_s is None else packets.extra_s + delay_s
-        by_message = delay_s is not None or bool(self._packet_layers)
-        debt, overflow, due, waited_s = self._due(state, memory.debt, tick, impairments, extra_s, passed, by_message)
-        if overflow is not None:
-            np.copyto(reason, _OVERFLOW, where=overflow)
-            passed &= ~overflow
-        np.copyto(reason, _DELIVERED, where=passed)
-        np.copyto(reason, _DELAYED, where=passed & (due > tick))
-        np.copyto(reason, _SILENT, where=~offered)
-        copy_due = self._copies(tick, impairments, passed, due, waited_s)
-        verdicts = Verdicts(reason, due, self._marks(state, impairments, passed), copy_due)
-        return Memory(debt, packets.states), verdicts
+        held, extra_s, chains = impairments.held, delay_s, memory.chains
+        if self._packet_layers:
+            chains, lost, slower_s = self._packet_chains(memory, tick, offered)
+            held, extra_s = also_held(held, lost, _LOST), slower_s if delay_s is None else slower_s + delay_s
+        for kind, where in self._layers(state, tick, impairments, position):
+            held = also_held(held, where, kind)
+        debt, rate = memory.debt, self.profile.rate
+        if rate:
+            passing = offered & (stronger(imposed, held) == PASSED)
+            debt, overflow, queued_s = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passing)
+            held, extra_s = also_held(held, overflow, _OVERFLOW), queued_s if extra_s is None else extra_s + queued_s
+        wait = self._wait(state, tick, impairments, extra_s)
+        kind, due = _decided(tick, self._measured, offered, imposed, held, wait)
+        mark, copy_due = self._unmarked, self._single
+        if self._corrupts:
+            mark = _marked(self._measured, kind, impairments.mark, state.spoke)
+        if self._doubles:
+            copy_due = self._copies(tick, impairments, kind, due, extra_s)
+        return Memory(debt, chains), Verdicts(kind, due, mark, copy_due)
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
@@ -157,41 +154,38 @@ class LinkModel:
         return self._by_tick.draw(purpose, ticks, 1)[..., 0]
 
     def _layers(
-        self, state: MediumState, tick: int, impairments: TickImpairments, packets: _Packets, position: Array | None
+        self, state: MediumState, tick: int, impairments: TickImpairments, position: Array | None
     ) -> Iterator[tuple[np.uint8, Mask]]:
-        """The layers that change from tick to tick, and what each holds: the weakest first."""
-        if self.profile.spatial and position is None:
-            raise ValueError("loss by distance and jammed zones need the positions of the tick")
-        yield _LOST, impairments.lost
-        if packets.states:
-            yield _LOST, packets.lost
+        """The layers that time alone does not decide, and what each holds."""
         for own, on in self._own:
             yield _LOST, own.lost(tick, position) & on
-        if len(self.profile.listed):
-            yield _LISTED, self._listed(state.offered)
-        if position is not None:
-            for zone, on in zip(self.profile.zones, impairments.jams.tolist(), strict=True):
-                if on:
-                    yield _JAMMED, zone.jammed(self._receiver, position) & self._by_tick.on(zone.sensing, zone.comms)
-            if self.profile.reaches:
-                yield _RANGE, squared_distances(self._sender, self._receiver, position) > impairments.squared_limit
-        if self.profile.schedules:
-            yield _CLOSED, impairments.closed
+        if len(self.profile.listed) and (hit := self._hit(state.offered)).any():
+            yield _LISTED, self._listed(hit)
+        if not self._spatial:
+            return
+        if position is None:
+            raise ValueError("loss by distance and jammed zones need the positions of the tick")
+        for zone, on in zip(self.profile.zones, impairments.jams.tolist(), strict=True):
+            if on:
+                yield _JAMMED, zone.jammed(self._receiver, position) & self._by_tick.on(zone.sensing, zone.comms)
+        if self.profile.reaches:
+            yield _RANGE, squared_distances(self._sender, self._receiver, position) > impairments.squared_limit
 
-    def _listed(self, offered: Integers) -> Mask:
-        link, listed, sensing, comms = self.profile.listed.T
+    def _hit(self, offered: Integers) -> Mask:
+        """Which listed messages are offered now, by channel, shape (C, m)."""
         number = offered[:1] if self.profile.coupled else offered  # one verdict for all: that on the sensing
-        hit = (number[:, link] == listed) & np.where(self._sensing[:, None], sensing, comms).astype(bool)
+        return (number[:, self._listed_link] == self._listed_number) & self._listed_on
+
+    def _listed(self, hit: Mask) -> Mask:
         held = np.zeros(self._shape, dtype=bool)
         channel, row = np.nonzero(hit)
-        held[channel, link[row]] = True
+        held[channel, self._listed_link[row]] = True
         return held
 
-    def _packet_chains(self, memory: Memory, tick: int, offered: Mask) -> _Packets:
+    def _packet_chains(self, memory: Memory, tick: int, offered: Mask) -> tuple[tuple[Integers, ...], Mask, Array]:
+        """Of chains that step with messages: states after a tick, losses (C, L), extra delay in seconds (C', L)."""
         lost = np.zeros(self._shape, dtype=bool)
         extra = np.zeros((len(self._codes), self._shape[1]))
-        if not self._packet_layers:
-            return _Packets((), lost, extra)
         moves = offered.any(axis=0, keepdims=True) if self.profile.coupled else offered
         draws = self._by_tick.draw(Purpose.PACKET_CHAIN, np.array([tick]), 2 * self._packet_lanes)[0]
         states = []
@@ -202,43 +196,65 @@ class LinkModel:
             extra += layer.adds(state) * (layer.by_packet & self._by_tick.acts(layer))
             _, following = layer.walk(state, draws[None, ..., 2 * layer.lane + 1])
             states.append(np.where(moves, following, state))
-        return _Packets(tuple(states), lost, extra)
+        return tuple(states), lost, extra
 
-    def _due(
-        self,
-        state: MediumState,
-        debt: Array,
-        tick: int,
-        impairments: TickImpairments,
-        extra_s: Array,
-        passed: Mask,
-        by_message: bool,
-    ) -> tuple[Array, Mask | None, Integers, Array]:
-        """The queues' debt, what they refuse, when the others arrive, and what else makes them wait."""
-        rate, overflow, wait = self.profile.rate, None, impairments.delay_ticks
-        if by_message or rate:
-            if rate:
-                debt, overflow, queued = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passed)
-                extra_s = extra_s + queued
-            wait = delay.ticks(impairments.delay_s + extra_s, self.profile.dt)
-            wait = np.where(self._comms, np.maximum(wait, self.profile.least_delay), 0)
-        due = tick + wait
+    def _wait(self, state: MediumState, tick: int, impairments: TickImpairments, extra_s: Array | None) -> Integers:
+        """Ticks that messages wait in the air if they are no measurements, shape (C, L) or (1, L)."""
+        wait = impairments.delay_ticks
+        if extra_s is not None:
+            wait = delay.ticks(impairments.delay_s + extra_s, self.profile.dt, self.profile.least_delay)
         if self.keeps_order:
-            due = np.where(self._ordered, np.maximum(due, state.last_due), due)
-        return debt, overflow, due, extra_s
-
-    def _marks(self, state: MediumState, impairments: TickImpairments, passed: Mask) -> Marks:
-        if not self._corrupts:
-            return self._unmarked
-        return impairments.mark * (passed & ((impairments.mark != _STALE) | state.spoke))
+            wait = np.where(self._ordered, np.maximum(wait, state.last_due - tick), wait)
+        return wait
 
     def _copies(
-        self, tick: int, impairments: TickImpairments, passed: Mask, due: Integers, waited_s: Array
+        self, tick: int, impairments: TickImpairments, kind: VerdictCodes, due: Integers, extra_s: Array | None
     ) -> Integers:
-        if not self._doubles:
-            return self._single
-        wait = delay.ticks(impairments.copy_delay_s + waited_s, self.profile.dt)
-        arrival = tick + np.maximum(wait, self.profile.least_delay)
-        if self.keeps_order:
-            arrival = np.where(self._ordered, np.maximum(arrival, due), arrival)
-        return np.where(passed & impairments.copied, arrival, -1)
+        seconds = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
+        wait = delay.ticks(seconds, self.profile.dt, self.profile.least_delay)
+        copy_due: Integers = _copied(tick, self._measured, kind, impairments.copied, wait, due, self._ordered)
+        return copy_due
+
+
+@kernel("(),(),(),(),(),()->(),()", "l??BBl->Bl")
+def _decided() -> Plain:
+    def plain(
+        tick: int,
+        measured: bool,
+        offered: bool,
+        imposed: int,
+        held: int,
+        wait: int,
+        verdict: VerdictCodes,
+        due: Integers,
+    ) -> None:
+        reason = strongest(imposed, held)
+        due[0] = tick if measured else tick + wait
+        if not offered:
+            verdict[0] = _SILENT
+        elif reason != PASSED:
+            verdict[0] = reason
+        else:
+            verdict[0] = _DELAYED if due[0] > tick else _DELIVERED
+
+    return plain
+
+
+@kernel("(),(),(),()->()", "?BB?->B")
+def _marked() -> Plain:
+    def plain(measured: bool, verdict: int, mark: int, spoke: bool, marked: Marks) -> None:
+        marked[0] = mark if passed(verdict) and not measured and (spoke or mark != _STALE) else 0
+
+    return plain
+
+
+@kernel("(),(),(),(),(),(),()->()", "l?B?ll?->l")
+def _copied() -> Plain:
+    def plain(
+        tick: int, measured: bool, verdict: int, copied: bool, wait: int, due: int, ordered: bool, copy_due: Integers
+    ) -> None:
+        copy_due[0] = -1
+        if copied and passed(verdict) and not measured:
+            copy_due[0] = max(tick + wait, due) if ordered else tick + wait
+
+    return plain

@@ -22,7 +22,7 @@ from netem.faults.timeline import Conditions, Timeline
 from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
 from netem.medium.link_model import LinkModel, Memory
-from netem.medium.verdict import PASSED, Verdict, VerdictCodes, doom, standing, stronger
+from netem.medium.verdict import Verdict, VerdictCodes, also_held, doom, standing
 
 JOURNAL = "journal.arrows"  # in a run directory
 
@@ -53,6 +53,8 @@ class _Under(NamedTuple):
 
     Parameters
     ----------
+    offered
+        Where they are offered, shape (C, L).
     standing, doom
         Of those offered and those under way: a reason, or PASSED, shape (C, L) or (L,), and (L,).
     holds
@@ -63,6 +65,7 @@ class _Under(NamedTuple):
         Whether some are lost by chance, not measured by chance, delayed, or ruled by another profile.
     """
 
+    offered: Mask
     standing: VerdictCodes
     doom: VerdictCodes
     holds: Mask
@@ -114,9 +117,9 @@ class Medium:
         """The state before the first tick."""
         return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
 
-    def offered(self, awake: Mask) -> Mask:
-        """Where messages are offered when these agents (N,) speak on all their links, shape (C, L); all sensors sense."""
-        return awake[self._links.src - 1] | self._sensing
+    def offered(self, tick: int) -> Mask:
+        """Where messages are offered in a tick, shape (C, L): who is awake speaks on all its links, and all sensors sense."""
+        return self._under(self.timeline.at(tick)).offered
 
     def judge(
         self, state: MediumState, tick: int, offered: Mask, position: Array | None
@@ -191,10 +194,9 @@ class Medium:
         """What the timeline makes of messages: a reason, or PASSED, shape (C, L) or (L,)."""
         reason = under.standing
         if under.drops_out:
-            unmade = self._sensing & (self._dropouts.at(tick) < now.dropout)
-            reason = stronger(reason, np.where(unmade, _DROPOUT, PASSED))
+            reason = also_held(reason, self._sensing & (self._dropouts.at(tick) < now.dropout), _DROPOUT)
         if under.loses:
-            reason = stronger(reason, np.where(self._scripted.at(tick) < now.loss, _SCRIPTED, PASSED))
+            reason = also_held(reason, self._scripted.at(tick) < now.loss, _SCRIPTED)
         return reason
 
     def _under(self, now: Conditions) -> _Under:
@@ -207,9 +209,9 @@ class Medium:
         links, held = self._links, standing(self._links, now)
         deaf = now.paused[links.dst - 1]
         if deaf.any():  # a paused agent measures nothing; what is sent to it is dropped, or waits
-            unheard = deaf & (self._sensing | now.pause_drops)
-            held = stronger(held, np.where(unheard, _PAUSED, PASSED))
+            held = also_held(held, deaf & (self._sensing | now.pause_drops), _PAUSED)
         return _Under(
+            offered=~now.idle[links.src - 1] | self._sensing,
             standing=held,
             doom=doom(links, now),
             holds=now.holds,

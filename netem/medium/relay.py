@@ -24,7 +24,8 @@ from netem.medium.verdict import Verdict
 
 Said = TypeVar("Said")
 
-_STALE = int(Mark.STALE)  # an enumeration member is compared ten times as slowly
+# An enumeration member is compared ten times as slowly.
+_STALE, _DELIVERED = int(Mark.STALE), int(Verdict.DELIVERED)
 
 
 class Relayed(NamedTuple):
@@ -56,7 +57,7 @@ class Relayed(NamedTuple):
     @property
     def seen(self) -> Mask:
         """Links whose measurement reaches the agent that made it, shape (L,)."""
-        return self.verdicts.kind[0] == Verdict.DELIVERED
+        return self.verdicts.kind[0] == _DELIVERED
 
     @property
     def arriving(self) -> Integers:
@@ -131,7 +132,7 @@ class Relay(Generic[Said]):
         position
             The agents', shape (N, D), in metres; only a spatial profile needs them.
         """
-        return self.decide_on(tick, self._medium.offered(~self.timeline.at(tick).idle), position)
+        return self.decide_on(tick, self._medium.offered(tick), position)
 
     def decide_on(self, tick: int, offered: Mask, position: Array | None) -> Relayed:
         """What becomes of a tick in which a message is offered where `offered` says so, shape (C, L)."""

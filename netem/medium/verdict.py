@@ -7,6 +7,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.kernels.kernel import Part, Plain, kernel
+from analysis.models.arrays import Mask
 from netem.core.links import Links
 from netem.faults.fault import Verb
 from netem.faults.timeline import Conditions
@@ -71,13 +73,51 @@ STRONGEST_FIRST = (
 REASONS = tuple(kind for kind in Verdict if kind >= Verdict.DEAD)
 BY_THE_AIR = (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW)
 
+# Looking up the members of an enumeration costs as much as an operation on a small array.
+_DELIVERED, _DELAYED = int(Verdict.DELIVERED), int(Verdict.DELAYED)
+
 _RANK = np.full(256, len(STRONGEST_FIRST), dtype=np.uint8)
 _RANK[list(STRONGEST_FIRST)] = np.arange(len(STRONGEST_FIRST))
 
 
+@Part
+def passed(verdict: int) -> bool:
+    """Whether the medium let a message pass, now or later."""
+    return verdict in (_DELIVERED, _DELAYED)
+
+
+@Part
+def strongest(one: int, other: int) -> int:
+    """Of two reasons, or PASSED, the one under which a message is booked that both hold."""
+    return one if _RANK[one] <= _RANK[other] else other
+
+
 def stronger(one: VerdictCodes, other: VerdictCodes) -> VerdictCodes:
     """Of two reasons, or PASSED, the one under which a message is booked that both hold, elementwise."""
-    return np.where(_RANK[one] <= _RANK[other], one, other)
+    held: VerdictCodes = _stronger(one, other)
+    return held
+
+
+@kernel("(),()->()", "BB->B")
+def _stronger() -> Plain:
+    def plain(one: int, other: int, held: VerdictCodes) -> None:
+        held[0] = strongest(one, other)
+
+    return plain
+
+
+def also_held(reason: VerdictCodes, where: Mask, kind: np.uint8) -> VerdictCodes:
+    """The reasons, or PASSED, of messages of which one more layer holds those where it is true, elementwise."""
+    held: VerdictCodes = _also_held(reason, where, kind)
+    return held
+
+
+@kernel("(),(),()->()", "B?B->B")
+def _also_held() -> Plain:
+    def plain(reason: int, where: bool, kind: int, held: VerdictCodes) -> None:
+        held[0] = strongest(reason, kind) if where else reason
+
+    return plain
 
 
 def standing(links: Links, now: Conditions) -> VerdictCodes:

@@ -58,6 +58,11 @@ class Tick(NamedTuple):
     estimate: Estimate
 
 
+def drive_of(chase_of, tick, seeds, swarms=1):
+    """What noise does to targets in a tick."""
+    return chase_of.drive(np.array([tick]), seeds, swarms)[0]
+
+
 def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2, prior=(1.0, 1.0)):
     """Agents, each after a target of its own, whose start is drawn as the prior says."""
     rng = np.random.default_rng(seed)
@@ -80,7 +85,7 @@ def watch(estimator, target, *, dt=0.05, ticks=100, runs=1, seed=0, dimension=2,
         before, _ = estimator.sense(alone, state, alone.relative, alone.present)
         state, estimate = estimator.fuse(alone, before, heard, Own(nothing, nothing, tick, sighting=sighting))
         yield Tick(chase.target, sighting, before, state, estimate)
-        chase = chase_of.step(tick, seeds, first, chase)
+        chase = chase_of.step(tick, seeds, first, chase, drive_of(chase_of, tick, seeds, runs))
 
 
 def informed(flown, order=2, dimension=2):
@@ -154,5 +159,5 @@ def agreed(seconds=0.526, dt=1e-3, latencies=(400, 200), order=2, **parameters):
         heard = {TARGET: Heard({"information": said[TARGET]["information"][neighbours]}, agents.present)}
         state, estimate = estimator.fuse(agents, state, heard, Own(nothing, nothing, tick, sighting=sighting))
         flown.append((state, estimate, sighting, said))
-        chase = chase_of.step(tick, 5, who, chase)
+        chase = chase_of.step(tick, 5, who, chase, drive_of(chase_of, tick, 5))
     return flown

@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array
 from analysis.models.elementary import cos, sin, whole_power
 from netem.faults.timeline import Conditions
@@ -94,11 +95,37 @@ class Integrators:
 
     def moved(self, at: Motion, flown: Array, push: Array, dt: float) -> Motion:
         """Each derivative is carried by those above it, up to the input, which is held."""
-        kept = [] if self.order == 1 else [*np.moveaxis(at.derivatives, 1, 0)]
-        driven = [*kept, flown]
-        position = carried([at.position, driven[0] + push, *driven[1:]], dt)
-        led = [carried(driven[order:], dt) for order in range(len(kept))]
-        return Motion(position, np.stack(led or [flown], axis=1), at.pose)
+        if self.order == 1:
+            return Motion(at.position + dt * (flown + push), flown[:, None], at.pose)
+        position, derivatives = _integrated(at.position, at.derivatives, flown, push, dt)
+        return Motion(position, derivatives, at.pose)
+
+
+@kernel("(D),(k,D),(D),(p),()->(D),(k,D)", "ddddd->dd")
+def _integrated(D: int) -> Plain:
+    """As `carried` has it, for the position and each derivative of one body; a push along one axis is one along all."""
+
+    def plain(
+        position: Array, derivatives: Array, flown: Array, push: Array, dt: float, moved: Array, led: Array
+    ) -> None:
+        number = len(derivatives)
+        for axis in range(D):
+            for level in range(number + 1):
+                value = derivatives[level - 1, axis] if level else position[axis]
+                weight, ways = 1.0, 1.0
+                for order in range(level, number + 1):
+                    rate = derivatives[order, axis] if order < number else flown[axis]
+                    if order == 0:
+                        rate += push[min(axis, len(push) - 1)]
+                    weight *= dt
+                    ways *= order - level + 1
+                    value += weight / ways * rate
+                if level:
+                    led[level - 1, axis] = value
+                else:
+                    moved[axis] = value
+
+    return plain
 
 
 @dataclass(frozen=True)
@@ -190,4 +217,14 @@ def flown(commanded: Array, coasting: Array, now: Conditions) -> Array:
     now
         Who has none; a body that holds does not fly at all.
     """
-    return np.where(now.coasting[:, None], coasting, np.where(now.still[:, None], 0.0, commanded))
+    flown: Array = _flown(commanded, coasting, now.coasting, now.still)
+    return flown
+
+
+@kernel("(D),(D),(),()->(D)", "dd??->d")
+def _flown(D: int) -> Plain:
+    def plain(commanded: Array, going_on: Array, coasts: bool, holds: bool, flown: Array) -> None:
+        for axis in range(D):
+            flown[axis] = going_on[axis] if coasts else 0.0 if holds else commanded[axis]
+
+    return plain

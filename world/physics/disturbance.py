@@ -70,32 +70,41 @@ class Disturbance:
         """The square root of `between`, lower triangular, shape (n, n)."""
         return _root(self.between(nominal))
 
-    def next(self, before: Array | None, white: Array, position: Array, root: Array) -> Array:
+    @cached_property
+    def still(self) -> bool:
+        """Whether nothing is displaced."""
+        return not self.covariance.any()
+
+    def drawn(self, white: Array, root: Array) -> Array:
+        """What is drawn for ticks, correlated as far as that is known ahead of them, shape (..., n, D), in metres.
+
+        Parameters
+        ----------
+        white
+            Standard normal draws, shape (..., n, D).
+        root
+            Of Q_A at nominal positions, shape (n, n).
+        """
+        drawn = product(white, _root(self.covariance).T)
+        return product(root, drawn) if self.kernel is not None and self.kernel.positions == "nominal" else drawn
+
+    def next(self, before: Array | None, drawn: Array, position: Array) -> Array:
         """The displacements of a tick, shape (R, n, D), in metres, of R swarms side by side.
 
         Parameters
         ----------
         before
             Those of the tick before, shape (R, n, D); None in the first.
-        white
-            Standard normal draws, shape (R, n, D).
+        drawn
+            What is drawn for the tick, shape (R, n, D), in metres.
         position
             Of the agents, shape (R, n, D), in metres.
-        root
-            Of Q_A at nominal positions, shape (n, n).
         """
-        drawn = product(white, self._root_axes.T)
         if self.kernel is not None and self.kernel.positions == "true":
             drawn = product(_root(self.kernel.correlation(position)), drawn)
-        elif self.kernel is not None:
-            drawn = product(root, drawn)
-        if before is None:
+        if before is None or self.persistence == 0.0:
             return drawn
         return self.persistence * before + np.sqrt(1.0 - self.persistence * self.persistence) * drawn
-
-    @cached_property
-    def _root_axes(self) -> Array:
-        return _root(self.covariance)
 
 
 def _root(covariance: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.kernels.kernel import Plain, kernel
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
@@ -12,7 +13,17 @@ from netem.faults.timeline import Conditions
 
 def relative(position: Array, links: Links) -> Array:
     """z_ij = z_i - z_j of every directed link j -> i, shape (..., L, D), for positions (..., N, D), in metres."""
-    return position.take(links.dst - 1, axis=-2) - position.take(links.src - 1, axis=-2)
+    between: Array = _between(position[..., None, :, :], links.dst, links.src)
+    return between
+
+
+@kernel("(n,D),(),()->(D)", "dll->d")
+def _between(D: int) -> Plain:
+    def plain(position: Array, dst: int, src: int, between: Array) -> None:
+        for axis in range(D):
+            between[axis] = position[dst - 1, axis] - position[src - 1, axis]
+
+    return plain
 
 
 def noise(standard: Array, covariance: Array) -> Array:

@@ -76,32 +76,46 @@ class MovingTarget:
     def sighting(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> Sighting:
         """What detectors say; `numbers` are those of the agents in their swarms, shape (N,)."""
         over = chase.due == tick
-        method = np.where(over, self.detectors.chosen(tick, seed, numbers, chase.turn), chase.method)
+        method, beginning = chase.method, np.flatnonzero(over)
+        if len(beginning):
+            method = method.copy()
+            method[beginning] = self.detectors.chosen(
+                tick, _of(seed, beginning), numbers[beginning], chase.turn[beginning]
+            )
         return Sighting(chase.found, over & (tick > 0), chase.method, method)
 
-    def step(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState) -> PursuitState:
-        """The next tick: detectors that are done begin again, and targets move on."""
-        over, method = chase.due == tick, self.sighting(tick, seed, numbers, chase).method
-        swarms = len(chase.target)
-        here = np.repeat(chase.target[:, 0], len(numbers) // swarms, axis=0)
-        seen = self.detectors.found(tick, seed, numbers, here, np.sqrt(self.target.variances[method]))
-        firsts = seed if isinstance(seed, int) else seed[:: len(numbers) // swarms]
-        return PursuitState(
-            target=self._moved(tick, firsts, chase.target),
-            method=method,
-            due=np.where(over, tick + self.target.latencies[method], chase.due),
-            found=np.where(over[:, None], seen, chase.found),
-            turn=chase.turn + over,
+    def step(self, tick: int, seed: Seed, numbers: Integers, chase: PursuitState, drive: Array) -> PursuitState:
+        """The next tick: detectors that are done begin again, and targets move on, driven as `drive` says, shape (S, m, D)."""
+        moved = chase._replace(target=self._moved(tick, chase.target, drive))
+        beginning = np.flatnonzero(chase.due == tick)
+        if not len(beginning):
+            return moved
+        method = self.sighting(tick, seed, numbers, chase).method
+        due, found, turn, by = chase.due.copy(), chase.found.copy(), chase.turn.copy(), method[beginning]
+        due[beginning] = tick + self.target.latencies[by]
+        found[beginning] = self.detectors.found(
+            tick,
+            _of(seed, beginning),
+            numbers[beginning],
+            chase.target[beginning // (len(numbers) // len(chase.target)), 0],
+            np.sqrt(self.target.variances[by]),
         )
+        turn[beginning] += 1
+        return moved._replace(method=method, due=due, found=found, turn=turn)
 
-    def _moved(self, tick: int, seed: Seed, targets: Array) -> Array:
-        """Where the targets (S, m, D) of swarms with these seeds are a tick later."""
+    def drive(self, ticks: Integers, seed: Seed, swarms: int) -> Array:
+        """What noise does to the targets of swarms with these seeds, one or (S,), in ticks, shape (T, S, m, D)."""
+        shape = (len(ticks), swarms, *self.start.shape)
+        if self.path is not None:
+            return np.zeros(shape)
+        white = normal(seed, Purpose.TARGET, tick=np.broadcast_to(ticks[:, None], shape[:2]), axes=shape[2] * shape[3])
+        return product(self._motion[1], white.reshape(shape))
+
+    def _moved(self, tick: int, targets: Array, drive: Array) -> Array:
+        """Where the targets (S, m, D) are a tick later."""
         if self.path is not None:
             return np.broadcast_to(self.path[tick + 1], targets.shape).copy()
-        swarms, order, axes = targets.shape
-        white = normal(seed, Purpose.TARGET, tick=np.full(swarms, tick), axes=order * axes)
-        drift, root = self._motion
-        return product(drift, targets) + product(root, white.reshape(targets.shape))
+        return product(self._motion[0], targets) + drive
 
     @cached_property
     def _motion(self) -> tuple[Array, Array]:
@@ -109,3 +123,8 @@ class MovingTarget:
         spread = diffusion(order, seconds, self.intensity)
         root = np.linalg.cholesky(spread) if self.intensity > 0.0 else np.zeros_like(spread)
         return transition(order, seconds), np.asarray(root, dtype=np.float64)
+
+
+def _of(seed: Seed, rows: Integers) -> Seed:
+    """The seeds of some agents."""
+    return seed if isinstance(seed, int) else seed[rows]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -132,8 +132,8 @@ class World:
         """Where every agent should be, shape (N, D): where the manoeuvre wants it, or at its place about the target."""
         if scene.chase is None:
             return self.target(tick)
-        size = self.formation.agents // self.swarms
-        return np.repeat(scene.chase.target[:, 0], size, axis=0) + self.formation.nominal
+        about = scene.chase.target[:, :1] + self._of_swarms(self.formation.nominal)
+        return about.reshape(self.formation.nominal.shape)
 
     def sighting(self, tick: int, scene: Scene) -> Sighting | None:
         """What the agents' detectors say of the target, if there is one."""
@@ -144,7 +144,7 @@ class World:
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
         """y_ij of every directed link, shape (L, D), in metres, or a unit vector, as the sensor says it."""
         measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
-        if not (now.bias.any() or now.outlier.any() or now.frozen.any()):
+        if not now.acting or not (now.bias.any() or now.outlier.any() or now.frozen.any()):
             return measured
         size = self._normal(Purpose.OUTLIER_SIZE, tick, self.formation.dimension)
         return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
@@ -157,7 +157,7 @@ class World:
 
     def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
         """The inputs that the bodies fly when their agents command these, shape (N, D)."""
-        return bodies.flown(commanded, self._body.coasting(scene.bodies), now)
+        return bodies.flown(commanded, self._body.coasting(scene.bodies), now) if now.acting else commanded
 
     def odometry(self, scene: Scene) -> Array | None:
         """The derivatives that agents are told, as in `Scene`, shape (N, K, D), unless their input says all."""
@@ -165,19 +165,16 @@ class World:
 
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
-        noise, still = self._disturb(tick, scene), now.still[:, None]
+        noise, chase = self._disturb(tick, scene), scene.chase
         moved = self._body.moved(scene.bodies, flown, now.push, self.dt)
-        chase = scene.chase
-        if self.pursuit is not None and chase is not None:
-            chase = self.pursuit.step(tick, self.seed, self._numbers, chase)
-        return Scene(
-            position=np.where(still, scene.position, moved.position + noise),
-            motion=np.where(still[..., None], 0.0, moved.derivatives),
-            measured=measured,
-            disturbance=noise,
-            chase=chase,
-            pose=np.where(still, scene.pose, moved.pose),
-        )
+        position, motion, pose = moved.position + noise, moved.derivatives, moved.pose
+        if now.acting:
+            still = now.still[:, None]
+            position, pose = np.where(still, scene.position, position), np.where(still, scene.pose, pose)
+            motion = np.where(still[..., None], 0.0, motion)
+        if self.pursuit is not None and self._drives is not None and chase is not None:
+            chase = self.pursuit.step(tick, self.seed, self._numbers, chase, self._drives.at(tick))
+        return Scene(position, motion, measured, noise, chase, pose)
 
     @cached_property
     def _body(self) -> Body:
@@ -196,31 +193,35 @@ class World:
         src, dst = self.links.ends.values()
         return normal(self.links.seeds(self.seed), purpose, tick=tick, src=src, dst=dst, axes=axes)
 
-    @property
+    @cached_property
     def _numbers(self) -> Integers:
         return self.links.own_number(np.arange(1, self.formation.agents + 1))
 
+    def _of_swarms(self, of_agents: Array) -> Array:
+        """Of agents (..., N, *), apart by swarms (..., S, n, *)."""
+        *batch, agents, size = of_agents.shape
+        return of_agents.reshape(*batch, self.swarms, agents // self.swarms, size)
+
     def _disturb(self, tick: int, scene: Scene) -> Array:
-        size = self.formation.agents // self.swarms
-
-        def by_swarm(of_agents: Array) -> Array:
-            return of_agents.reshape(self.swarms, size, -1)
-
-        pushed = self.disturbance.next(
-            by_swarm(scene.disturbance) if tick else None,
-            by_swarm(self._pushes.at(tick)),
-            by_swarm(scene.position),
-            self._between,
-        )
+        if self.disturbance.still:
+            return np.zeros_like(scene.position)
+        before = self._of_swarms(scene.disturbance) if tick else None
+        pushed = self.disturbance.next(before, self._pushes.at(tick), self._of_swarms(scene.position))
         return pushed.reshape(scene.position.shape)
 
     @cached_property
-    def _between(self) -> Array:
-        return self.disturbance.root(self.formation.nominal[: self.formation.agents // self.swarms])
+    def _pushes(self) -> DrawnAhead:
+        root = self.disturbance.root(self._of_swarms(self.formation.nominal)[0])
+
+        def pushes(ticks: Integers) -> Array:
+            axes, who = self.formation.dimension, self._numbers
+            white = normal(self.seed, Purpose.PROCESS_NOISE, tick=ticks[:, None], src=who, axes=axes)
+            return self.disturbance.drawn(self._of_swarms(white), root)
+
+        return DrawnAhead(pushes)
 
     @cached_property
-    def _pushes(self) -> DrawnAhead:
-        axes = self.formation.dimension
-        return DrawnAhead(
-            lambda ticks: normal(self.seed, Purpose.PROCESS_NOISE, tick=ticks[:, None], src=self._numbers, axes=axes)
-        )
+    def _drives(self) -> DrawnAhead | None:
+        seed = self.seed
+        first = seed if isinstance(seed, int) else seed[:: self.formation.agents // self.swarms]
+        return None if self.pursuit is None else DrawnAhead(partial(self.pursuit.drive, seed=first, swarms=self.swarms))

@@ -15,6 +15,7 @@ from affinet.scenario.sections import ScenarioError
 from affinet.studies import judging, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.quantities import NAMES, over_time
+from analysis.claims import checks
 from analysis.claims.intervals import Decision
 from analysis.figures import curves, paths
 from analysis.metrics.indicator import Bounds
@@ -105,6 +106,18 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
 def test_every_case_of_a_shipped_study_can_fly_be_drawn_and_be_judged(name, quick):
     shipped = study.load(name)
     assert [case for case, _ in study.plans(shipped, quick=quick)] == [*study.cases(shipped, quick=quick)]
+
+
+OF_MOST_RUNS = {"stays_below", "leaves", "exponential"}
+
+
+@pytest.mark.parametrize("name", study.shipped())
+def test_a_full_study_has_runs_enough_to_decide_what_most_of_them_do(name):
+    shipped = study.load(name)
+    if OF_MOST_RUNS & {claim.check for claim in shipped.claims}:
+        runs = shipped.full.runs
+        all_do = checks.stays_below("says", np.arange(2.0), np.zeros((runs, 2)), 1.0, (0.0, None), "m")
+        assert all_do.decision is Decision.HOLDS
 
 
 RIGID = [name for name in study.shipped() if name.startswith(("paper-001", "paper-004"))]

@@ -213,8 +213,14 @@ def test_the_study_that_these_are_mistakes_in_is_right(tmp_path):
 # ---- what was flown is kept
 
 
+@pytest.fixture
+def one_by_one(monkeypatch):
+    """As many processors as the study has cases, so that each is a batch."""
+    monkeypatch.setattr(study, "processors", lambda: 4)
+
+
 class Done:
-    """Cases flown in this process: no worker, no wait."""
+    """Batches flown in this process: no worker, no wait."""
 
     def __init__(self, fail_after=None):
         self.fail_after = fail_after
@@ -244,6 +250,7 @@ def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monk
     assert "test_study_checks.py" in (out / "report.log").read_text()
 
 
+@pytest.mark.usefixtures("one_by_one")
 def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "in_processes", Done(fail_after=3))
     out = tmp_path / "out"
@@ -251,6 +258,7 @@ def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, mo
     assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
 
 
+@pytest.mark.usefixtures("one_by_one")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT], ids=lambda one: one.name)
 def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_path, monkeypatch, capsys):
     class Ended(Done):

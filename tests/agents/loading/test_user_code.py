@@ -20,6 +20,7 @@ from affinet.planning import making
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
+from affinet.studies import study
 from affinet.testing.swarm import Broken, SwarmRuns
 from affinet.verdicts.checkers import always, eventually
 from affinet.verdicts.checking import Checker
@@ -690,22 +691,25 @@ def test_an_error_survives_the_way_from_a_worker(folder):
     assert str(caught.value).startswith(f"case {{}}: {name}:Own.fuse in tick 7: ")
 
 
-def test_a_study_names_the_case(folder, capsys):
-    name = write(folder, broken(ESTIMATOR, (SENSED, f"{SENSED} @ np.eye(3)")))
-    (folder / "mine.toml").write_text(f"""
+MINE = """
 title = "mine"
 source = "me"
 figure = "curves"
 scenario = "corridor"
-full = {{ runs = 1 }}
-quick = {{ runs = 1 }}
+full = { runs = 1 }
+quick = { runs = 1 }
 [[axes]]
 name = "column"
-values = {{ here = [] }}
+values = { here = [] }
 [[axes]]
 name = "row"
-values = {{ here = [] }}
-[[axes]]
+values = { here = [] }
+"""
+
+
+def test_a_study_names_the_case(folder, capsys):
+    name = write(folder, broken(ESTIMATOR, (SENSED, f"{SENSED} @ np.eye(3)")))
+    (folder / "mine.toml").write_text(f"""{MINE}[[axes]]
 name = "estimator"
 values = {{ none = ["agents.estimator=none"], own = ["agents.estimator={name}:Own"] }}
 """)
@@ -715,6 +719,32 @@ values = {{ none = ["agents.estimator=none"], own = ["agents.estimator={name}:Ow
         .err.splitlines()[-1]
         .startswith(f"case column=here, row=here, estimator=own: {name}:Own.sense: ValueE")
     )
+
+
+SET = 'set = ["agents.estimator={}:Own", "agents.law=rest", "time.dt=0.05", "time.duration=0.5"]'
+SHARES = """
+[[axes]]
+name = "share"
+values = { all = ["network.availability=1.0"], half = ["network.availability=0.5"] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("fails", "named"),
+    [
+        ("0.0 < seen.sum() < 0.9 * brief.present.sum()", "case column=here, row=here, share=half"),
+        ("np.size(brief.number) > 7", "case column=here, row=here, share=all, or column=here, row=here, share=half"),
+    ],
+    ids=["one of them", "nobody knows which"],
+)
+def test_of_cases_that_fly_together_the_one_is_named_whose_code_fails(fails, named, folder, capsys, monkeypatch):
+    monkeypatch.setattr(study, "processors", lambda: 1)  # both are one batch
+    monkeypatch.setattr(study, "in_processes", lambda work, given, _: (work(one) for one in given))
+    name = write(folder, broken(ESTIMATOR, (SENSED, f"1 / 0 if {fails} else {SENSED}")))
+    (folder / "mine.toml").write_text(SET.format(name) + MINE + SHARES)
+    assert main(["study", "mine.toml"]) == 3
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith(f"{named}: {name}:Own.sense in tick 0: ZeroDivisionError: division by zero")
 
 
 def test_a_hunt_ends_with_the_smallest_timeline_that_breaks_the_code(folder, capsys):

@@ -32,6 +32,9 @@ def runs(*means, noise=0.01, number=50, seed=1):
         ((1.0, np.nan), OPEN),
         ((1.0, np.nan, 2.5), FAILS),
         ((1.0,), OPEN),
+        ((0.0, 1.0), FAILS),
+        ((0.0, 0.0), OPEN),
+        ((-1.0, 1.0), FAILS),
     ],
 )
 def test_flat(means, decision):
@@ -175,6 +178,14 @@ def test_a_run_out_of_numbers_leaves_from_then_on():
 def below_in_mean(values, bound, defined=None):
     everywhere = np.ones(values.shape, dtype=bool)
     return checks.below_in_mean("says", SECONDS, values, bound, everywhere if defined is None else defined)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("value", "bound"), [(np.inf, np.inf), (1.0, np.inf), (np.inf, 1.0)])
+def test_nothing_infinite_is_below_in_mean_or_warns(value, bound):
+    values, bounds = np.full((50, 3, 2), value), np.full((50, 3, 2), bound)
+    found = checks.below_in_mean("says", SECONDS[:3], values, bounds, np.ones((50, 3, 2), dtype=bool))
+    assert found.decision is not HOLDS
 
 
 def test_below_in_mean_names_the_first_moment_above():
@@ -363,6 +374,14 @@ def test_what_falls_by_next_to_nothing_or_at_two_moments_is_open():
     verdict = checks.exponential("says", LATER, slowly, ALL)
     assert verdict.decision is OPEN
     assert "0 of 100 runs fall along a line" in verdict.found
+
+
+@pytest.mark.parametrize("rate", [1.0, 400.0])
+def test_of_an_error_that_comes_to_nothing_there_is_no_logarithm(rate):
+    seconds = np.arange(0.0, 5.0, 0.01)
+    falling = np.exp(-rate * seconds) * np.ones((50, 1))
+    falling[:, -1] = 0.0
+    assert checks.exponential("says", seconds, falling, ALL).decision is OPEN
 
 
 def test_an_exponential_is_looked_for_in_its_span_only():

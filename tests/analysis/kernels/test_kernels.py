@@ -32,6 +32,8 @@ def drawn(one, dimension, rng):
             given.append(rng.random(shape) < 0.7)
         elif letter == "l":
             given.append(rng.integers(0, 2, size=shape))
+        elif letter == "B":
+            given.append(rng.choice([0, 1, 2, 14, 255], size=shape).astype(np.uint8))
         else:
             given.append(rng.integers(0, 2**32, size=shape, dtype=np.uint64))
     return given
@@ -158,16 +160,128 @@ def squared(number):
     return number * number
 
 
-def calls_what_is_no_part():
+TABLE = {1.0: 2.0}
+
+
+def by_default():
+    def plain(number, made, factor=2.0):
+        made[0] = factor * number
+
+    return plain
+
+
+def of_a_module():
+    def plain(number, made):
+        made[0] = sys.maxsize * number
+
+    return plain
+
+
+def of_a_table():
+    def plain(number, made):
+        made[0] = TABLE[number]
+
+    return plain
+
+
+def no_part():
     def plain(number, made):
         made[0] = squared(number)
 
     return plain
 
 
-def test_a_function_that_is_no_part_is_refused():
-    with pytest.raises(TypeError, match="squared, which is no Part"):
-        kernel("()->()", "d->d")(calls_what_is_no_part)(np.ones(3))
+def raising():
+    def plain(number, made):
+        if number < 0.0:
+            raise ValueError("negative")
+        made[0] = number
+
+    return plain
+
+
+@Part
+def checked(number):
+    assert number > 0.0
+    return number
+
+
+def raising_within():
+    def plain(number, made):
+        made[0] = checked(number)
+
+    return plain
+
+
+@pytest.mark.parametrize(
+    ("factory", "why"),
+    [
+        (no_part, "squared, which is no Part"),
+        (by_default, "has no defaults: by_default"),
+        (of_a_module, "holds <module 'sys'"),
+        (of_a_table, r"holds {1.0: 2.0}: give it numbers"),
+        (raising, "raises nothing, as nobody would hear of it: raising"),
+        (raising_within, "nobody would hear of it: checked"),
+    ],
+)
+def test_what_is_not_compiled_with_it_or_may_change_unnoticed_is_refused(factory, why):
+    with pytest.raises(TypeError, match=why):
+        kernel("()->()", "d->d")(factory)(np.ones(3))
+
+
+def roomy(rows):
+    def factory():
+        def plain(numbers, made):
+            room = scratch(rows, 1)
+            for row in range(rows):
+                room[row, 0] = numbers[0]
+            made[0] = room[rows - 1, 0]
+
+        return plain
+
+    return factory
+
+
+def as_long_as_it_is():
+    def plain(numbers, made):
+        room = scratch(len(numbers), 1)
+        room[0, 0] = 1.0
+        made[0] = room[0, 0]
+
+    return plain
+
+
+def test_room_is_as_large_as_constants_say_and_has_a_limit():
+    assert kernel("(n)->()", "d->d")(roomy(2000))(np.full(1, 3.0)) == 3.0
+    with pytest.raises(Exception, match="room for 4096 numbers, and not for 5000 x 1"):
+        kernel("(n)->()", "d->d")(roomy(5000))(np.ones(1))
+    with pytest.raises(Exception, match="sizes that are constants"):
+        kernel("(n)->()", "d->d")(as_long_as_it_is)(np.ones(90))
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_another_number_of_arrays_is_refused(step):
+    numbers = np.ones((3, 8))[:, ::step]
+    with pytest.raises(TypeError, match="takes 1 arrays, not 2"):
+        _sum(numbers, np.empty(3))
+
+
+def looked_up(table):
+    def factory():
+        def plain(number, made):
+            made[0] = table[1000] * number
+
+        return plain
+
+    return factory
+
+
+def test_arrays_of_constants_count_to_the_last_digit(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for last in (2.0, 2.000000001, 3.0):
+        table = np.ones(2000)
+        table[1000] = last
+        assert kernel("()->()", "d->d")(looked_up(table))(np.ones(1)) == last
 
 
 def times(factor):

@@ -5,11 +5,11 @@ import pytest
 from scipy.linalg import orthogonal_procrustes
 
 from analysis.metrics.errors import (
-    change_of_step,
     covariance_trace,
     estimation_error,
     procrustes_error,
     rate_of_fall,
+    tick_flown,
     tracking_error,
 )
 from analysis.models.small import triangle
@@ -109,10 +109,43 @@ def test_steps_along_a_line_do_not_change_and_those_that_turn_do():
     straight = np.array([[[0.0, 0.0]], [[1.0, 2.0]], [[2.0, 4.0]]])
     back = np.array([[[0.0, 0.0]], [[3.0, 4.0]], [[0.0, 0.0]]])
     both = np.concatenate([straight, back], axis=-2)
-    assert change_of_step(straight, np.array([True])) == 0.0
-    assert change_of_step(back, np.array([True])) == 10.0
-    assert change_of_step(both, np.array([True, True])) == pytest.approx(10.0 / np.sqrt(2.0))
-    assert change_of_step(both, np.array([True, False])) == 0.0
+
+    def change(path, *present):
+        still = np.zeros_like(path[0])
+        return tick_flown(path, still, still, np.array(present)).change
+
+    assert change(straight, True) == 0.0
+    assert change(back, True) == pytest.approx(100.0)
+    assert change(both, True, True) == pytest.approx(50.0)
+    assert change(both, True, False) == 0.0
+    assert np.isnan(change(both, False, False))
+
+
+def test_a_tick_is_flown_with_the_tracking_error_and_the_longest_input():
+    rng = np.random.default_rng(1)
+    path, target, steered = rng.normal(size=(3, 50, 7, 3)), *rng.normal(size=(2, 50, 7, 3))
+    present = rng.random((50, 7)) < 0.7
+    tick = tick_flown(path, target, steered, present)
+    np.testing.assert_array_equal(tick.error, tracking_error(path[2], target, present))
+    np.testing.assert_allclose(tick.longest, np.linalg.norm(steered, axis=-1).max(axis=-1), rtol=1e-15)
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf, -np.inf])
+def test_whoever_has_left_the_numbers_is_infinitely_far_unless_absent(lost):
+    position, present = np.stack([POSITION] * 3), np.ones((3, 3), dtype=bool)
+    position[1:, 2, 1] = lost
+    present[2, 2] = False
+    with np.errstate(invalid="ignore"):
+        tick = tick_flown((position, position, position), TARGET, np.zeros((3, 3, 2)), present)
+    np.testing.assert_allclose(tick.error, [10.0, np.inf, 14.5])
+
+
+@pytest.mark.parametrize("agent", [0, 1, 2])
+def test_an_input_that_is_no_number_is_the_longest(agent):
+    steered = np.array([[3.0, 4.0], [1.0, 0.0], [6.0, 8.0]])
+    assert tick_flown([POSITION] * 3, TARGET, steered, np.array([True] * 3)).longest == 10.0
+    steered[agent, 0] = np.nan
+    assert np.isnan(tick_flown([POSITION] * 3, TARGET, steered, np.array([True] * 3)).longest)
 
 
 def test_rate_of_fall_is_that_of_an_exponential_and_nowhere_else_a_number():

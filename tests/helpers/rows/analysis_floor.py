@@ -167,7 +167,13 @@ CASES = {
     "analysis.metrics.errors.estimation_error": of(
         errors.estimation_error, real(AGENTS, 9, 2), real(AGENTS, 9, 2), truth(AGENTS, 9)
     ),
-    "analysis.metrics.errors.change_of_step": of(errors.change_of_step, real(3, AGENTS, 2), truth(AGENTS)),
+    "analysis.metrics.errors.tick_flown": of(
+        lambda earlier, before, now, target, steered, present: errors.tick_flown(
+            (earlier, before, now), target, steered, present
+        ),
+        *[real(AGENTS, 2)] * 5,
+        truth(AGENTS),
+    ),
     "analysis.metrics.errors.rate_of_fall": of(
         lambda error: errors.rate_of_fall(np.arange(7.0), error * error), real(7)
     ),

@@ -28,7 +28,7 @@ EXEMPT = {
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
         netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
-        netem.medium.verdict.stronger netem.medium.picking.picked
+        netem.medium.verdict.stronger netem.medium.verdict.also_held netem.medium.picking.picked
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
         netem.medium.medium.Medium.offered netem.medium.relay.Relayed.arriving
         netem.medium.relay.Relayed.awake netem.medium.relay.Relayed.seen netem.medium.relay.changed_on_the_way
@@ -41,7 +41,7 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
-        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
+        world.acts.Acts.together world.carrier.ProcessesActed.input
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
         world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
@@ -50,7 +50,8 @@ EXEMPT = {
     ONE_WORLD: """
         world.physics.detectors.Detectors.chosen world.physics.detectors.Detectors.found
         world.physics.target.MovingTarget.begin world.physics.target.MovingTarget.sighting
-        world.physics.target.MovingTarget.step world.physics.sensors.astray world.physics.world.World.begin
+        world.physics.target.MovingTarget.step world.physics.target.MovingTarget.drive
+        world.physics.sensors.astray world.physics.world.World.begin
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
         world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
         world.physics.world.World.odometry world.physics.world.World.step world.carrier.ZenohCarrier.carry world.flight.fly
@@ -102,7 +103,9 @@ EXEMPT = {
         agents.estimators.rkf.EdgeFilters.unknown
     """,
     PART: """
-        agents.algebra.geometry.disagreement agents.algebra.geometry.spans analysis.models.small.invert netem.core.draws.unit
+        agents.algebra.geometry.disagreement agents.algebra.geometry.spans agents.algebra.kalman.move
+        agents.algebra.kalman.observe analysis.models.affine.placed analysis.models.affine.travelling
+        analysis.models.small.invert netem.core.draws.unit
     """,
     PROTOCOL: """
         agents.laws.base.Law.command agents.laws.base.Law.step_matrix agents.laws.heard_late.Relaxed.step_matrix
@@ -117,6 +120,7 @@ EXEMPT = {
     """,
     FLOWN: """
         agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act
+        netem.medium.by_slot.sensed netem.medium.by_slot.arriving
     """,
 }
 NAMES = [name for names in EXEMPT.values() for name in names.split()]

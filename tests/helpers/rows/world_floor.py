@@ -1,5 +1,7 @@
 """`netem` and `world`."""
 
+from dataclasses import replace
+
 import numpy as np
 from flying import plan_of
 
@@ -31,6 +33,7 @@ TRACE = Trace(np.array([0, 5, 9]), np.random.default_rng(9).random((3, LINKS)), 
 LIAR = Fault(Verb.LIE, 0, 9, agents=(1,), matrix=((0.3, 0.7), (-1.1, 0.9)))
 KERNELS = {shape: disturbance.Kernel(shape, 2.0, "true") for shape in ("exponential", "squared-exponential")}
 PUSH = disturbance.Disturbance(np.array([[0.02, 0.01], [0.01, 0.03]]), KERNELS["exponential"], 0.6)
+AHEAD = disturbance.Kernel("exponential", 2.0, "nominal")
 NOMINAL = np.random.default_rng(7).normal(size=(9, 2))
 TIMES = [0.0, 0.4, 1.0]
 THETA, OFFSET = (np.random.default_rng(8).normal(size=(3, *size)) for size in ((2, 2), (2,)))
@@ -141,11 +144,9 @@ CASES = {
     "world.physics.disturbance.Kernel.correlation (squared-exponential)": of(
         KERNELS["squared-exponential"].correlation, real(9, 2)
     ),
-    "world.physics.disturbance.Disturbance.next": of(
-        lambda before, white, position: PUSH.next(before, white, position, PUSH.root(NOMINAL)),
-        real(9, 2),
-        real(9, 2),
-        real(9, 2),
+    "world.physics.disturbance.Disturbance.next": of(PUSH.next, real(9, 2), real(9, 2), real(9, 2)),
+    "world.physics.disturbance.Disturbance.drawn": of(
+        lambda white: replace(PUSH, kernel=AHEAD).drawn(white, PUSH.root(NOMINAL)), real(9, 2)
     ),
     "world.physics.bodies.carried": of(lambda *motion: bodies.carried(motion, 0.013), *[real(9, 2)] * 4),
     "world.physics.bodies.Integrators.moved": of(

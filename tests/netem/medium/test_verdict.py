@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from analysis.kernels.kernel import Kernel
+from netem.medium import verdict
 from netem.medium.verdict import BY_THE_AIR, PASSED, REASONS, STRONGEST_FIRST, VERDICT_OF, Verdict, stronger
 
 NUMBERS = {
@@ -44,6 +46,7 @@ def test_a_message_that_two_layers_hold_is_booked_under_the_stronger():
 def test_strength_is_no_matter_of_numbers(monkeypatch):
     turned = np.full(256, 255, dtype=np.uint8)
     turned[list(reversed(STRONGEST_FIRST))] = np.arange(len(STRONGEST_FIRST))
-    monkeypatch.setattr("netem.medium.verdict._RANK", turned)
+    monkeypatch.setattr(verdict, "_RANK", turned)
+    monkeypatch.setattr(verdict, "_stronger", Kernel(verdict._stronger.factory, "(),()->()", "BB->B"))
     dead, lost = np.array([Verdict.DEAD], dtype=np.uint8), np.array([Verdict.LOST], dtype=np.uint8)
     assert stronger(dead, lost) == stronger(lost, dead) == Verdict.LOST

@@ -209,6 +209,15 @@ def test_velocity_carries_the_target_of_this_tick_to_the_next():
     np.testing.assert_allclose(arrived, flown.target(41, NOMINAL), atol=1e-12)
 
 
+def test_velocities_and_accelerations_have_the_bits_of_differences_of_targets():
+    ticks = np.arange(-3, len(FLOWN.offset) + 3)[:, None]
+    before, here, after = (FLOWN.target(ticks + step, NOMINAL) for step in (-1, 0, 1))
+    velocity, gained = (after - here) / 0.3, (here - before) / 0.3
+    np.testing.assert_array_equal(FLOWN.velocity(ticks, NOMINAL, 0.3), velocity)
+    np.testing.assert_array_equal(FLOWN.acceleration(ticks, NOMINAL, 0.3), (velocity - gained) / 0.3)
+    assert velocity.any()
+
+
 def test_acceleration_is_what_the_velocity_gains():
     # Offsets that grow with the square of the tick, and a scale that grows with its cube.
     ticks = np.arange(6.0)

@@ -35,7 +35,7 @@ def test_the_displacements_have_the_covariance_of_agents_by_that_of_axes(shape, 
     runs = 40_000
     pushed = Disturbance(Q_D, kernel, 0.0)
     before, true = np.zeros((runs, 4, 2)), np.broadcast_to(true, (runs, 4, 2))
-    drawn = pushed.next(before, white(runs, 4, 2), true, pushed.root(nominal))
+    drawn = pushed.next(before, pushed.drawn(white(runs, 4, 2), pushed.root(nominal)), true)
     Q_A = kernel.correlation(PLACES)
     assert 0.1 < Q_A[0, 1] < 0.9
     assert_covariance(drawn.reshape(runs, 8), np.kron(Q_A, Q_D))
@@ -43,7 +43,8 @@ def test_the_displacements_have_the_covariance_of_agents_by_that_of_axes(shape, 
 
 def test_without_a_kernel_agents_are_pushed_each_by_itself():
     runs = 40_000
-    drawn = Disturbance(Q_D, None, 0.0).next(np.zeros((runs, 4, 2)), white(runs, 4, 2), white(runs, 4, 2), np.eye(4))
+    pushed = Disturbance(Q_D, None, 0.0)
+    drawn = pushed.next(np.zeros((runs, 4, 2)), pushed.drawn(white(runs, 4, 2), np.eye(4)), white(runs, 4, 2))
     assert_covariance(drawn.reshape(runs, 8), np.kron(np.eye(4), Q_D))
 
 
@@ -62,9 +63,9 @@ def test_the_squared_kernel_by_hand():
 def test_persistence_correlates_successive_ticks_and_leaves_the_covariance(persistence):
     runs, rng = 40_000, np.random.default_rng(1)
     pushed = Disturbance(Q_D, Kernel("exponential", 2.0, "nominal"), persistence)
-    now = np.zeros((runs, 2, 2))
+    now, root = np.zeros((runs, 2, 2)), pushed.root(PLACES[:2])
     for _ in range(60):
-        before, now = now, pushed.next(now, rng.normal(size=now.shape), now, pushed.root(PLACES[:2]))
+        before, now = now, pushed.next(now, pushed.drawn(rng.normal(size=now.shape), root), now)
     both = np.concatenate([before.reshape(runs, 4), now.reshape(runs, 4)], axis=1)
     in_a_tick = np.kron(Kernel("exponential", 2.0, "nominal").correlation(PLACES[:2]), Q_D)
     assert_covariance(both, np.kron([[1, persistence], [persistence, 1]], in_a_tick))
@@ -74,17 +75,17 @@ def test_agents_at_one_place_are_pushed_alike_if_it_is_true_places_that_count():
     here = np.array([[5.0, 5.0], [5.0, 5.0], [6.0, 5.0]])[None]
     for positions, alike in (("true", True), ("nominal", False)):
         pushed = Disturbance(Q_D, Kernel("exponential", 2.0, positions), 0.0)
-        (drawn,) = pushed.next(np.zeros((1, 3, 2)), white(1, 3, 2), here, pushed.root(PLACES[:3]))
+        (drawn,) = pushed.next(np.zeros((1, 3, 2)), pushed.drawn(white(1, 3, 2), pushed.root(PLACES[:3])), here)
         assert np.allclose(drawn[0], drawn[1], atol=1e-5) is alike
         assert not np.allclose(drawn[0], drawn[2], atol=1e-2)
 
 
 def test_every_swarm_is_pushed_by_its_own_places():
     pushed = Disturbance(Q_D, Kernel("exponential", 2.0, "true"), 0.0)
-    drawn, places = white(2, 4, 2), np.stack([PLACES, 3 * PLACES])
-    together = pushed.next(np.zeros((2, 4, 2)), drawn, places, pushed.root(PLACES))
+    drawn, places = pushed.drawn(white(2, 4, 2), pushed.root(PLACES)), np.stack([PLACES, 3 * PLACES])
+    together = pushed.next(np.zeros((2, 4, 2)), drawn, places)
     for run in range(2):
-        alone = pushed.next(np.zeros((1, 4, 2)), drawn[run : run + 1], places[run : run + 1], pushed.root(PLACES))
+        alone = pushed.next(np.zeros((1, 4, 2)), drawn[run : run + 1], places[run : run + 1])
         assert together[run].tobytes() == alone[0].tobytes()
 
 

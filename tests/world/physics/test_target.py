@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 from pursuits import ALONE, COARSE, NAME
-from targets import at_random, target_of, van_loan
+from targets import at_random, drive_of, target_of, van_loan
 
 from affinet.runtimes.run import rehearse
 from world.formation.manoeuvre import course
@@ -21,7 +21,8 @@ def step_of(target, dt=0.1, start=None, swarms=20_000, tick=3, intensity=None):
         target, dt, start, target.intensity if intensity is None else intensity, None, at_random(len(target.latencies))
     )
     seeds, first = np.arange(swarms, dtype=np.uint64), np.ones(swarms, dtype=np.int64)
-    return chase_of.step(tick, seeds, first, chase_of.begin(swarms, swarms)).target
+    chase, drive = chase_of.begin(swarms, swarms), drive_of(chase_of, tick, seeds, swarms)
+    return chase_of.step(tick, seeds, first, chase, drive).target
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -123,7 +124,7 @@ def detections(agents=60, ticks=400):
         else:
             assert not said.done.any()
         method = said.method
-        chase = chase_of.step(tick, 11, who, chase)
+        chase = chase_of.step(tick, 11, who, chase, drive_of(chase_of, tick, 11))
     return made, target
 
 

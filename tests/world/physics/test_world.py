@@ -15,7 +15,7 @@ from netem.faults.timeline import Timeline
 from world.formation.manoeuvre import corridor, hover
 from world.formation.nominal import PRESETS, Formation
 from world.physics import sensors
-from world.physics.bodies import BodyModel
+from world.physics.bodies import BodyModel, Integrators, Motion, carried
 from world.physics.disturbance import Disturbance
 from world.physics.world import Scene, World
 
@@ -372,6 +372,19 @@ def test_bodies_move_as_the_exponential_of_a_chain_of_integrators_says(world, or
     if order == 1:
         np.testing.assert_array_equal(here.velocity, u)
     np.testing.assert_array_equal(here.velocity, here.motion[:, 0])
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.parametrize("pushed", [1, 2], ids=["one push for all axes", "a push for each"])
+def test_integrators_have_the_bits_of_what_carries_their_derivatives(order, pushed):
+    rng = np.random.default_rng(order)
+    position, flown, push = (rng.normal(size=(7, axes)) for axes in (2, 2, pushed))
+    higher = [*rng.normal(size=(order - 1, 7, 2))]
+    moved = Integrators(order).moved(Motion(position, np.stack(higher, axis=1), NOWHERE), flown, push, 0.013)
+    driven = [*higher, flown]
+    np.testing.assert_array_equal(moved.position, carried([position, driven[0] + push, *driven[1:]], 0.013))
+    led = [carried(driven[level:], 0.013) for level in range(order - 1)]
+    np.testing.assert_array_equal(moved.derivatives, np.stack(led, axis=1))
 
 
 def test_single_and_double_integrators_fly_the_bits_of_their_formulas(world, heavy):
