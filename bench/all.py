@@ -3,7 +3,8 @@
     python bench/all.py [--only runs tick7 tick10 growth] [--rounds 5] [--share 1.0] [--keep] [--history FILE]
 
 Every ratio is affinet's cost by that of the peer: below 1 affinet is the cheaper. Peers and affinet take turns, round by
-round, and a ratio is the median of those of the rounds, with an interval of it. Ends with status 1 where a ratio is 20 % worse
+round, and a ratio is the median of those of the rounds, with an interval of it. A ratio whose interval is wider than 20 %, or
+of fewer than five rounds, is noisy: it is said, and neither kept nor compared. Ends with status 1 where a ratio is 20 % worse
 than the last that was kept on such a machine, beyond the intervals of both. docs/bench.md says how to read it.
 """
 
@@ -50,8 +51,10 @@ def main() -> None:
         exponents=_found(rows, "exponent"),
     )
     print(f"\n{entry.machine}; load {entry.load[0]:.1f} before, {entry.load[1]:.1f} after; {_listed(entry.versions)}")
+    if noisy := [row.name for row in rows if row.measured is not None and not row.is_steady]:
+        print(f"{len(noisy)} of {len(rows)} rows are noisy on this machine now, and neither kept nor compared")
     fallen = _compared(history.last(earlier, entry), entry.ratios)
-    if options.keep:
+    if options.keep and (entry.ratios or entry.exponents):
         history.keep(options.history, entry)
     sys.exit(1 if fallen else 0)
 
@@ -61,13 +64,13 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="some parts")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--share", type=float, default=1.0, help="of the ticks; compared with runs of the same share")
-    parser.add_argument("--keep", action="store_true", help="add this run to the history")
+    parser.add_argument("--keep", action="store_true", help="add what is not noisy to the history")
     parser.add_argument("--history", type=Path, default=history.FILE, metavar="FILE")
     return parser.parse_args()
 
 
 def _found(rows: Sequence[Row], kind: str) -> dict[str, Measured]:
-    return {row.name: row.measured for row in rows if row.kind == kind and row.measured is not None}
+    return {row.name: row.measured for row in rows if row.kind == kind and row.measured and row.is_steady}
 
 
 def _listed(versions: Mapping[str, str]) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from speed.lines import Lines, Pipes, Zenoh, ZeroMQ
 
+GO = "go\n"
 CHANNELS = ("input", "measurement", "theta")
 
 
@@ -19,8 +20,7 @@ def be_hub(lines: Lines, agents: int, ticks: int, size: Mapping[str, int]) -> No
     sense, said = lines.hears("sense"), lines.hears("said")
     inboxes = [lines.says(f"inbox/{agent}") for agent in range(1, agents + 1)]
     journal = lines.says("journal")
-    ready(lines)
-    for _ in range(ticks):
+    for _ in ticks_of_rounds(lines, ticks):
         sense()
         for inbox in inboxes:
             inbox(b"." * size["seen"])
@@ -32,16 +32,18 @@ def be_hub(lines: Lines, agents: int, ticks: int, size: Mapping[str, int]) -> No
 
 
 def be_world(lines: Lines, agents: int, ticks: int, size: Mapping[str, int]) -> None:
-    """Sense, and wait for everybody; prints the seconds of a tick."""
+    """Sense, and wait for everybody; prints the seconds of a tick, round by round."""
     acts, journal, sense = lines.hears("act"), lines.hears("journal"), lines.says("sense")
-    ready(lines)
-    began = time.perf_counter()
-    for _ in range(ticks):
+    began = 0.0
+    for tick in ticks_of_rounds(lines, ticks):
+        if tick == 0:
+            began = time.perf_counter()
         sense(b"." * size["sense"])
         journal()
         for _ in range(agents):
             acts()
-    print((time.perf_counter() - began) / ticks, flush=True)
+        if tick == ticks - 1:
+            print((time.perf_counter() - began) / ticks, flush=True)
 
 
 def be_agent(lines: Lines, agent: int, ticks: int, size: Mapping[str, int]) -> None:
@@ -49,8 +51,7 @@ def be_agent(lines: Lines, agent: int, ticks: int, size: Mapping[str, int]) -> N
     inbox = lines.hears(f"inbox/{agent}")
     said = [lines.says(f"said/{agent}/{channel}") for channel in CHANNELS]
     act = lines.says(f"act/{agent}")
-    ready(lines)
-    for _ in range(ticks):
+    for _ in ticks_of_rounds(lines, ticks):
         inbox()
         for broadcast in said:
             broadcast(b"." * size["said"])
@@ -58,11 +59,12 @@ def be_agent(lines: Lines, agent: int, ticks: int, size: Mapping[str, int]) -> N
         act(b"." * size["act"])
 
 
-def ready(lines: Lines) -> None:
-    """Say so, and wait for the word to begin."""
+def ticks_of_rounds(lines: Lines, ticks: int) -> Iterator[int]:
+    """Say that it is ready, and number the ticks of each round that somebody lets begin."""
     lines.await_everybody()
     print("ready", flush=True)
-    sys.stdin.readline()
+    while sys.stdin.readline() == GO:
+        yield from range(ticks)
 
 
 def _lines(told: Mapping[str, Any]) -> Lines:
@@ -87,7 +89,6 @@ def main() -> None:
         be_world(lines, agents, ticks, size)
     else:
         be_agent(lines, int(role), ticks, size)
-    sys.stdin.readline()
     lines.leave()
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import importlib.util
 import secrets
 import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
+from speed.launched import Cost
 from speed.lines import Pipes
-from speed.started import all_of
+from speed.started import PeerFailed, Process, all_of
 
 from affinet.planning.plan import Plan
 from netem.wire import messages
@@ -20,6 +24,7 @@ from netem.wire.session import HUB, WORLD, agent_name, socket_folder
 TRANSPORTS = ("pipes", "ZeroMQ", "Zenoh", "Ray actors")
 _NEEDS = {"ZeroMQ": "zmq", "Ray actors": "ray"}
 _TICK = 500  # a typical one
+_FAREWELL = 10.0  # s
 
 
 def is_installed(transport: str) -> bool:
@@ -27,13 +32,22 @@ def is_installed(transport: str) -> bool:
     return importlib.util.find_spec(_NEEDS.get(transport, "zenoh")) is not None
 
 
-def tick(transport: str, plan: Plan, ticks: int) -> float:
-    """Seconds of a tick in which nobody computes."""
+@contextmanager
+def standing(transport: str, plan: Plan, ticks: int) -> Iterator[Callable[[], Cost]]:
+    """A floor that waits for its rounds: each call flies so many ticks.
+
+    Between them its processes sleep. Those of Ray do not, they take a tenth of a core: each round of theirs starts them anew.
+
+    Raises
+    ------
+    PeerFailed
+        When it does not run on this machine.
+    """
     agents, size = plan.world.formation.agents, sizes(plan)
     shared = {"agents": agents, "ticks": ticks, "size": size}
     if transport == "Ray actors":
-        with all_of("ray_floor", {"driver": shared}) as (started):
-            return float(started["driver"].said())
+        yield lambda: _by_ray(shared)
+        return
     names = {"world": WORLD, "hub": HUB, **{str(agent): agent_name(agent) for agent in range(1, agents + 1)}}
     with tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder()) as private:
         passwords = {role: secrets.token_hex(8) for role in names}
@@ -46,9 +60,27 @@ def tick(transport: str, plan: Plan, ticks: int) -> float:
             role: shared | {"role": role, "login": [endpoint, name, passwords[role]]} for role, name in names.items()
         }
         with all_of("floor", told) as started:
-            for role in ("hub", *(role for role in names if role not in ("hub", "world")), "world"):
-                started[role].tell("go")
-            return float(started["world"].said())
+            yield lambda: _round(started)
+
+
+def _round(started: Mapping[str, Process]) -> Cost:
+    world = started["world"]
+    try:
+        for process in (*(process for process in started.values() if process is not world), world):
+            process.tell("go")
+        return Cost(float(world.said()))
+    except PeerFailed:  # the others would wait for it
+        for process in started.values():
+            process.kill()
+        raise
+
+
+def _by_ray(shared: Mapping[str, Any]) -> Cost:
+    with all_of("ray_floor", {"driver": shared}) as started:
+        cost = Cost(float(started["driver"].said()))
+        daemons = psutil.Process(started["driver"].pid).children(recursive=True)
+    psutil.wait_procs(daemons, timeout=_FAREWELL)  # they are busy with ending when their driver is gone
+    return cost
 
 
 def sizes(plan: Plan) -> dict[str, int]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from speed.lockstep import fly
+from speed.launched import fly
 from speed.measured import exponent, over_rounds
 from speed.problem import PATIENCE_S
 from speed.rows import Row, seconds
@@ -22,12 +22,14 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.scenario import loading
 
-_AGENTS, _AGENTS_OVER_PROCESSES, _REACHES = (5, 10, 20, 40), (5, 10, 20), (1, 2, 4, 8)
-_USUAL_REACH, _USUAL_AGENTS = 2, 20
-_TICKS, _TICKS_OVER_PROCESSES = 128, 150
+_SMALL, _LARGE = (5, 10, 20, 40), (80, 160, 320, 640)
+_SMALL_REACHES, _LARGE_REACHES = (1, 2, 4, 8), (4, 8, 16, 32)
+_OVER_PROCESSES, _REACHES_OVER_PROCESSES, _IN_HOSTS, _PER_HOST = (5, 10, 20), (1, 2, 4), (10, 20, 40), 5
+_USUAL_REACH, _FEW, _SOME, _MANY = 2, 10, 20, 160
+_TICKS, _TICKS_OVER_PROCESSES = 128, 120
 
 
-def ring(agents: int, reach: int, ticks: int) -> Plan:
+def ring(agents: int, reach: int, ticks: int, per_process: int = 1) -> Plan:
     """A plan of so many agents, linked to so many neighbours on each side."""
     places = [(math.cos(angle), math.sin(angle)) for angle in np.linspace(0.0, 2.0 * math.pi, agents, endpoint=False)]
     edges = {tuple(sorted((i, (i + far) % agents))) for i in range(agents) for far in range(1, reach + 1)}
@@ -40,6 +42,7 @@ def ring(agents: int, reach: int, ticks: int) -> Plan:
         f"[time]\ndt = 0.01\nduration = {ticks / 100:g}\npatience = {PATIENCE_S:g}",
         "[sensing]\nsigma = 0.1",
         '[agents]\nestimator = "rkf"\nlaw = "rest"',
+        f"per_process = {per_process}",
         "[network]\navailability = 0.7",
     ]
     with tempfile.TemporaryDirectory() as folder:
@@ -51,29 +54,34 @@ def ring(agents: int, reach: int, ticks: int) -> Plan:
 def measure(rounds: int, share: float) -> list[Row]:
     """Exponents of the tick."""
     ticks, over_processes = (max(5, round(many * share)) for many in (_TICKS, _TICKS_OVER_PROCESSES))
-    return [
-        _row(
-            f"tick in process, {_AGENTS[0]} to {_AGENTS[-1]} agents of {2 * _USUAL_REACH} neighbours",
-            _AGENTS,
-            [ring(agents, _USUAL_REACH, ticks) for agents in _AGENTS],
-            _in_process,
-            rounds,
-        ),
-        _row(
-            f"tick in process, {2 * _REACHES[0]} to {2 * _REACHES[-1]} neighbours of {_USUAL_AGENTS} agents",
-            _REACHES,
-            [ring(_USUAL_AGENTS, reach, ticks) for reach in _REACHES],
-            _in_process,
-            rounds,
-        ),
-        _row(
-            f"tick over processes, {_AGENTS[0]} to {_AGENTS_OVER_PROCESSES[-1]} agents of {2 * _USUAL_REACH} neighbours",
-            _AGENTS_OVER_PROCESSES,
-            [ring(agents, _USUAL_REACH, over_processes) for agents in _AGENTS_OVER_PROCESSES],
-            lambda plan: fly(plan).tick_s,
-            rounds,
-        ),
-    ]
+    rows = []
+    for sizes in (_SMALL, _LARGE):
+        plans = [ring(agents, _USUAL_REACH, ticks) for agents in sizes]
+        rows.append(_row(f"tick in process, {_agents(sizes)}", sizes, plans, _in_process, rounds))
+    for agents, reaches in ((_SOME, _SMALL_REACHES), (_MANY, _LARGE_REACHES)):
+        plans = [ring(agents, reach, ticks) for reach in reaches]
+        rows.append(_row(f"tick in process, {_neighbours(reaches, agents)}", reaches, plans, _in_process, rounds))
+    plans = [ring(agents, _USUAL_REACH, over_processes) for agents in _OVER_PROCESSES]
+    rows.append(_row(f"tick over processes, {_agents(_OVER_PROCESSES)}", _OVER_PROCESSES, plans, _flown, rounds))
+    plans = [ring(_FEW, reach, over_processes) for reach in _REACHES_OVER_PROCESSES]
+    what = f"tick over processes, {_neighbours(_REACHES_OVER_PROCESSES, _FEW)}"
+    rows.append(_row(what, _REACHES_OVER_PROCESSES, plans, _flown, rounds))
+    plans = [ring(agents, _USUAL_REACH, over_processes, _PER_HOST) for agents in _IN_HOSTS]
+    what = f"tick over processes of {_PER_HOST} agents each, {_agents(_IN_HOSTS)}"
+    rows.append(_row(what, _IN_HOSTS, plans, _flown, rounds))
+    return rows
+
+
+def _agents(sizes: Sequence[int]) -> str:
+    return f"{sizes[0]} to {sizes[-1]} agents of {2 * _USUAL_REACH} neighbours"
+
+
+def _neighbours(reaches: Sequence[int], agents: int) -> str:
+    return f"{2 * reaches[0]} to {2 * reaches[-1]} neighbours of {agents} agents"
+
+
+def _flown(plan: Plan) -> float:
+    return fly(plan).tick_s
 
 
 def _in_process(plan: Plan) -> float:
@@ -85,6 +93,7 @@ def _in_process(plan: Plan) -> float:
 
 
 def _row(name: str, sizes: Sequence[int], plans: Sequence[Plan], cost: Callable[[Plan], float], rounds: int) -> Row:
+    cost(plans[0])  # loads what is compiled
     costs = np.array([[cost(plan) for plan in plans] for _ in range(rounds)])
     least, most = (seconds(over_rounds(costs[:, size].tolist()).median) for size in (0, -1))
     return Row(name, f"{least} to {most}", "", "exponent", exponent(sizes, costs))

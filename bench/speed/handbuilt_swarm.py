@@ -1,15 +1,17 @@
-"""A swarm over ZeroMQ with filterpy in every agent, flown: the seconds of its tick, its start, and its memory."""
+"""A swarm over ZeroMQ with filterpy in every agent, flown: its tick, its start, and its memory."""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import psutil
+from speed.launched import Cost
 from speed.problem import numbers
 from speed.started import all_of
 
@@ -19,11 +21,9 @@ from netem.wire.session import socket_folder
 
 
 class Swarmed(NamedTuple):
-    """Seconds of a tick, seconds to the first tick, the largest agent's memory in MB, and the estimates, (T, L, D)."""
+    """What it cost, and its estimates, shape (T, L, D)."""
 
-    tick_s: float
-    start_s: float
-    memory_mb: float
+    cost: Cost
     estimate: Array
 
 
@@ -53,11 +53,17 @@ def fly(plan: Plan, *, as_affinet: bool = False) -> Swarmed:
             }  # fmt: skip
         launched = time.perf_counter()
         with all_of("handbuilt", told) as started:
+            processes = {role: psutil.Process(process.pid) for role, process in started.items()}
+            before = _processor_s(processes.values())
             for role in (*(role for role in started if role != "world"), "world"):
                 started[role].tell("go")
             start = time.perf_counter() - launched
             tick = float(started["world"].said())
-            pids = [process.pid for role, process in started.items() if role != "world"]
-            memory = max(psutil.Process(pid).memory_full_info().pss for pid in pids) / 1e6
+            busy = (_processor_s(processes.values()) - before) / swarm.ticks
+            memory = max(one.memory_full_info().pss for role, one in processes.items() if role != "world") / 2**20
         with np.load(Path(folder) / "arrays.npz") as arrays:
-            return Swarmed(tick, start, memory, arrays["estimate"])
+            return Swarmed(Cost(tick, busy, start, memory), arrays["estimate"])
+
+
+def _processor_s(processes: Iterable[psutil.Process]) -> float:
+    return float(sum(sum(process.cpu_times()[:2]) for process in processes))

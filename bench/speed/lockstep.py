@@ -7,80 +7,96 @@ which is looked at first, and keeps arrays of the run; affinet records with its 
 from __future__ import annotations
 
 import importlib.util
-import tempfile
 from collections import defaultdict
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 from speed import floors, handbuilt_swarm
+from speed.launched import Cost, fly
 from speed.monte_carlo import TOLERANCE, affinet
 from speed.problem import planned
 from speed.rows import Row, compared, missing
 from speed.started import PeerFailed
 
-from affinet.planning.plan import Plan
-from affinet.runtimes.launcher import Launcher
-
-_TICKS, _CHECKED = 250, 40
-_PEER_BY_HAND = "ZeroMQ and filterpy by hand"
+_TICKS, _BARE_TICKS, _CHECKED = 250, {"Ray actors": 250}, 40
+_USUAL_BARE_TICKS = 1000
+_PER_HOST = 5
+_FUSED, _ALONE, _HOSTS, _BARE = "GA-RKF", "RKF", f"RKF, {_PER_HOST} in a process", "RKF unrecorded"
+_BY_HAND = "ZeroMQ and filterpy by hand"
 _GROUP = "not installed: uv sync --inexact --group bench"
 
-
-class Flown(NamedTuple):
-    """Seconds of a tick, seconds to the first tick, and the largest agent's memory in MB, its share of what is shared."""
-
-    tick_s: float
-    start_s: float
-    memory_mb: float
+_Flight = Callable[[], Cost]
 
 
-def fly(plan: Plan) -> Flown:
-    """A run over processes.
+class _Pair(NamedTuple):
+    """Whose cost is held against whose."""
 
-    Raises
-    ------
-    SystemExit
-        When it fails.
-    """
-    with tempfile.TemporaryDirectory() as out:
-        flight = Launcher(plan, Path(out), watch=lambda *_: None).fly()
-    if flight.failure or flight.uninstructed:
-        raise SystemExit(f"the run failed: {flight.failure}, {flight.uninstructed} lost")
-    memory = max(process["pss_mb"] for process in flight.processes if process["role"] == "agent")
-    return Flown(flight.wall_s / plan.world.ticks, flight.start_s, memory)
+    what: str
+    cost: Literal["tick_s", "processor_s", "start_s", "memory_mb"]
+    ours: str
+    theirs: str
+
+
+_PAIRS = (
+    *(_Pair("tick", "tick_s", _FUSED, transport) for transport in floors.TRANSPORTS),
+    _Pair("tick", "tick_s", _ALONE, _BY_HAND),
+    _Pair("tick", "tick_s", _HOSTS, _BY_HAND),
+    _Pair("tick", "tick_s", _HOSTS, _ALONE),
+    _Pair("tick", "tick_s", _ALONE, _BARE),
+    _Pair("processors' time of a tick", "processor_s", _ALONE, _BY_HAND),
+    _Pair("processors' time of a tick", "processor_s", _HOSTS, _BY_HAND),
+    _Pair("processors' time of a tick", "processor_s", _HOSTS, _ALONE),
+    _Pair("processors' time of a tick", "processor_s", _ALONE, _BARE),
+    _Pair("start", "start_s", _ALONE, _BY_HAND),
+    _Pair("start", "start_s", _HOSTS, _ALONE),
+    _Pair("memory of an agent", "memory_mb", _ALONE, _BY_HAND),
+    _Pair("memory of an agent", "memory_mb", _HOSTS, _ALONE),
+)
 
 
 def measure(scenario: str, rounds: int, share: float) -> list[Row]:
     """Costs of a tick of a scenario, of its start, of memory, and of recording."""
+    costs, absent = defaultdict[str, list[Cost]](list), dict[str, str]()
+    with _flights(scenario, share, absent) as flights:
+        for _ in range(rounds):
+            for name, flight in flights.items():
+                if name not in absent:
+                    try:
+                        costs[name].append(flight())
+                    except PeerFailed as failure:
+                        absent[name] = str(failure)
+    agents = planned(scenario, 1).world.formation.agents
+    return [_row(agents, pair, costs, absent) for pair in _PAIRS]
+
+
+@contextmanager
+def _flights(scenario: str, share: float, absent: dict[str, str]) -> Iterator[Mapping[str, _Flight]]:
     ticks = max(5, round(_TICKS * share))
-    fused = planned(scenario, ticks, "agents.estimator='ga-rkf'")
-    filtered = planned(scenario, ticks)
+    fused, filtered = planned(scenario, ticks, "agents.estimator='ga-rkf'"), planned(scenario, ticks)
+    hosted = planned(scenario, ticks, f"agents.per_process={_PER_HOST}")
     bare = planned(scenario, ticks, "record.enabled=false")
-    by_hand = importlib.util.find_spec("zmq") is not None
-    if by_hand:
-        _check(scenario, max(5, round(_CHECKED * share)))
-    transports = [transport for transport in floors.TRANSPORTS if floors.is_installed(transport)]
-    absent = {transport: _GROUP for transport in floors.TRANSPORTS if transport not in transports}
-    costs: dict[str, list[float]] = defaultdict(list)
-    for _ in range(rounds):
-        for transport in [one for one in transports if one not in absent]:
+    flights: dict[str, _Flight] = {}
+    with ExitStack() as standing:
+        for transport in floors.TRANSPORTS:
+            if not floors.is_installed(transport):
+                absent[transport] = _GROUP
+                continue
             try:
-                costs[transport].append(floors.tick(transport, fused, ticks))
+                bare_ticks = max(5, round(_BARE_TICKS.get(transport, _USUAL_BARE_TICKS) * share))
+                flights[transport] = standing.enter_context(floors.standing(transport, fused, bare_ticks))
             except PeerFailed as failure:
                 absent[transport] = str(failure)
-        costs["GA-RKF"].append(fly(fused).tick_s)
-        recorded = fly(filtered)
-        costs["RKF"].append(recorded.tick_s)
-        costs["start"].append(recorded.start_s)
-        costs["memory"].append(recorded.memory_mb)
-        costs["unrecorded"].append(fly(bare).tick_s)
-        if by_hand:
-            theirs = handbuilt_swarm.fly(filtered)
-            costs["by hand"].append(theirs.tick_s)
-            costs["start by hand"].append(theirs.start_s)
-            costs["memory by hand"].append(theirs.memory_mb)
-    return _rows(f"{fused.world.formation.agents} agents", costs, absent, by_hand)
+        for name, plan in ((_FUSED, fused), (_ALONE, filtered), (_HOSTS, hosted), (_BARE, bare)):
+            flights[name] = partial(fly, plan)
+        if importlib.util.find_spec("zmq") is None:
+            absent[_BY_HAND] = _GROUP
+        else:
+            _check(scenario, max(5, round(_CHECKED * share)))
+            flights[_BY_HAND] = lambda: handbuilt_swarm.fly(filtered).cost
+        yield flights
 
 
 def _check(scenario: str, ticks: int) -> None:
@@ -91,20 +107,12 @@ def _check(scenario: str, ticks: int) -> None:
         raise SystemExit(f"bench/speed: the swarm built by hand estimates something else, off by {off:g} m")
 
 
-def _rows(who: str, costs: dict[str, list[float]], absent: dict[str, str], by_hand: bool) -> list[Row]:
-    rows = []
-    for transport in floors.TRANSPORTS:
-        name = f"tick of {who}: GA-RKF / {transport}, nobody computes"
-        if transport in absent:
-            rows.append(missing(name, absent[transport]))
-        else:
-            rows.append(compared(name, costs["GA-RKF"], costs[transport]))
-    rows.append(compared(f"tick of {who}: RKF recorded / unrecorded", costs["RKF"], costs["unrecorded"]))
-    if not by_hand:
-        return [*rows, missing(f"tick of {who}: RKF / {_PEER_BY_HAND}", _GROUP)]
-    return [
-        *rows,
-        compared(f"tick of {who}: RKF / {_PEER_BY_HAND}", costs["RKF"], costs["by hand"]),
-        compared(f"start of {who}: RKF / {_PEER_BY_HAND}", costs["start"], costs["start by hand"]),
-        compared(f"memory of an agent of {who}: RKF / {_PEER_BY_HAND}", costs["memory"], costs["memory by hand"], "MB"),
-    ]
+def _row(agents: int, pair: _Pair, costs: Mapping[str, Sequence[Cost]], absent: Mapping[str, str]) -> Row:
+    theirs = f"{pair.theirs}, nobody computes" if pair.theirs in floors.TRANSPORTS else pair.theirs
+    name = f"{pair.what}, {agents} agents: {pair.ours} / {theirs}"
+    if pair.theirs in absent:
+        return missing(name, absent[pair.theirs])
+    own, other = ([getattr(cost, pair.cost) for cost in costs[whose]] for whose in (pair.ours, pair.theirs))
+    if not np.isfinite([own, other]).all():
+        return missing(name, "too few ticks to tell")
+    return compared(name, own, other, "MB" if pair.cost == "memory_mb" else "s")

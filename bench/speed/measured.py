@@ -12,6 +12,7 @@ from analysis.models.arrays import Array
 
 WORSE = 0.2  # as a share: from here on a ratio is worse
 _CONFIDENCE = 0.95
+_FEWEST = 5  # rounds that tell how noisy the machine is
 
 
 class Measured(NamedTuple):
@@ -21,6 +22,11 @@ class Measured(NamedTuple):
     low: float
     high: float
     rounds: int
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the rounds agree well enough to tell that a ratio is 20 % worse."""
+        return self.rounds >= _FEWEST and self.high <= (1.0 + WORSE) * self.low
 
     def __str__(self) -> str:
         return f"{self.median:.3g} ({self.low:.3g} to {self.high:.3g})"
@@ -71,6 +77,11 @@ def exponent(sizes: Sequence[float], costs: Array) -> Measured:
     """
     at = np.log(sizes) - np.log(sizes).mean()
     return over_rounds((np.log(costs) @ at / (at @ at)).tolist())
+
+
+def of_twice_the_size(power: Measured) -> Measured:
+    """By how much what grows with this exponent costs more at twice the size."""
+    return Measured(2.0**power.median, 2.0**power.low, 2.0**power.high, power.rounds)
 
 
 def worsened(before: Measured, now: Measured) -> float:

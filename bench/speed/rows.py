@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from speed.measured import Measured, over_rounds, ratio
+from speed.measured import Measured, of_twice_the_size, over_rounds, ratio
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,20 @@ class Row:
     kind: Literal["ratio", "exponent", "nothing"]
     measured: Measured | None
 
+    @property
+    def is_steady(self) -> bool:
+        """Whether the rounds agree well enough for it to be kept and compared."""
+        match self.kind, self.measured:
+            case "ratio", Measured() as found:
+                return found.is_steady
+            case "exponent", Measured() as found:
+                return of_twice_the_size(found).is_steady
+        return False
+
     def __str__(self) -> str:
         found = "" if self.measured is None else str(self.measured)
         kind = "exponent " if self.kind == "exponent" else ""
-        rounds = "" if self.measured is None else str(self.measured.rounds)
+        rounds = "" if self.measured is None else str(self.measured.rounds) + ("" if self.is_steady else ", noisy")
         return f"| {self.name} | {self.ours} | {self.theirs} | {kind}{found} | {rounds} |"
 
 

@@ -36,10 +36,19 @@ class Process:
         self.tell(json.dumps(told))
 
     def tell(self, line: str) -> None:
-        """One line."""
+        """One line.
+
+        Raises
+        ------
+        PeerFailed
+            When it has ended.
+        """
         assert self._process.stdin
-        self._process.stdin.write(line + "\n")
-        self._process.stdin.flush()
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended() from None
 
     def said(self) -> str:
         """The next line it says.
@@ -51,17 +60,22 @@ class Process:
         """
         assert self._process.stdout
         if not (line := self._process.stdout.readline()):
-            raise PeerFailed(f"bench/speed/{self._module}.py ended with status {self._process.wait()}")
+            raise self._ended()
         return line.strip()
 
     def end(self) -> None:
         """Let it go, and wait for it."""
-        self._process.communicate("done\n", timeout=_PATIENCE)
+        if self._process.returncode is None:
+            self._process.communicate("done\n", timeout=_PATIENCE)
 
     def kill(self) -> None:
         """Whatever it does."""
-        self._process.kill()
-        self._process.communicate()
+        if self._process.returncode is None:
+            self._process.kill()
+            self._process.communicate()
+
+    def _ended(self) -> PeerFailed:
+        return PeerFailed(f"bench/speed/{self._module}.py ended with status {self._process.wait()}")
 
 
 @contextmanager
