@@ -3,9 +3,9 @@
     python bench/all.py [--only runs tick7 tick10 growth] [--rounds 5] [--share 1.0] [--keep] [--history FILE]
 
 Every ratio is affinet's cost by that of the peer: below 1 affinet is the cheaper. Peers and affinet take turns, round by
-round, and a ratio is the median of those of the rounds, with an interval of it. A ratio whose interval is wider than 20 %, or
-of fewer than five rounds, is noisy: it is said, and neither kept nor compared. Ends with status 1 where a ratio is 20 % worse
-than the last that was kept on such a machine, beyond the intervals of both. docs/bench.md says how to read it.
+round, and a ratio is the median of those of the rounds, with an interval of it. A ratio whose interval goes 20 % beyond it, or
+of fewer than five rounds, is noisy: that is said, and it is neither kept nor compared. Ends with status 1 where a ratio is 20 %
+worse than the last that was kept on such a machine, beyond the intervals of both. docs/bench.md says how to read it.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ _GROUP = "not installed: uv sync --inexact --group bench"
 _Flight = Callable[[], Cost]
 
 
-class _Pair(NamedTuple):
+class Pair(NamedTuple):
     """Whose cost is held against whose."""
 
     what: str
@@ -40,20 +40,20 @@ class _Pair(NamedTuple):
     theirs: str
 
 
-_PAIRS = (
-    *(_Pair("tick", "tick_s", _FUSED, transport) for transport in floors.TRANSPORTS),
-    _Pair("tick", "tick_s", _ALONE, _BY_HAND),
-    _Pair("tick", "tick_s", _HOSTS, _BY_HAND),
-    _Pair("tick", "tick_s", _HOSTS, _ALONE),
-    _Pair("tick", "tick_s", _ALONE, _BARE),
-    _Pair("processors' time of a tick", "processor_s", _ALONE, _BY_HAND),
-    _Pair("processors' time of a tick", "processor_s", _HOSTS, _BY_HAND),
-    _Pair("processors' time of a tick", "processor_s", _HOSTS, _ALONE),
-    _Pair("processors' time of a tick", "processor_s", _ALONE, _BARE),
-    _Pair("start", "start_s", _ALONE, _BY_HAND),
-    _Pair("start", "start_s", _HOSTS, _ALONE),
-    _Pair("memory of an agent", "memory_mb", _ALONE, _BY_HAND),
-    _Pair("memory of an agent", "memory_mb", _HOSTS, _ALONE),
+PAIRS = (
+    *(Pair("tick", "tick_s", _FUSED, transport) for transport in floors.TRANSPORTS),
+    Pair("tick", "tick_s", _ALONE, _BY_HAND),
+    Pair("tick", "tick_s", _HOSTS, _BY_HAND),
+    Pair("tick", "tick_s", _HOSTS, _ALONE),
+    Pair("tick", "tick_s", _ALONE, _BARE),
+    Pair("processors' time of a tick", "processor_s", _ALONE, _BY_HAND),
+    Pair("processors' time of a tick", "processor_s", _HOSTS, _BY_HAND),
+    Pair("processors' time of a tick", "processor_s", _HOSTS, _ALONE),
+    Pair("processors' time of a tick", "processor_s", _ALONE, _BARE),
+    Pair("start", "start_s", _ALONE, _BY_HAND),
+    Pair("start", "start_s", _HOSTS, _ALONE),
+    Pair("memory of an agent", "memory_mb", _ALONE, _BY_HAND),
+    Pair("memory of an agent", "memory_mb", _HOSTS, _ALONE),
 )
 
 
@@ -69,7 +69,7 @@ def measure(scenario: str, rounds: int, share: float) -> list[Row]:
                     except PeerFailed as failure:
                         absent[name] = str(failure)
     agents = planned(scenario, 1).world.formation.agents
-    return [_row(agents, pair, costs, absent) for pair in _PAIRS]
+    return [row(agents, pair, costs, absent) for pair in PAIRS]
 
 
 @contextmanager
@@ -107,7 +107,8 @@ def _check(scenario: str, ticks: int) -> None:
         raise SystemExit(f"bench/speed: the swarm built by hand estimates something else, off by {off:g} m")
 
 
-def _row(agents: int, pair: _Pair, costs: Mapping[str, Sequence[Cost]], absent: Mapping[str, str]) -> Row:
+def row(agents: int, pair: Pair, costs: Mapping[str, Sequence[Cost]], absent: Mapping[str, str]) -> Row:
+    """What came of a pair."""
     theirs = f"{pair.theirs}, nobody computes" if pair.theirs in floors.TRANSPORTS else pair.theirs
     name = f"{pair.what}, {agents} agents: {pair.ours} / {theirs}"
     if pair.theirs in absent:

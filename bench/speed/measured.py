@@ -25,8 +25,8 @@ class Measured(NamedTuple):
 
     @property
     def is_steady(self) -> bool:
-        """Whether the rounds agree well enough to tell that a ratio is 20 % worse."""
-        return self.rounds >= _FEWEST and self.high <= (1.0 + WORSE) * self.low
+        """Whether enough rounds lie within 20 % of their median."""
+        return self.rounds >= _FEWEST and max(self.high / self.median, self.median / self.low) <= 1.0 + WORSE
 
     def __str__(self) -> str:
         return f"{self.median:.3g} ({self.low:.3g} to {self.high:.3g})"

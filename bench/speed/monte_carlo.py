@@ -24,6 +24,7 @@ TOLERANCE = 1e-7  # m: what rounding leaves between filters that update by other
 SIDE_BY_SIDE = 200
 _TICKS = 128  # two blocks of draws that affinet makes ahead
 _CHECKED_RUNS = 2
+_AS_MANY = 3  # rounds for each that is asked for: they are short
 _ALONE, _MANY = "affinet, 1 run", f"affinet, {SIDE_BY_SIDE} runs"
 _OBJECTS, _NUMPY, _NUMPY_MANY = "filterpy, an object an edge", "NumPy, 1 run", f"NumPy, {SIDE_BY_SIDE} runs"
 _COMPILED = f"compiled loop, {SIDE_BY_SIDE} runs"
@@ -81,7 +82,7 @@ def measure(rounds: int, share: float) -> list[Row]:
         raise SystemExit(f"bench/speed: peers do not compute what affinet does, off by so many metres: {apart}")
     flights = _flights(plan, numbers(plan))
     costs: dict[str, list[float]] = {name: [] for name in flights}
-    for _ in range(rounds):
+    for _ in range(_AS_MANY * rounds):
         for name, flight in flights.items():
             began = time.process_time()
             flight.fly()

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,12 @@ class Process:
             self._process.communicate()
 
     def _ended(self) -> PeerFailed:
-        return PeerFailed(f"bench/speed/{self._module}.py ended with status {self._process.wait()}")
+        status = self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream
+            with suppress(BrokenPipeError):  # what it has not read
+                stream.close()
+        return PeerFailed(f"bench/speed/{self._module}.py ended with status {status}")
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from speed.measured import Measured, exponent, over_rounds, ratio, worse, worsened
+from speed.measured import Measured, exponent, of_twice_the_size, over_rounds, ratio, worse, worsened
 
 
 def rounds_of(true, spread, seed, rounds=9):
@@ -85,3 +85,11 @@ def test_the_exponent_of_a_power_is_found_whatever_the_speed_of_a_round():
     found = exponent(sizes, noisy)
     assert found.low < found.median < found.high
     assert found.median == pytest.approx(1.5, abs=0.2)
+
+
+def test_steady_is_what_lies_within_a_fifth_of_its_median():
+    assert Measured(12.0, 10.0, 14.4, 5).is_steady
+    assert not Measured(12.0, 10.0, 14.41, 5).is_steady
+    assert not Measured(12.0, 9.99, 14.0, 5).is_steady
+    assert not Measured(12.0, 12.0, 12.0, 4).is_steady
+    assert of_twice_the_size(Measured(2.0, 1.0, 3.0, 5)) == Measured(4.0, 2.0, 8.0, 5)

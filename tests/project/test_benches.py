@@ -18,7 +18,7 @@ SMALLEST = {
     "leaders": (("--swarms", "swarm50"), "| swarm50 | 8 | 7.0 | "),
     "all": (
         ("--only", "runs", "tick7", "growth", "--rounds", "1", "--share", "0.03"),
-        "| tick over processes, 5 to 20 agents of 4 neighbours | ",  # the last of them
+        "| tick over processes of 5 agents each, 10 to 40 agents of 4 neighbours | ",  # the last of them
     ),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }
