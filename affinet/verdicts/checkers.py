@@ -122,10 +122,7 @@ def recovers(level: float, within: float) -> Checker:
 
 
 def below(metric: str, level: float, *, since: float = 0.0, until: float | None = None) -> Checker:
-    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds.
-
-    In ticks in which there is something to take it of; vacuous where there is none. What is no number any more is not below.
-    """
+    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever there is any."""
     name = f"below({metric!r}, {level:g})"
     if metric not in METRICS:
         raise ValueError(f"{name}: no metric {metric!r}; {among(metric, METRICS)}")
