@@ -7,7 +7,7 @@ changes it.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -61,6 +61,8 @@ class MediumBrief:
         What the fields of each channel hold that agents look into.
     positioned
         Agents that have positioning, shape (N,).
+    hosts
+        For each process that carries several agents, which.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
     """
@@ -78,6 +80,7 @@ class MediumBrief:
     recorded: str | None
     forms: Mapping[str, Mapping[str, Form]]
     positioned: Mask
+    hosts: Mapping[int, tuple[int, ...]]
     journal: str
     batch: int
 
@@ -144,10 +147,11 @@ class MediumNode:
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
+        self._rosters = {host: session.says(keys.roster(host)) for host in brief.hosts}
 
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
-        await_heard([*self._inboxes.values(), self._journal])
+        await_heard([*self._inboxes.values(), *self._rosters.values(), self._journal])
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
@@ -167,6 +171,7 @@ class MediumNode:
                 where = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
                 decided = self._decide(sense.k, where)
             self._welcome_back(sense.k)
+            self._call(sense.k, set(decided.awake))
             self._hand_out_measurements(sense, decided)
             self._journal.say(decided.journal)
             self._collect(decided)
@@ -222,6 +227,24 @@ class MediumNode:
         for agent in self._relay.timeline.restarted(tick):
             self._numbers.restart(f"inbox {agent}")
             self._reader.restart(agent)
+
+    def _call(self, tick: int, awake: Collection[int]) -> None:
+        """Tell each host who of its agents takes part."""
+        if not self._rosters:
+            return
+        restarted, remembering = (
+            set(of(tick)) for of in (self._relay.timeline.restarted, self._relay.timeline.remembering)
+        )
+        for host, agents in self._brief.hosts.items():
+            roster = messages.Roster(
+                k=tick,
+                src=HUB,
+                seq=self._numbers.next(f"roster {host}"),
+                awake=[agent for agent in agents if agent in awake],
+                restarted=[agent for agent in agents if agent in restarted],
+                remembering=[agent for agent in agents if agent in remembering],
+            )
+            self._rosters[host].say(messages.pack(roster))
 
     def _hand_out_measurements(self, sense: messages.Sense, decided: Decided) -> None:
         clock = self._relay.timeline.clock(sense.k).tolist()
@@ -293,6 +316,7 @@ class MediumNode:
         return messages.pack(replace(said, payload=payload))
 
     def _end(self, tick: int) -> None:
+        self._call(tick, self._inboxes.keys())
         for agent, inbox in self._inboxes.items():
             number = self._numbers.next(f"inbox {agent}")
             inbox.say(messages.pack(messages.EndInbox(k=tick, src=HUB, seq=number)))
@@ -308,7 +332,7 @@ def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
-    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
+    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
     with supervisor.confessing(), Session(config) as session:
         from netem.medium import journal  # takes a while to import: everybody else can log in by now
 

@@ -56,6 +56,17 @@ class Sense(_Message, frozen=True, kw_only=True):
     fired: list[int]
 
 
+class Roster(_Message, frozen=True, kw_only=True):
+    """Medium to host: who of its agents gets an inbox in tick k, who of them was restarted, and who of those remembers."""
+
+    k: int
+    src: str
+    seq: int
+    awake: list[int]
+    restarted: list[int]
+    remembering: list[int]
+
+
 class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="sense"):
     """Medium to agent: the measurements of tick k that reached it.
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from msgspec.structs import asdict
 
-from agents.process import AgentNode
+from agents.arrivals import Arrivals
 from netem.core.links import Links
 from netem.core.plain import shown
 from netem.wire import messages
@@ -230,12 +230,11 @@ def test_an_act_that_is_none_of_this_tick_names_its_agent(plain, says):
 
 
 def heard(payload):
-    node = AgentNode.__new__(AgentNode)
-    node._width, node._slot, node._channels = 2, {5: 0, 6: 1}, {"input": {}}
-    node._forms = {"input": {"velocity": Form((2,), truths=False)}}
-    node._said_by = {"input": ["agent 5 on 'input'", "agent 6 on 'input'"]}
-    said = [messages.Broadcast(k=TICK, src=6, channel="input", seq=0, payload=payload)]
-    return node._gather(TICK, said)["input"].fields["velocity"][1].tolist()
+    forms = {"input": {"velocity": Form((2,), truths=False)}}
+    arrivals = Arrivals({1: (7,), 2: (5, 6)}, width=2, dimension=2, forms=forms)
+    said = messages.Broadcast(k=TICK, src=6, channel="input", seq=0, payload=payload)
+    inbox = messages.ExchangeInbox(k=TICK, src="netem", seq=0, messages=[said])
+    return arrivals.heard(TICK, {2: inbox})["input"].fields["velocity"][1, 1].tolist()
 
 
 def test_what_a_neighbour_says_is_heard_as_numbers():

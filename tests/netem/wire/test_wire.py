@@ -15,7 +15,7 @@ from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief
+from agents.process import AgentBrief, HostBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
@@ -101,6 +101,7 @@ MESSAGES = [
         handed=[1, 0],
         injected=None,
     ),
+    messages.Roster(k=7, src="netem", seq=7, awake=[1, 3], restarted=[3], remembering=[]),
 ]
 FIELDS = [
     pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in plain(message)
@@ -432,6 +433,7 @@ MEDIUM = MediumBrief(
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
+    hosts={1: (1, 3)},
     journal="/tmp/run/journal.arrows",
     batch=50,
 )
@@ -460,13 +462,14 @@ AGENT = AgentBrief(
 
 
 def plain_of(brief):
-    return msgpack.unpackb(msgpack.packb(to_plain(brief)))
+    return msgpack.unpackb(msgpack.packb(to_plain(brief)), strict_map_key=False)
 
 
 @pytest.mark.parametrize(
     "brief",
     [
         *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, limit=None, checkpoint=None, remembers=False)),
+        HostBrief(2, (AGENT, replace(AGENT, agent=3))),
         *(MEDIUM, *MEDIUM.faults, *MEDIUM.triggers),
     ],
     ids=[
@@ -474,6 +477,7 @@ def plain_of(brief):
         "no mission",
         "agent",
         "no limit, no checkpoint",
+        "host",
         "medium",
         *(f.verb for f in MEDIUM.faults),
         "above",
