@@ -138,3 +138,13 @@ def test_verdicts_on_our_own_claims_are_beneath_the_means(name):
 
 def test_verdicts_on_claims_of_papers_are_not_said_again():
     assert claims_page.page().partition("## Means of all cases")[2].count("| our own claim |") == len(OWN) > 0
+
+
+@pytest.mark.parametrize(
+    ("quantity", "low", "said"), [("error", -0.1, True), ("error", 0.1, False), ("fall", -0.1, False)]
+)
+def test_intervals_of_squares_that_reach_below_0_are_said_to_be_of_few_runs(quantity, low, said):
+    full = record.full_study("bursts")
+    case = full.cases[0].model_copy(update={"quantity": quantity, "low": low})
+    lines = list(claims_page._scattered(full.model_copy(update={"cases": [case]})))
+    assert any("few runs make the mean" in line for line in lines) == said
