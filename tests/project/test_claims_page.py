@@ -46,12 +46,6 @@ def test_what_judges_a_claim_has_to_be_said(left_out):
         claims_page.PaperClaim.model_validate(first)
 
 
-@pytest.mark.parametrize("name", [name for name in study.shipped() if record.full_study(name)])
-def test_full_verdicts_are_of_the_grid_that_the_study_has(name):
-    full = record.full_study(name)
-    assert full.flown == record.grid(study.load(name), quick=False), f"fly {name} again, or take its verdicts away"
-
-
 def test_cases_that_come_out_alike_are_counted_and_the_others_named():
     def found(case, decision):
         judged = record.JudgedClaim(says="s", asked="a", decision=Decision(decision), found="1 (0 to 2)")
