@@ -41,6 +41,8 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
+        agents.arrivals.Arrivals.sensed agents.arrivals.Arrivals.heard agents.arrivals.Arrivals.told
+        agents.batch.beside_others agents.batch.put_back agents.batch.come_back agents.algebra.late_news.blank
         world.acts.Acts.together world.carrier.ProcessesActed.input
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
