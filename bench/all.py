@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from speed.history import Entry
 from speed.measured import Measured, worse
 from speed.rows import Row
 
-PARTS: Mapping[str, Callable[[int, float], list[Row]]] = {
+PARTS: Mapping[str, Callable[[int, float], Iterable[Row]]] = {
     "runs": monte_carlo.measure,
     "tick7": partial(lockstep.measure, "corridor"),
     "tick10": partial(lockstep.measure, "hexa"),

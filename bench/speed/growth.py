@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,25 +51,24 @@ def ring(agents: int, reach: int, ticks: int, per_process: int = 1) -> Plan:
         return making.make(loading.load(str(file)))
 
 
-def measure(rounds: int, share: float) -> list[Row]:
+def measure(rounds: int, share: float) -> Iterator[Row]:
     """Exponents of the tick."""
     ticks, over_processes = (max(5, round(many * share)) for many in (_TICKS, _TICKS_OVER_PROCESSES))
-    rows = []
+    _in_process(ring(_SMALL[0], _USUAL_REACH, ticks))  # loads what is compiled
     for sizes in (_SMALL, _LARGE):
         plans = [ring(agents, _USUAL_REACH, ticks) for agents in sizes]
-        rows.append(_row(f"tick in process, {_agents(sizes)}", sizes, plans, _in_process, rounds))
+        yield _row(f"tick in process, {_agents(sizes)}", sizes, plans, _in_process, rounds)
     for agents, reaches in ((_SOME, _SMALL_REACHES), (_MANY, _LARGE_REACHES)):
         plans = [ring(agents, reach, ticks) for reach in reaches]
-        rows.append(_row(f"tick in process, {_neighbours(reaches, agents)}", reaches, plans, _in_process, rounds))
+        yield _row(f"tick in process, {_neighbours(reaches, agents)}", reaches, plans, _in_process, rounds)
     plans = [ring(agents, _USUAL_REACH, over_processes) for agents in _OVER_PROCESSES]
-    rows.append(_row(f"tick over processes, {_agents(_OVER_PROCESSES)}", _OVER_PROCESSES, plans, _flown, rounds))
+    yield _row(f"tick over processes, {_agents(_OVER_PROCESSES)}", _OVER_PROCESSES, plans, _flown, rounds)
     plans = [ring(_FEW, reach, over_processes) for reach in _REACHES_OVER_PROCESSES]
     what = f"tick over processes, {_neighbours(_REACHES_OVER_PROCESSES, _FEW)}"
-    rows.append(_row(what, _REACHES_OVER_PROCESSES, plans, _flown, rounds))
+    yield _row(what, _REACHES_OVER_PROCESSES, plans, _flown, rounds)
     plans = [ring(agents, _USUAL_REACH, over_processes, _PER_HOST) for agents in _IN_HOSTS]
     what = f"tick over processes of {_PER_HOST} agents each, {_agents(_IN_HOSTS)}"
-    rows.append(_row(what, _IN_HOSTS, plans, _flown, rounds))
-    return rows
+    yield _row(what, _IN_HOSTS, plans, _flown, rounds)
 
 
 def _agents(sizes: Sequence[int]) -> str:
@@ -93,7 +92,6 @@ def _in_process(plan: Plan) -> float:
 
 
 def _row(name: str, sizes: Sequence[int], plans: Sequence[Plan], cost: Callable[[Plan], float], rounds: int) -> Row:
-    cost(plans[0])  # loads what is compiled
     costs = np.array([[cost(plan) for plan in plans] for _ in range(rounds)])
     least, most = (seconds(over_rounds(costs[:, size].tolist()).median) for size in (0, -1))
     return Row(name, f"{least} to {most}", "", "exponent", exponent(sizes, costs))

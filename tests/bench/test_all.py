@@ -3,7 +3,6 @@
 import json
 import runpy
 import sys
-from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
@@ -134,10 +133,8 @@ def test_a_peer_that_ends_before_its_time_is_said_in_its_row(monkeypatch):
     with pytest.raises(PeerFailed, match=r"nothing\.py ended with status 1"), all_of("nothing", {"only": {}}):
         pass
 
-    @contextmanager
     def failed(*_):
         raise PeerFailed("it does not start")
-        yield
 
     monkeypatch.setattr(lockstep, "fly", lambda _: Cost(0.01, 0.01, 1.0, 10.0))
     monkeypatch.setattr(floors, "standing", failed)
