@@ -206,22 +206,23 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
 
 
 def _study(parsed: argparse.Namespace) -> int:
-    from affinet.studies import judging, record, report  # pyarrow and matplotlib take a while to import
+    from affinet.studies import judging, pool, record, report  # pyarrow and matplotlib take a while to import
     from affinet.studies import study as studies
+    from affinet.studies.executor import Lost
 
     study = studies.load(parsed.study)
     planned = studies.plans(study, quick=parsed.quick)
     out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
+    executor = pool.on_this_machine(parsed.jobs)
     results: list[Result] = []
     with directories.unless_empty(out), ended_by_signals():
         try:
             with show.Grid(study.title, [plan.world.ticks for _, plan in planned]) as grid:
-                for result in studies.fly(planned, study.size(quick=parsed.quick).runs, grid.look):
+                for result in studies.fly(planned, study.size(quick=parsed.quick).runs, executor, grid.look):
                     results.append(result)
                     grid.see(result)
-        except BrokenExecutor:
-            gone = f"a process that flew cases is gone, for want of memory perhaps; {out} has those done"
-            print(gone, file=sys.stderr)  # noqa: T201
+        except Lost as error:
+            print(f"{error}; {out} has those done", file=sys.stderr)  # noqa: T201
             return FAIL
         finally:
             if results:  # whatever happened meanwhile, what was flown is kept
