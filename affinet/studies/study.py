@@ -12,6 +12,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Se
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
@@ -38,6 +39,7 @@ from netem.processes.user_code import UserCodeError
 Labels = dict[str, str]
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
+_NOTHING: Mapping[Piece, Runs] = MappingProxyType({})
 
 
 # What checks compare with, and want to be told; the others need nothing.
@@ -270,6 +272,8 @@ def fly(
     planned: Sequence[tuple[Case, Plan]],
     runs: int,
     executor: Executor,
+    there: Mapping[Piece, Runs] = _NOTHING,
+    keep: Callable[[Piece, Runs], None] = lambda *_: None,
     watch: Callable[[Sequence[float]], None] = lambda _: None,
 ) -> Iterator[Result]:
     """So many runs of each case, in batches; each case in its turn, as soon as it is done.
@@ -280,6 +284,8 @@ def fly(
         The cases, and how many runs of each.
     executor
         Where they fly.
+    there, keep
+        What came of pieces of it that have flown already, and what is told of each piece as it is done.
     watch
         Told from time to time which share of each case has flown.
 
@@ -290,7 +296,6 @@ def fly(
     Lost
         When who flew them is gone.
     """
-    there: dict[Piece, Runs] = {}
     wanted = missing(there, len(planned), runs)
     shared = batches([plan for _, plan in planned], wanted, executor.at_once)
 
@@ -302,7 +307,10 @@ def fly(
         given = [[_part(*planned[piece.case], piece) for piece in batch] for batch in shared]
         with closing(executor.each(_fly, given, look)) as flown:
             for number, made in flown:
-                yield from zip(shared[number], made, strict=True)
+                pieces = list(zip(shared[number], made, strict=True))
+                for one in pieces:
+                    keep(*one)
+                yield from pieces
 
     with closing(coming()) as pieces:
         for (case, plan), whole in zip(planned, in_turn(pieces, len(planned), runs), strict=True):

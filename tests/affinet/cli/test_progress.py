@@ -57,6 +57,17 @@ def test_where_there_is_no_terminal_a_study_says_a_line_for_each_case(monkeypatc
     assert log.getvalue().splitlines()[1:] == ["losses: 2/2 cases  100 %  about 0:00:00 left  zhao7, none"]
 
 
+def test_what_has_flown_before_says_nothing_of_how_long_the_rest_takes(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", log := io.StringIO())
+    clock = Clock()
+    with Grid("losses", [100, 300], clock, there=[1.0, 0.0]) as grid:
+        grid.see(done("zhao7", "rkf"))
+        clock.seconds = 10.0
+        grid.look([1.0, 0.5])
+        grid.see(done("zhao7", "none"))
+    assert log.getvalue().splitlines()[0] == "losses: 1/2 cases  25 %  zhao7, rkf"
+
+
 def test_at_a_terminal_a_study_shows_how_far_it_is_within_a_case(monkeypatch):
     terminal, shown = pty.openpty()
     monkeypatch.setenv("TERM", "xterm")
