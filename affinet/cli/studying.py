@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from affinet.cli import show
@@ -12,7 +13,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.runtimes.interruption import ended_by_signals
 from affinet.scenario.words import one_line
-from affinet.studies import cells, identity, judging, pool, record, report
+from affinet.studies import cells, cluster, identity, judging, pool, record, report
 from affinet.studies import study as studies
 from affinet.studies.cells import Cells
 from affinet.studies.executor import Executor, Lost
@@ -30,11 +31,27 @@ def fly_and_report(parsed: argparse.Namespace) -> bool:
     """
     study = studies.load(parsed.study)
     planned = studies.plans(study, quick=parsed.quick)
+    with _executor(parsed, [plan for _, plan in planned]) as executor:
+        return _into_its_directory(study, planned, parsed, executor)
+
+
+@contextmanager
+def _executor(parsed: argparse.Namespace, plans: Sequence[Plan]) -> Iterator[Executor]:
+    if parsed.dask is None:
+        yield pool.on_this_machine(parsed.jobs)
+        return
+    with cluster.connected(parsed.dask, identity.own_modules(plans)) as workers:
+        yield workers
+
+
+def _into_its_directory(
+    study: Study, planned: Sequence[tuple[Case, Plan]], parsed: argparse.Namespace, executor: Executor
+) -> bool:
     out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
     of = identity.of_cells(study, [plan for _, plan in planned], quick=parsed.quick)
     with directories.unless_empty(out), cells.held(out, of, _note) as kept:
         try:
-            results = _flown(study, planned, parsed, pool.on_this_machine(parsed.jobs), kept)
+            results = _flown(study, planned, parsed, executor, kept)
         except Lost as error:
             _note(str(error))
             _go_on(kept)
