@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from analysis.models.affine import Manoeuvre
 from analysis.models.algebra import sum_over
@@ -119,18 +122,7 @@ class Brief:
 
     def of(self, row: int) -> Brief:
         """One place among those of a batch; the mission goes with it."""
-        return replace(
-            self,
-            number=self.number[row],
-            nominal=self.nominal[row],
-            relative=self.relative[row],
-            present=self.present[row],
-            back=self.back[row],
-            stress=self.stress[row],
-            leads=self.leads[row],
-            process=self.process[row],
-            leader=self.leader[row],
-        )
+        return replace(self, **{name: getattr(self, name)[row] for name in _OWN})
 
     @cached_property
     def degree(self) -> Array:
@@ -141,3 +133,13 @@ class Brief:
     def dimension(self) -> int:
         """D."""
         return self.nominal.shape[-1]
+
+
+_OWN = ("number", "nominal", "relative", "present", "back", "stress", "leads", "process", "leader")
+
+
+def together(briefs: Sequence[Brief]) -> Brief:
+    """The places of several agents as those of a batch; who is told the manoeuvre tells the others of it."""
+    missions = [brief.mission for brief in briefs if brief.mission is not None]
+    own: dict[str, Any] = {name: np.stack([getattr(brief, name) for brief in briefs]) for name in _OWN}
+    return replace(briefs[0], mission=missions[0] if missions else None, **own)

@@ -1,40 +1,45 @@
-"""One agent as a process (`python -m agents`): it hears the medium, lets `Agent` decide, and speaks on keys of its own."""
+"""Agents as a process (`python -m agents`): one, or several that a host carries as one batch.
+
+They hear the medium, let `Agent` decide, and speak, each on keys of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
 from agents import checkpoint
-from agents.agent import Agent, AgentState
-from agents.brief import Brief
-from agents.exchange import Heard
-from analysis.models.arrays import Array
-from analysis.models.pursuit import Sighting
+from agents.agent import Agent, AgentAction, AgentState
+from agents.arrivals import Arrivals, Sensed, forms_of
+from agents.batch import beside_others, come_back, put_back
+from agents.brief import Brief, together
+from agents.mailbox import Mailbox
 from netem.core import channels
 from netem.loading.choice import Choice
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
-from netem.wire.carrier import Session, await_heard
+from netem.wire.arrays import TRUTH, packed
+from netem.wire.carrier import Ear, Session, await_heard
 from netem.wire.keys import Keys
-from netem.wire.sequence import Numbering, Sequences
+from netem.wire.sequence import Sequences
 from netem.wire.session import CENTRE, HUB, Login, client
 
 
 @dataclass(frozen=True)
 class AgentBrief:
-    """All an agent process is told.
+    """All an agent is told.
 
     Parameters
     ----------
     run, login
-        Where it connects, and as whom.
+        Where its process connects, and as whom.
     agent, neighbours
         Its number, and the numbers of the agents in its neighbour slots.
     estimator, law, leaders, leader_gain, limit, reports, brief
@@ -61,178 +66,210 @@ class AgentBrief:
     remembers: bool
 
 
-# Which data types that came will do for one that is wanted.
-_KINDS = {"f": "iuf", "i": "i", "u": "iu", "b": "b"}
+@dataclass(frozen=True)
+class HostBrief:
+    """All a process is told that carries several agents.
+
+    Parameters
+    ----------
+    host
+        Which of the run's it is, from 1.
+    agents
+        What each of them is told.
+    """
+
+    host: int
+    agents: tuple[AgentBrief, ...]
 
 
-class AgentNode:
-    """One agent on the network."""
+class AgentsNode:
+    """Agents of one process on the network, computed as one batch."""
 
-    def __init__(self, session: Session, supervisor: Supervisor, brief: AgentBrief) -> None:
+    def __init__(
+        self, session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None = None
+    ) -> None:
+        """Nothing is said yet.
+
+        Parameters
+        ----------
+        session, supervisor
+            Where, and watched by whom.
+        briefs
+            What each of the agents is told.
+        host
+            Which of the run's hosts this is; None of an agent that has its process to itself.
+        """
+        first, brief = briefs[0], together([one.brief for one in briefs])
         self._supervisor = supervisor
-        self._number = brief.agent
-        self._neighbours = brief.neighbours
-        self._slot = {number: slot for slot, number in enumerate(brief.neighbours)}
-        self._agent = Agent(
-            brief.brief,
-            brief.estimator.build(),
-            brief.law.build(),
-            brief.leaders,
-            brief.leader_gain,
-            brief.limit,
-            brief.reports,
+        self._agents = Agent(
+            brief,
+            first.estimator.build(),
+            first.law.build(),
+            first.leaders,
+            first.leader_gain,
+            first.limit,
+            first.reports,
         )
-        self._width, self._dimension = brief.brief.relative.shape
-        self._checkpoint = None if brief.checkpoint is None else Path(brief.checkpoint)
-        self._state: AgentState = self._agent.init(())
-        if self._checkpoint and brief.remembers:
-            self._state = self._agent.revived(checkpoint.load(self._checkpoint, like=self._state))
-        elif self._checkpoint:  # it may die before it has acted, and what a predecessor wrote is not its own
-            checkpoint.save(self._checkpoint, self._state)
-        self._heard = 0
-        self._numbers = Numbering()
-        self._inboxes = Sequences("the medium's")
-        keys = Keys(brief.run)
-        self._inbox = session.hears(keys.inbox(self._number), 64)
-        self._channels = self._agent.channels()
-        self._silence = {
-            channel: {name: np.zeros(field.shape, dtype=field.dtype).tolist() for name, field in fields.items()}
-            for channel, fields in self._channels.items()
+        self._numbers = np.array([one.agent for one in briefs])
+        self._state = self._begun(first)
+        self._forms = forms_of(self._agents.channels())
+        neighbours, (width, dimension) = {one.agent: one.neighbours for one in briefs}, brief.relative.shape[-2:]
+        self._arrivals = Arrivals(neighbours, width, dimension, self._forms)
+        self._mailboxes = {
+            one.agent: Mailbox(
+                session, one.run, one.agent, one.neighbours, sorted(self._forms), hears_centre=one.hears_centre
+            )
+            for one in briefs
         }
-        spoken = sorted([channels.MEASUREMENT, *self._channels])
-        self._broadcasts = {name: session.says(keys.broadcast(self._number, name)) for name in spoken}
-        self._act = session.says(keys.act(self._number))
-        self._told = session.hears(keys.told(self._number), 64) if brief.hears_centre else None
-        self._tellings = Sequences("the centre's")
+        self._hears_centre = first.hears_centre
+        self._roster = None if host is None else Roster(session.hears(Keys(first.run).roster(host), 4))
+
+    def _begun(self, first: AgentBrief) -> AgentState:
+        fresh = self._agents.init(self._numbers.shape)
+        self._checkpoint = None if first.checkpoint is None else Path(first.checkpoint)
+        if self._checkpoint and first.remembers:
+            return self._agents.revived(checkpoint.load(self._checkpoint, like=fresh))
+        if self._checkpoint:  # it may die before it has acted, and what a predecessor wrote is not its own
+            checkpoint.save(self._checkpoint, fresh)
+        return fresh
 
     def await_everybody(self) -> None:
         """Wait until the medium and the world listen."""
-        await_heard([*self._broadcasts.values(), self._act])
+        await_heard(voice for mailbox in self._mailboxes.values() for voice in mailbox.voices)
 
     def run(self) -> None:
         """Sense, broadcast, hear and act until the medium says that the run is over."""
-        sensed: messages.SenseInbox | None = None
         tick = 0
         while True:
             self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
-            inbox = messages.unpack_inbox(self._inbox.next().data)
-            self._inboxes.check("inbox", inbox.seq)
-            tick = inbox.k
+            if not (awake := self._taking_part()):
+                continue
+            inboxes = {agent: inbox for agent in awake if isinstance(inbox := self._next(agent), messages.SenseInbox)}
+            if len(inboxes) < len(awake):
+                return
+            tick = inboxes[awake[0]].k
             self._supervisor.works(tick)
-            try:
-                if isinstance(inbox, messages.SenseInbox):
-                    sensed = inbox
-                    self._sense(inbox)
-                elif isinstance(inbox, messages.ExchangeInbox) and sensed is not None:
-                    self._exchange(inbox, sensed)
-                else:
-                    return
-            except UserCodeError as error:
-                error.tick = inbox.k
-                raise
+            with _at(tick):
+                self._live(tick, inboxes)
 
-    def _sense(self, inbox: messages.SenseInbox) -> None:
-        measured = np.zeros((self._width, self._dimension))
-        seen = np.zeros(self._width, dtype=bool)
-        if inbox.neighbours:
-            slots = [self._slot[number] for number in inbox.neighbours]
-            measured[slots], seen[slots] = inbox.measured, True
-        self._state, said = self._agent.sense(self._state, inbox.k, measured, seen, inbox.motion)
-        observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
-        for name, fields in {channels.MEASUREMENT: observed, **said}.items():
-            self._broadcasts[name].say(
-                messages.pack(
-                    messages.Broadcast(
-                        k=inbox.k, src=self._number, channel=name, seq=self._numbers.next(name), payload=dict(fields)
-                    )
-                )
-            )
+    def _taking_part(self) -> Sequence[int]:
+        if self._roster is None:
+            return [*self._mailboxes]
+        called = self._roster.next()
+        if called.restarted:
+            self._state = come_back(self._agents, self._numbers, self._state, called.restarted, called.remembering)
+            for agent in called.restarted:
+                self._mailboxes[agent].begin()
+        return called.awake
 
-    def _exchange(self, inbox: messages.ExchangeInbox, sensed: messages.SenseInbox) -> None:
-        self._heard += len(inbox.messages)
-        heard = {**self._gather(inbox.k, inbox.messages), **self._from_the_centre(inbox.k)}
-        sighting = _sighting(sensed.sighting)
-        self._state, action = self._agent.act(
-            self._state, sensed.clock, heard, sensed.position, sensed.motion, sighting
-        )
+    def _next(self, agent: int) -> messages.Inbox:
+        return self._mailboxes[agent].next_inbox()
+
+    def _live(self, tick: int, inboxes: Mapping[int, messages.SenseInbox]) -> None:
+        idle = ~np.isin(self._numbers, [*inboxes])
+        before, some_idle = self._state, bool(idle.any())
+        living = beside_others(before, idle, tick) if some_idle else before
+        sensed = self._arrivals.sensed(inboxes)
+        state = self._speak(tick, living, sensed, inboxes)
+        self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
+        state, action = self._act(tick, state, sensed, [*inboxes])
+        self._state = put_back(idle, before, state) if some_idle else state
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
-        estimate, degree = action.estimate, len(self._neighbours)
-        act = messages.Act(
-            k=inbox.k,
-            src=self._number,
-            seq=self._numbers.next("act"),
-            input=action.input,
-            estimate=estimate.relative[:degree],
-            known=estimate.known[:degree],
-            covariance=estimate.spread[:degree],
-            psi=float(estimate.psi),
-            feasible=None if estimate.feasible is None else bool(estimate.feasible),
-            reports=dict(estimate.reports),
-            heard=self._heard,
-        )
-        self._act.say(messages.pack(act))
+        self._tell(tick, action, [*inboxes])
 
-    def _from_the_centre(self, tick: int) -> Mapping[str, Heard]:
-        if self._told is None:
-            return {}
-        self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
-        told = messages.unpack(messages.Told, self._told.next().data)
+    def _speak(
+        self, tick: int, state: AgentState, sensed: Sensed, inboxes: Mapping[int, messages.SenseInbox]
+    ) -> AgentState:
+        state, said = self._agents.sense(state, tick, sensed.measured, sensed.seen, sensed.motion)
+        for row, (agent, mailbox) in enumerate(self._mailboxes.items()):
+            if (inbox := inboxes.get(agent)) is None:
+                continue
+            for channel, fields in said.items():
+                forms = self._forms[channel]
+                payload = {name: packed(fields[name][row], form.dtype) for name, form in forms.items()}
+                mailbox.broadcast(tick, channel, payload)
+            observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
+            mailbox.broadcast(tick, channels.MEASUREMENT, observed)
+        return state
+
+    def _act(
+        self, tick: int, state: AgentState, sensed: Sensed, awake: Collection[int]
+    ) -> tuple[AgentState, AgentAction]:
+        arrived = {agent: inbox for agent in awake if isinstance(inbox := self._next(agent), messages.ExchangeInbox)}
         self._supervisor.works(tick)
-        self._tellings.check("told", told.seq)
-        if told.k != tick:
-            raise messages.WireError(f"the centre told of tick {told.k} in tick {tick}")
-        fields = {"relative": told.relative, "covariance": told.covariance, "nis": told.nis}
-        return {channels.CENTRE: Heard(fields, self._agent.brief.present)}
+        heard = self._arrivals.heard(tick, arrived)
+        if self._hears_centre:
+            self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
+            told = {agent: self._mailboxes[agent].next_told() for agent in awake}
+            self._supervisor.works(tick)
+            heard[channels.CENTRE] = self._arrivals.told(tick, told, self._agents.brief.present)
+        return self._agents.act(state, sensed.clock, heard, sensed.position, sensed.motion, sensed.sighting)
 
-    def _gather(self, tick: int, arrived: list[messages.Broadcast]) -> Mapping[str, Heard]:
-        # Messages come sorted by tick, so what stands in a slot in the end is the newest.
-        said: dict[str, dict[int, messages.Broadcast]] = {name: {} for name in self._channels}
-        for message in arrived:
-            if message.channel in said:
-                said[message.channel][self._slot[message.src]] = message
-        return {name: self._heard_on(tick, name, said[name]) for name in self._channels}
-
-    def _heard_on(self, tick: int, channel: str, said: dict[int, messages.Broadcast]) -> Heard:
-        payloads = {slot: message.payload for slot, message in said.items()}
-        fields = {name: self._rows(channel, name, payloads) for name in self._channels[channel]}
-        age = np.zeros(self._width, dtype=np.int64)
-        for slot, message in said.items():
-            age[slot] = tick - message.k
-        return Heard(fields, np.array([slot in said for slot in range(self._width)]), age)
-
-    def _rows(self, channel: str, name: str, said: dict[int, Any]) -> Array:
-        field, silence = self._channels[channel][name], self._silence[channel][name]
-        kinds = _KINDS[np.dtype(field.dtype).kind]
-        try:
-            rows = np.array([said[slot][name] if slot in said else silence for slot in range(self._width)])
-        except (KeyError, TypeError, ValueError, OverflowError):
-            rows = np.array(None)
-        if rows.shape != (self._width, *field.shape) or rows.dtype.kind not in kinds:
-            rows = np.zeros((self._width, *field.shape))
-            for slot, payload in said.items():  # one of them is wrong: which
-                whose = f"agent {self._neighbours[slot]} on {channel!r}: {name!r}"
-                rows[slot] = messages.numbers(payload.get(name), whose, field.shape, kinds)
-        return rows.astype(field.dtype, copy=False)
+    def _tell(self, tick: int, action: AgentAction, awake: Collection[int]) -> None:
+        estimate, input_ = action.estimate, action.input
+        for row, (agent, mailbox) in enumerate(self._mailboxes.items()):
+            if agent not in awake:
+                continue
+            edges = slice(len(mailbox.neighbours))
+            mailbox.act(
+                tick,
+                input=packed(input_[row]),
+                estimate=packed(estimate.relative[row, edges]),
+                known=packed(estimate.known[row, edges], TRUTH),
+                covariance=packed(estimate.spread[row, edges]),
+                psi=float(estimate.psi[row]),
+                feasible=None if estimate.feasible is None else bool(estimate.feasible[row]),
+                reports={name: packed(said[row]) for name, said in estimate.reports.items()},
+            )
 
 
-def _sighting(said: messages.Sighted | None) -> Sighting | None:
-    if said is None:
-        return None
-    return Sighting(said.position, np.array(said.done), np.array(said.by), np.array(said.method))
+class Roster:
+    """Who of a host's agents takes part in each tick, as the medium calls it."""
+
+    def __init__(self, ear: Ear) -> None:
+        self._ear, self._calls = ear, Sequences("the medium's")
+
+    def next(self) -> messages.Roster:
+        """Wait for the next tick."""
+        called = messages.unpack(messages.Roster, self._ear.next().data)
+        self._calls.check("roster", called.seq)
+        return called
+
+
+@contextmanager
+def _at(tick: int) -> Iterator[None]:
+    try:
+        yield
+    except UserCodeError as error:
+        error.tick = tick
+        raise
 
 
 def main() -> NoReturn:
     """Fly one agent until the run is over; the process ends here, whatever threads the user's own code has started."""
-    leave(status_of(_fly))
+    leave(status_of(lambda: _fly(Supervisor())))
 
 
-def _fly() -> None:
-    supervisor = Supervisor()
+def host() -> NoReturn:
+    """Fly the agents of a host."""
+    leave(status_of(lambda: _carry(Supervisor())))
+
+
+def _fly(supervisor: Supervisor) -> None:
     brief = supervisor.brief(AgentBrief)
     with supervisor.confessing(), Session(client(brief.login)) as session:
-        node = AgentNode(session, supervisor, brief)
-        node.await_everybody()
-        supervisor.tell("ready")
-        node.run()
-        supervisor.tell("done")
+        _until_the_end(supervisor, AgentsNode(session, supervisor, [brief]))
+
+
+def _carry(supervisor: Supervisor) -> None:
+    brief = supervisor.brief(HostBrief)
+    with supervisor.confessing(), Session(client(brief.agents[0].login)) as session:
+        _until_the_end(supervisor, AgentsNode(session, supervisor, brief.agents, brief.host))
+
+
+def _until_the_end(supervisor: Supervisor, node: AgentsNode) -> None:
+    node.await_everybody()
+    supervisor.tell("ready")
+    node.run()
+    supervisor.tell("done")

@@ -79,7 +79,7 @@ def main() -> None:
     told = json.loads(sys.stdin.readline())
     role, agents, ticks, size = told["role"], told["agents"], told["ticks"], told["size"]
     keys, login = Keys("floor"), Login(*told["login"])
-    config = hub(login, told["users"], keys, range(1, agents + 1)) if role == HUB else client(login)
+    config = hub(login, told["users"], keys, range(1, agents + 1), {}) if role == HUB else client(login)
     with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
         if role == HUB:
             be_hub(session, keys, agents, ticks, size)

@@ -27,6 +27,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.launcher import Launcher
 from affinet.scenario import loading
 from netem.wire import messages
+from netem.wire.arrays import CODE, TRUTH, packed
 from netem.wire.session import ENVIRONMENT, HUB, WORLD, agent_name
 
 
@@ -37,12 +38,12 @@ def sizes(plan: Plan) -> dict[str, int]:
     agents = plan.world.formation.agents
     degree = round(links / agents)
     heard = round(degree * plan.scenario.network.availability)
-    nothing = np.empty((0, 5), dtype=np.int64)
-    map_ = number(size=(dimension, dimension))
+    nothing = b""
+    map_ = packed(number(size=(dimension, dimension)))
     said: dict[str, dict[str, Any]] = {
-        "input": {"velocity": number(size=dimension)},
-        "measurement": {"neighbours": [1] * heard, "measured": number(size=(heard, dimension))},
-        "theta": {"local": map_, "feasible": True, "consensus": map_, "started": True},
+        "input": {"velocity": packed(number(size=dimension))},
+        "measurement": {"neighbours": [1] * heard, "measured": packed(number(size=(heard, dimension)))},
+        "theta": {"local": map_, "feasible": b"\1", "consensus": map_, "started": b"\1"},
     }
     broadcasts = [
         messages.pack(messages.Broadcast(k=500, src=1, channel=name, seq=500, payload=fields))
@@ -55,8 +56,8 @@ def sizes(plan: Plan) -> dict[str, int]:
                 src=WORLD,
                 seq=500,
                 last=False,
-                measured=number(size=(links, dimension)),
-                position=number(size=(agents, 2)),
+                measured=packed(number(size=(links, dimension))),
+                position=packed(number(size=(agents, 2))),
                 motion=None,
                 sightings=None,
                 fired=[],
@@ -69,7 +70,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 seq=500,
                 clock=500,
                 neighbours=[1] * heard,
-                measured=number(size=(heard, 2)),
+                measured=packed(number(size=(heard, 2))),
                 position=None,
                 motion=None,
                 sighting=None,
@@ -81,10 +82,10 @@ def sizes(plan: Plan) -> dict[str, int]:
                 k=500,
                 src=1,
                 seq=500,
-                input=number(size=dimension),
-                estimate=number(size=(degree, dimension)),
-                known=np.ones(degree, dtype=bool),
-                covariance=number(size=(degree, dimension * (dimension + 1) // 2)),
+                input=packed(number(size=dimension)),
+                estimate=packed(number(size=(degree, dimension))),
+                known=packed(np.ones(degree), TRUTH),
+                covariance=packed(number(size=(degree, dimension * (dimension + 1) // 2))),
                 psi=0.1,
                 feasible=True,
                 reports={},
@@ -96,7 +97,7 @@ def sizes(plan: Plan) -> dict[str, int]:
                 k=500,
                 src=HUB,
                 seq=500,
-                verdicts=np.ones((4, links), np.uint8),
+                verdicts=packed(np.ones((4, links)), CODE),
                 odd=nothing,
                 apart=nothing,
                 late=0,

@@ -20,6 +20,7 @@ from pydantic import Field, model_validator
 
 from affinet.studies import judging, record
 from affinet.studies import study as studies
+from affinet.studies.batch import REPORT
 from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
 from affinet.studies.study import Claim, Study
 from analysis.claims.intervals import Decision, all_of
@@ -27,6 +28,7 @@ from analysis.claims.intervals import Decision, all_of
 DOCS = Path(__file__).parent
 PAGE = DOCS / "claims.md"
 PICTURES = DOCS / "pictures"
+_SIGNED = {"fall"}  # quantities that may be negative
 _MANY = 4  # cases that come out alike are counted
 _NOT_FLOWN = "not flown in full yet"
 NOT_ALL_FLOWN, NOT_JUDGED = "not all flown in full yet", "not judged"
@@ -99,12 +101,14 @@ def page() -> str:
         "## Means of all cases",
         "",
         "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own,",
-        "which are with them. Verdicts on claims that no paper makes are beneath the means.",
+        "which are with them. Verdicts on claims that no paper makes are beneath the means. An `estimation_error` is the",
+        "norm of the errors of all edges together; a `covariance_trace` is summed over all edges",
+        "([quantities](studies.md#a-study-of-your-own)).",
     ]
     of_papers = _asked_by_papers(rows, named)
     for name in named:
         if full := record.full_study(name):
-            lines += ["", f"### {name}", "", *_whence(name, full), "", *_cases(full)]
+            lines += ["", f"### {name}", "", *_whence(name, full), "", *_cases(full), *_scattered(full)]
             lines += _own([claim for claim in full.claims if (name, claim.asked) not in of_papers])
     return "\n".join(lines) + "\n"
 
@@ -281,6 +285,20 @@ def _cases(full: StudyRecord) -> Iterator[str]:
     for labels in dict.fromkeys(tuple(case.labels.values()) for case in full.cases):
         means = {case.quantity: case for case in full.cases if tuple(case.labels.values()) == labels}
         yield "| " + " | ".join([*labels, *(_mean(means[name]) for name in quantities)]) + " |"
+
+
+def _scattered(full: StudyRecord) -> Iterator[str]:
+    """What to think of means of squares, lengths and shares whose intervals have negative numbers in them."""
+    if any(
+        case.low is not None
+        and case.low < 0.0
+        and case.quantity not in _SIGNED
+        and not case.quantity.startswith(REPORT)
+        for case in full.cases
+    ):
+        yield ""
+        yield "No such quantity is negative: where an interval reaches below 0, few runs make the mean, as runs are of very"
+        yield "different sizes, and it tells an order of magnitude at best. The interval is Student's, of what is symmetric."
 
 
 def _mean(case: CaseMean) -> str:

@@ -7,10 +7,10 @@ changes it.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -28,7 +28,8 @@ from netem.medium.medium import Medium, recorded
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
-from netem.wire.broadcasts import Broadcasts, fields
+from netem.wire.arrays import CODE, WHOLE, Form, WireError, channel_rows, numbers, packed
+from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
@@ -56,8 +57,12 @@ class MediumBrief:
         Faults that an earlier run was given while it flew.
     recorded
         The journal of an earlier run that is to be judge of this one.
+    forms
+        What the fields of each channel hold that agents look into.
     positioned
         Agents that have positioning, shape (N,).
+    hosts
+        For each process that carries several agents, which.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
     """
@@ -73,13 +78,14 @@ class MediumBrief:
     triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
+    forms: Mapping[str, Mapping[str, Form]]
     positioned: Mask
+    hosts: Mapping[int, tuple[int, ...]]
     journal: str
     batch: int
 
 
-@dataclass(frozen=True)
-class Arriving:
+class Arriving(NamedTuple):
     """A broadcast on its way into an inbox: the tick it speaks of, who said it on which link and channel, how corrupted."""
 
     content: int
@@ -100,7 +106,7 @@ class Decided:
     awake
         Numbers of the agents that hear and speak.
     seen
-        For each agent, the rows of the links whose measurement reaches it.
+        The rows of links whose measurement arrives, and where those of each agent end among them, from 0 on.
     heard
         For each agent, the broadcasts that reach it, in order.
     entry, journal
@@ -109,7 +115,7 @@ class Decided:
 
     relayed: Relayed
     awake: tuple[int, ...]
-    seen: dict[int, list[int]]
+    seen: tuple[Integers, list[int]]
     heard: dict[int, list[Arriving]]
     entry: Entry
     journal: bytes
@@ -127,6 +133,7 @@ class MediumNode:
         self._awaited: set[tuple[int, str]] = set()
         self._links = brief.links
         self._src, self._dst = brief.links.src.tolist(), brief.links.dst.tolist()
+        self._ends = np.concatenate([[0], np.cumsum(brief.links.degree)])
         timeline = Timeline(brief.links, brief.faults, brief.triggers, brief.injected)
         path = None if brief.recorded is None else Path(brief.recorded)
         verdicts = recorded(path, brief.links, brief.channels)
@@ -140,10 +147,11 @@ class MediumNode:
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
+        self._rosters = {host: session.says(keys.roster(host)) for host in brief.hosts}
 
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
-        await_heard([*self._inboxes.values(), self._journal])
+        await_heard([*self._inboxes.values(), *self._rosters.values(), self._journal])
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
@@ -160,8 +168,10 @@ class MediumNode:
             if sense.fired:
                 self._relay.fire(sense.fired, sense.k)
             if decided is None:
-                decided = self._decide(sense.k, sense.position)
+                where = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
+                decided = self._decide(sense.k, where)
             self._welcome_back(sense.k)
+            self._call(sense.k, set(decided.awake))
             self._hand_out_measurements(sense, decided)
             self._journal.say(decided.journal)
             self._collect(decided)
@@ -182,7 +192,13 @@ class MediumNode:
             src=HUB,
             seq=self._numbers.next("journal"),
             handed=[len(heard[agent]) for agent in self._inboxes],
-            **entry._asdict(),
+            verdicts=packed(entry.verdicts, CODE),
+            odd=packed(entry.odd, WHOLE),
+            apart=packed(entry.apart, WHOLE),
+            late=int(entry.late),
+            dropped=packed(entry.dropped, WHOLE),
+            released=packed(entry.released, WHOLE),
+            injected=entry.injected,
         )
         awake = tuple((np.flatnonzero(relayed.awake) + 1).tolist())
         return Decided(relayed, awake, self._seen(relayed.seen), heard, entry, messages.pack(journal))
@@ -192,16 +208,14 @@ class MediumNode:
             with question:
                 try:
                     order = messages.unpack(Order, question.data)
-                except messages.WireError as error:
+                except WireError as error:
                     question.refuse(str(error))
                     continue
                 question.answer(messages.pack(self._relay.obey(order, tick)))
 
-    def _seen(self, arrived: Mask) -> dict[int, list[int]]:
-        seen: dict[int, list[int]] = defaultdict(list)
-        for link in np.flatnonzero(arrived).tolist():
-            seen[self._dst[link]].append(link)
-        return seen
+    def _seen(self, arrived: Mask) -> tuple[Integers, list[int]]:
+        rows = np.flatnonzero(arrived)  # links toward one agent stand together
+        return rows, np.searchsorted(rows, self._ends).tolist()
 
     def _heard(self, arriving: Integers) -> dict[int, list[Arriving]]:
         heard: dict[int, list[Arriving]] = defaultdict(list)
@@ -214,19 +228,42 @@ class MediumNode:
             self._numbers.restart(f"inbox {agent}")
             self._reader.restart(agent)
 
+    def _call(self, tick: int, awake: Collection[int]) -> None:
+        """Tell each host who of its agents takes part."""
+        if not self._rosters:
+            return
+        restarted, remembering = (
+            set(of(tick)) for of in (self._relay.timeline.restarted, self._relay.timeline.remembering)
+        )
+        for host, agents in self._brief.hosts.items():
+            roster = messages.Roster(
+                k=tick,
+                src=HUB,
+                seq=self._numbers.next(f"roster {host}"),
+                awake=[agent for agent in agents if agent in awake],
+                restarted=[agent for agent in agents if agent in restarted],
+                remembering=[agent for agent in agents if agent in remembering],
+            )
+            self._rosters[host].say(messages.pack(roster))
+
     def _hand_out_measurements(self, sense: messages.Sense, decided: Decided) -> None:
         clock = self._relay.timeline.clock(sense.k).tolist()
+        rows, ends = decided.seen
+        measured = _parts(sense.measured, len(self._src))
+        whom = [(self._src[row], measured[row]) for row in rows.tolist()]
+        position = _parts(sense.position, len(self._inboxes))
+        motion = None if sense.motion is None else _parts(sense.motion, len(self._inboxes))
         for agent in decided.awake:
-            links = decided.seen[agent]
+            seen = whom[ends[agent - 1] : ends[agent]]
             inbox = messages.SenseInbox(
                 k=sense.k,
                 src=HUB,
                 seq=self._numbers.next(f"inbox {agent}"),
                 clock=clock[agent - 1],
-                neighbours=[self._src[link] for link in links],
-                measured=sense.measured[links],
-                position=sense.position[agent - 1] if self._brief.positioned[agent - 1] else None,
-                motion=None if sense.motion is None else sense.motion[agent - 1],
+                neighbours=[src for src, _ in seen],
+                measured=b"".join([y for _, y in seen]),
+                position=position[agent - 1] if self._brief.positioned[agent - 1] else None,
+                motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
             self._inboxes[agent].say(messages.pack(inbox))
@@ -235,12 +272,13 @@ class MediumNode:
         tick, said = decided.relayed.tick, Spoken()
         self._awaited = {(agent, name) for agent in decided.awake for name in self._spoken}
         self._supervisor.waits(tick, "what it broadcasts", self._silent)
+        somebody_lies = bool(decided.relayed.conditions.liars)
         while self._awaited:
             arrived = self._broadcasts.next()
             data = arrived.data
             broadcast = self._reader.read(arrived.key, data, tick, self._awaited)
             self._awaited.remove((broadcast.src, broadcast.channel))
-            said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data)
+            said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data) if somebody_lies else data
         self._relay.keep(tick, said)
         self._supervisor.works(tick)
 
@@ -256,7 +294,9 @@ class MediumNode:
     def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
         if not self._relay.lies(said.k, said.channel, said.src):
             return data
-        return _rewritten(said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields))
+        return self._rewritten(
+            said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields)
+        )
 
     def _as_it_arrives(self, arriving: Arriving) -> bytes:
         data = self._relay.said(arriving.content)[arriving.src, self._brief.channels[arriving.channel]]
@@ -265,25 +305,34 @@ class MediumNode:
         mark = np.array([arriving.mark], dtype=np.uint8)
         content, channel, link = (np.array([row]) for row in (arriving.content, arriving.channel, arriving.link))
         said = messages.unpack(messages.Broadcast, data)
-        return _rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))
+        return self._rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))
+
+    def _rewritten(self, said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
+        """A broadcast with its fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
+        if (forms := self._brief.forms.get(said.channel)) is None:  # nobody looks into it
+            return messages.pack(said)
+        changed = change(channel_rows(forms, [said.payload], [f"agent {said.src} on {said.channel!r}"]))
+        payload = {name: packed(changed[name], form.dtype) for name, form in forms.items()}
+        return messages.pack(replace(said, payload=payload))
 
     def _end(self, tick: int) -> None:
+        self._call(tick, self._inboxes.keys())
         for agent, inbox in self._inboxes.items():
             number = self._numbers.next(f"inbox {agent}")
             inbox.say(messages.pack(messages.EndInbox(k=tick, src=HUB, seq=number)))
 
 
-def _rewritten(said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
-    """A broadcast with its named fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
-    changed = change({name: field[None] for name, field in fields(said).items()})
-    return messages.pack(replace(said, payload={name: field[0] for name, field in changed.items()}))
+def _parts(data: bytes, count: int) -> list[bytes]:
+    """As many bytes for each."""
+    size = len(data) // count
+    return [data[start : start + size] for start in range(0, size * count, size)]
 
 
 def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
-    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1))
+    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
     with supervisor.confessing(), Session(config) as session:
         from netem.medium import journal  # takes a while to import: everybody else can log in by now
 

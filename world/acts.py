@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
 
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
 from netem.wire import messages
+from netem.wire.arrays import FLOAT, TRUTH, Form, WireError, joined, numbers, packed
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
 
 
-class Beliefs(NamedTuple):
-    """What all agents believe of their edges, 0 where nobody said anything: estimates (N, n, D), known (N, n), covariances."""
+class Done(NamedTuple):
+    """What all agents did and believe, 0 of those who said nothing.
 
+    Parameters
+    ----------
+    input
+        What they steer, shape (N, D).
+    estimate, known, covariance
+        What they believe of their edges, shapes (N, n, D), (N, n) and (N, n, D (D + 1) / 2).
+    reports
+        What else their estimators say, by name, shape (N, *), NaN of those who said nothing.
+    """
+
+    input: Array
     estimate: Array
     known: Mask
     covariance: Array
+    reports: Mapping[str, Array]
 
 
 class Acts:
@@ -37,22 +50,30 @@ class Acts:
     def __init__(self, keys: Keys, links: Links, dimension: int, reports: Mapping[str, tuple[int, ...]]) -> None:
         self._speaking = {keys.act(agent): agent for agent in range(1, links.agents + 1)}
         self._degree = links.present.sum(axis=1).tolist()
-        self._shape = links.present.shape
-        self._rows = {"estimate": dimension, "covariance": dimension * (dimension + 1) // 2}
-        self._dimension = dimension
-        self._reports = reports
-        self._streams = Sequences("agent")
-        fields = ("input", "known", "estimate", "covariance")
-        self._whose = {
-            agent: {name: f"agent {agent}: Act: {name}" for name in fields} for agent in range(1, links.agents + 1)
+        self._present = links.present
+        self._input = Form((dimension,), truths=False)
+        # What an agent believes of an edge: the shape, what it holds, and how many bytes there are of each agent.
+        self._edges = {
+            name: (shape, dtype, [degree * prod(shape) * dtype.itemsize for degree in self._degree])
+            for name, shape, dtype in (
+                ("estimate", (dimension,), FLOAT),
+                ("known", (), TRUTH),
+                ("covariance", (dimension * (dimension + 1) // 2,), FLOAT),
+            )
         }
+        self._reports = {name: Form(shape, truths=False) for name, shape in reports.items()}
+        self._unsaid = [packed(np.full(shape, np.nan)) for shape in reports.values()]
+        self._streams = Sequences("agent")
+        self._stream = {agent: f"{agent} act" for agent in self._speaking.values()}
+        fields = ("input", "reports", *self._edges)
+        self._whose = {name: [f"agent {agent}: Act: {name}" for agent in self._stream] for name in fields}
 
     def restart(self, agent: int) -> None:
         """Expect the acts of a new process."""
-        self._streams.restart(f"{agent} act")
+        self._streams.restart(self._stream[agent])
 
     def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> messages.Act:
-        """The act that came on a key, its numbers as arrays.
+        """The act that came on a key.
 
         Parameters
         ----------
@@ -73,41 +94,52 @@ class Acts:
         agent = self._speaking[key]
         try:
             act = messages.unpack(messages.Act, data)
-        except messages.WireError as error:
-            raise messages.WireError(f"agent {agent}: {error}") from error
+        except WireError as error:
+            raise WireError(f"agent {agent}: {error}") from error
         if act.src != agent or act.k != tick or agent not in awaited:
-            raise messages.WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
-        self._streams.check(f"{agent} act", act.seq)
-        return replace(
-            act,
-            input=messages.numbers(act.input, self._whose[agent]["input"], (self._dimension,)),
-            known=self._edges(agent, "known", act.known, (None,), "b"),
-            estimate=self._edges(agent, "estimate", act.estimate, (None, self._rows["estimate"])),
-            covariance=self._edges(agent, "covariance", act.covariance, (None, self._rows["covariance"])),
+            raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
+        self._streams.check(self._stream[agent], act.seq)
+        return act
+
+    def together(self, acts: Mapping[int, messages.Act]) -> Done:
+        """What the acts of a tick say, by number of the agent, as arrays of all.
+
+        Raises
+        ------
+        WireError
+            When one has something else in a field than belongs there.
+        """
+        everybody = [acts.get(agent) for agent in self._stream]
+        inputs = [self._input.silence if act is None else act.input for act in everybody]
+        return Done(
+            input=self._input.rows(inputs, self._whose["input"]),
+            **{name: self._of_edges(name, everybody) for name in self._edges},
             reports={
-                name: messages.numbers(act.reports[name], f"agent {agent}: Act: reports: {name}", shape, "iufb")
-                for name, shape in self._reports.items()
-                if name in act.reports
+                name: form.rows(
+                    [unsaid if act is None else act.reports.get(name, unsaid) for act in everybody],
+                    (f"{who}: {name}" for who in self._whose["reports"]),
+                )
+                for (name, form), unsaid in zip(self._reports.items(), self._unsaid, strict=True)
             },
         )
 
-    def beliefs(self, acts: Mapping[int, messages.Act]) -> Beliefs:
-        """What all agents believe, padded to the widest."""
-        believed = Beliefs(
-            np.zeros((*self._shape, self._rows["estimate"])),
-            np.zeros(self._shape, dtype=bool),
-            np.zeros((*self._shape, self._rows["covariance"])),
-        )
-        for agent, act in acts.items():
-            for everybody, own in zip(believed, (act.estimate, act.known, act.covariance), strict=True):
-                everybody[agent - 1, : len(own)] = own
-        return believed
+    def _of_edges(self, name: str, everybody: Sequence[messages.Act | None]) -> Any:
+        shape, dtype, sizes = self._edges[name]
+        said = [b"" if act is None else getattr(act, name) for act in everybody]
+        given = [one or bytes(size) for one, size in zip(said, sizes, strict=True)]  # who has nothing to say has zeros
+        rows = joined(given, sizes, (-1, *shape), dtype)
+        if rows is None:
+            each = zip(given, self._whose[name], self._degree, strict=True)
+            rows = np.concatenate([_of_one(one, whose, degree, shape, dtype) for one, whose, degree in each])
+        padded = np.zeros((*self._present.shape, *shape), dtype)
+        padded[self._present] = rows
+        return padded
 
-    def _edges(self, agent: int, name: str, given: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> Any:
-        rows = messages.numbers(given, self._whose[agent][name], shape, kinds)
-        if len(rows) not in (0, self._degree[agent - 1]):
-            raise messages.WireError(
-                f"agent {agent}: Act: {name}: expected one for each of its {self._degree[agent - 1]} neighbours, or none, "
-                f"got {len(rows)} (see docs/protocol.md)"
-            )
-        return rows
+
+def _of_one(given: Any, whose: str, degree: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+    rows = numbers(given, whose, (-1, *shape), dtype)
+    if len(rows) != degree:
+        raise WireError(
+            f"{whose}: expected one for each of its {degree} neighbours, or none, got {len(rows)} (see docs/protocol.md)"
+        )
+    return rows

@@ -14,13 +14,16 @@ from netem.faults.timeline import Timeline
 from netem.medium.in_flight import Entry
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
+from netem.wire.arrays import CODE, WHOLE, WireError, numbers, packed
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering
 from netem.wire.session import HUB, WORLD
-from world.acts import Acts, Beliefs
+from world.acts import Acts, Done
 from world.brief import WorldBrief
 from world.physics.world import Scene
+
+_COLUMNS = {"odd": 5, "apart": 4, "dropped": 5, "released": 4}  # of what a journal lists
 
 
 class ProcessesActed(NamedTuple):
@@ -28,20 +31,22 @@ class ProcessesActed(NamedTuple):
 
     Parameters
     ----------
-    input
-        What they steer, shape (N, D).
     acts
         What those who are awake said, by number.
-    believed
-        What everybody believes of edges.
+    done
+        The arrays in it, of all.
     entry
         What became of the messages.
     """
 
-    input: Array
     acts: Mapping[int, messages.Act]
-    believed: Beliefs
+    done: Done
     entry: Entry
+
+    @property
+    def input(self) -> Array:
+        """What they steer, shape (N, D)."""
+        return self.done.input
 
 
 class ZenohCarrier:
@@ -92,10 +97,7 @@ class ZenohCarrier:
         if journal.injected is not None:
             self.timeline = self.timeline.facing([from_plain(Fault, fault) for fault in journal.injected])
         self._account(journal, acts)
-        steered = np.zeros((self._world.links.agents, self._world.formation.dimension))
-        for agent, act in acts.items():
-            steered[agent - 1] = act.input
-        return ProcessesActed(steered, acts, self._reader.beliefs(acts), _entry(journal))
+        return ProcessesActed(acts, self._reader.together(acts), self._entry(journal))
 
     def end(self) -> None:
         """The run is over: tell the medium."""
@@ -144,9 +146,9 @@ class ZenohCarrier:
             src=WORLD,
             seq=self._numbers.next("sense"),
             last=last,
-            measured=measured,
-            position=position,
-            motion=motion,
+            measured=packed(measured),
+            position=packed(position),
+            motion=None if motion is None else packed(motion),
             sightings=sightings,
             fired=list(fired),
         )
@@ -157,7 +159,7 @@ class ZenohCarrier:
         if sighting is None:
             return None
         return [
-            messages.Sighted(position=position, done=bool(done), by=int(by), method=int(method))
+            messages.Sighted(position=packed(position), done=bool(done), by=int(by), method=int(method))
             for position, done, by, method in zip(*sighting, strict=True)
         ]
 
@@ -165,7 +167,7 @@ class ZenohCarrier:
         self._supervisor.waits(tick, "its journal", lambda: (HUB,))
         journal = messages.unpack(messages.Journal, self._journal.next().data)
         if journal.k != tick:
-            raise messages.WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
+            raise WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
         return journal
 
     def _read_acts(self, tick: int) -> dict[int, messages.Act]:
@@ -188,18 +190,17 @@ class ZenohCarrier:
             handed, heard = journal.handed[agent - 1], act.heard - self._heard[agent]
             if not 0 <= heard <= handed:
                 says = f"it was handed {handed} broadcasts in tick {act.k}, and has heard {heard} more than before"
-                raise messages.WireError(f"agent {agent}: Act: heard: {says} (see docs/protocol.md)")
+                raise WireError(f"agent {agent}: Act: heard: {says} (see docs/protocol.md)")
             self.uninstructed += handed - heard
             self._heard[agent] = act.heard
 
-
-def _entry(journal: messages.Journal) -> Entry:
-    return Entry(
-        verdicts=journal.verdicts,
-        odd=journal.odd.reshape(-1, 5),
-        apart=journal.apart.reshape(-1, 4),
-        late=journal.late,
-        dropped=journal.dropped.reshape(-1, 5),
-        released=journal.released.reshape(-1, 4),
-        injected=journal.injected,
-    )
+    def _entry(self, journal: messages.Journal) -> Entry:
+        return Entry(
+            verdicts=numbers(journal.verdicts, "the medium: Journal: verdicts", (-1, len(self._world.links)), CODE),
+            late=journal.late,
+            injected=journal.injected,
+            **{
+                name: numbers(getattr(journal, name), f"the medium: Journal: {name}", (-1, columns), WHOLE)
+                for name, columns in _COLUMNS.items()
+            },
+        )

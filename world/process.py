@@ -42,7 +42,6 @@ class WorldNode:
         self._carrier = ZenohCarrier(session, supervisor, brief, self._meanwhile)
         self._batch = brief.books.batch
         self._flown: list[tuple[Moment, Scene]] = []  # with where each tick led
-        self._unsaid = {name: np.full(shape, np.nan) for name, shape in brief.reports.items()}
         self.history = History(brief.world, len(brief.channels), brief.reports)
 
     @property
@@ -74,15 +73,12 @@ class WorldNode:
             target=self._world.goal(instant.tick, instant.scene),
             measured=instant.measured,
             input=instant.input,
-            estimate=acted.believed.estimate,
-            known=acted.believed.known,
-            covariance=acted.believed.covariance,
+            estimate=acted.done.estimate,
+            known=acted.done.known,
+            covariance=acted.done.covariance,
             psi=[np.nan if act is None else act.psi for act in everybody],
             feasible=[UNTOLD if act is None or act.feasible is None else int(act.feasible) for act in everybody],
-            reports={
-                name: [unsaid if act is None else act.reports.get(name, unsaid) for act in everybody]
-                for name, unsaid in self._unsaid.items()
-            },
+            reports=acted.done.reports,
             entry=acted.entry,
         )
 

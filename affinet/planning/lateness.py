@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import chain
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import chain as concatenated
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from affinet.scenario.sections import Scenario
 from agents.swarm import Late
 from netem.core.links import Links
 from netem.faults.fault import Fault, UnderWay, Verb
+from netem.faults.timeline import Conditions, Timeline
 from netem.impairments import delay
 from world.formation.nominal import Formation
 
@@ -43,10 +46,13 @@ def of(given: Scenario, formation: Formation, links: Links, script: Script) -> L
         When a profile cannot ever deliver, or selects nothing.
     """
     degraded = [given.network.model_copy(update={"profile": name, "links": []}) for name, _ in script.profiles]
-    groups = chain.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
+    groups = concatenated.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
     air = _distinct(_of_class(one, given) for one in groups if one.comms)
-    scripted = _distinct(_of_fault(fault, given) for fault in script.faults)
-    ticks = sum(max((cause.ticks for cause in some), default=0.0) for some in (air, scripted))
+    under_way = max((cause.ticks for cause in air), default=0.0)
+    delayed = _delayed(script, links, given)
+    held = _held(script, links, given, under_way + delayed.ticks)
+    scripted = tuple(cause for cause in (delayed, held) if cause.ticks)
+    ticks = under_way + delayed.ticks + held.ticks
     return Lateness((*air, *scripted), int(min(ticks, given.time.ticks)))
 
 
@@ -87,14 +93,44 @@ def _longest(one: LinkClass) -> float:
     return max((model.mean or 0.0) + (model.jitter or 0.0), *one.measured, 0.0)
 
 
-def _of_fault(fault: Fault, given: Scenario) -> Late:
-    lasts = np.inf if fault.end is None else float(fault.end - fault.start)
-    match fault.verb, fault.under_way:
-        case Verb.DELAY, _:
-            return Late("timeline: delay", _ticks(fault.seconds, given.time.dt))
-        case ((Verb.CUT | Verb.PARTITION | Verb.PAUSE), UnderWay.HOLD):
-            return Late(f"timeline: {fault.verb}, messages held", lasts)
-    return Late("", 0.0)
+def _delayed(script: Script, links: Links, given: Scenario) -> Late:
+    """Delays that hold at once on a link add up; those that wait for a condition may begin at any time."""
+    delays = [fault for fault in script.faults if fault.verb is Verb.DELAY]
+    waiting = Timeline(links, [_at_any_time(fault, given) for fault in delays if fault.trigger is not None])
+    placed = Timeline(links, [fault for fault in delays if fault.trigger is None])
+    seconds = sum(
+        max(segment.delay_s.max(initial=0.0) for _, _, segment in _segments(some, given)) for some in (waiting, placed)
+    )
+    return Late("timeline: delay", _ticks(float(seconds), given.time.dt))
+
+
+def _held(script: Script, links: Links, given: Scenario, under_way: float) -> Late:
+    """How long a link may hold a message, which may come from one hold into the next while it is `under_way`, in ticks."""
+    holding = [fault for fault in script.faults if fault.under_way is UnderWay.HOLD]
+    waiting = sum(_lasts(fault, given) for fault in holding if fault.trigger is not None)
+    timeline = Timeline(links, [fault for fault in holding if fault.trigger is None])
+    longest, chain, free = (np.zeros(len(links)) for _ in range(3))
+    for start, end, segment in _segments(timeline, given):
+        free = np.where(segment.holds, 0.0, free + (end - start))
+        chain = np.where(segment.holds, chain + (end - start), np.where(free > under_way, 0.0, chain))
+        longest = np.maximum(longest, chain)
+    verbs = " and ".join(sorted({str(fault.verb) for fault in holding}))
+    return Late(f"timeline: {verbs}, messages held", waiting + float(longest.max(initial=0.0)))
+
+
+def _segments(timeline: Timeline, given: Scenario) -> Iterator[tuple[int, int, Conditions]]:
+    """From which tick to which other the same conditions hold."""
+    ends = {end for fault in timeline.faults for end in (fault.start, fault.end) if end is not None}
+    bounds = sorted({0, given.time.ticks, *(end for end in ends if end < given.time.ticks)})
+    return ((start, end, timeline.at(start)) for start, end in pairwise(bounds))
+
+
+def _at_any_time(fault: Fault, given: Scenario) -> Fault:
+    return replace(fault, trigger=None, start=0, end=given.time.ticks)
+
+
+def _lasts(fault: Fault, given: Scenario) -> float:
+    return float((given.time.ticks if fault.end is None else fault.end) - fault.start)
 
 
 def _ticks(seconds: float, dt: float) -> float:

@@ -68,8 +68,8 @@ def run(first: World, channels: int, reports: Mapping[str, tuple[int, ...]], tim
 
 
 def _fits(needed: float, memory: int, what: str, way_out: str) -> Finding:
-    said = f"{what} take {needed / 2**30:.3g} GiB of memory"
-    has = f"this machine has {memory / 2**30:.3g} GiB"
+    said = f"{what} take {_bytes(needed)} of memory"
+    has = f"this machine has {_bytes(memory)}"
     if needed > memory:
         return Finding("memory", "error", f"{said}, and {has}; {way_out}")
     return Finding("memory", "ok", f"{said}; {has}")
@@ -145,3 +145,8 @@ def parameters(key: str, given: Any) -> None:
             raise ScenarioError(f"{key}: should be at most {LARGEST:g} in size, got {given}")
         case int() | float() if 0 < abs(given) < SMALLEST:
             raise ScenarioError(f"{key}: is too small to tell from 0: should be at least {SMALLEST:g}, got {given}")
+
+
+def _bytes(number: float) -> str:
+    power = int(np.clip(np.log2(max(number, 1.0)) // 10, 1, 3))
+    return f"{number / 2.0 ** (10 * power):.3g} {('KiB', 'MiB', 'GiB')[power - 1]}"

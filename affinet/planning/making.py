@@ -123,7 +123,6 @@ def _make(given: Scenario) -> Plan:
         findings += algorithms.findings(estimator.build(), law.build(), swarm)
         centre = centre_of(estimator.build(), swarm)
     _refuse_fatal(findings)
-    findings.append(fits)
     brief = brief_of(first, L, swarm.lateness)
     for name, algorithm in ((given.agents.estimator, estimator), (given.agents.law, law)):
         wants = capabilities.wants(algorithm.build())

@@ -9,10 +9,11 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from agents.agent import AgentAction, AgentState
+from agents.batch import beside_others, come_back, put_back
 from agents.brief import DERIVATIVES, Reading
 from agents.centre.checked import CheckedCentre
 from agents.exchange import Fields, Heard
-from analysis.models.arrays import Array, Integers, Mask, chosen
+from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks
@@ -52,7 +53,7 @@ class ArrayCarrier:
         self._numbers = np.arange(1, self._links.agents + 1)
         self._fields = self._agents.channels()
         self._rows = [plan.channels.index(channel) for channel in self._fields]
-        self._state = self._fresh = self._agents.init(self._numbers.shape)
+        self._state = self._agents.init(self._numbers.shape)
         medium = Medium(plan.world.seed, plan.channels, plan.profiles, plan.timeline, plan.recorded())
         self._relay = Relay[Broadcasts](medium)
         self._centre = plan.centre
@@ -93,8 +94,7 @@ class ArrayCarrier:
         idle, living = relayed.conditions.idle, before
         some_idle = idle.any()
         if some_idle:
-            # They live the tick with the others, and what comes of it is put back: they must not catch up for that.
-            living = before._replace(sensed=np.where(idle, tick - 1, before.sensed))
+            living = beside_others(before, idle, tick)
         measured, seen = by_slot.sensed(sensed, relayed.seen, self._links)
         motion = self._world.odometry(scene)
         state, said = self._agents.sense(living, tick, measured, seen, motion)
@@ -105,18 +105,15 @@ class ArrayCarrier:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, self._steered(said))
         sighting = self._world.sighting(tick, scene)
         state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
-        self._state = _protected(chosen(idle, before, state)) if some_idle else state
+        self._state = put_back(idle, before, state) if some_idle else state
         self._relay.finish(tick)
         steered = np.where(idle[:, None], 0.0, action.input) if some_idle else action.input
         return BatchActed(steered, action, relayed)
 
     def _welcomed_back(self, tick: int) -> AgentState:
-        state, restarted = self._state, self.timeline.restarted(tick)
-        if restarted:
-            warm = self.timeline.remembering(tick)
-            for agents, new in ((set(restarted) - set(warm), self._fresh), (warm, self._agents.revived(state))):
-                state = _protected(chosen(np.isin(self._numbers, [*agents]), new, state))
-        return state
+        if not (restarted := self.timeline.restarted(tick)):
+            return self._state
+        return come_back(self._agents, self._numbers, self._state, restarted, self.timeline.remembering(tick))
 
     def _from_the_centre(self, centre: CheckedCentre, measured: Array, seen: Mask, inputs: Array) -> Heard:
         def of_swarms(array: Any) -> Any:

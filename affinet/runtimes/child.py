@@ -69,7 +69,9 @@ class UserCodeFailed(RunFailed):
 
 def named(role: str, number: int | None) -> str:
     """What a process is called among those of a run."""
-    return role if number is None else called(number)
+    if number is None:
+        return role
+    return called(number) if role == "agent" else f"{role} {number}"
 
 
 def started(command: Sequence[str], stdin: int, log: IO[bytes]) -> Process:
@@ -91,9 +93,9 @@ class Child:
     Parameters
     ----------
     role
-        "netem", "world", "centre" or "agent".
+        "netem", "world", "centre", "agent" or "host".
     number
-        Of an agent.
+        Of an agent, or a host.
     process, log
         The process, and the file its standard error goes to.
     trusted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,9 @@ from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
+from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
-from agents.process import AgentBrief
+from agents.process import AgentBrief, HostBrief
 from analysis.metrics.errors import tracking_error
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
@@ -28,7 +29,7 @@ from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
-from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, socket_folder
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, host_name, socket_folder
 from world.brief import WorldBrief
 from world.physics.world import World
 
@@ -96,7 +97,8 @@ class Launcher:
         self._interruption = interruption or Interruption()
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
-        self._agents: dict[int, Child] = {}
+        self._agents: dict[int, Child] = {}  # that have a process to themselves
+        self._hosts = hosts_of(plan, self._programs)
         self.flight = LaunchRecord()
 
     def fly(self) -> LaunchRecord:
@@ -140,7 +142,9 @@ class Launcher:
         if self._plan.centre:
             login = self._logins[CENTRE]
             group.fork("centre", self._centre_brief(login))
-        for number in range(1, self._plan.world.links.agents + 1):
+        for host, carried in self._hosts.items():
+            group.fork("host", self._host_brief(host, carried), host, carrying=carried)
+        for number in self._lone:
             self._start_agent(group, number)
         group.await_ready(group.children)
         (private / "users").unlink()  # the medium knows them now, and nobody else has to
@@ -152,7 +156,8 @@ class Launcher:
             WORLD,
             CONTROL,
             CENTRE,
-            *(agent_name(number) for number in range(1, self._plan.world.links.agents + 1)),
+            *map(host_name, self._hosts),
+            *map(agent_name, self._lone),
         ]
         logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
         users = private / "users"
@@ -188,25 +193,37 @@ class Launcher:
                 self.flight.uninstructed = event["uninstructed"]
 
     def _move(self, group: ProcessGroup, order: str, event: Event) -> None:
+        # Of the agents in a host, that is told by the medium what becomes of each of them.
+        moved = [number for number in event["agents"] if number in self._agents]
         match order:
             case "kill":
-                for number in event["agents"]:
+                for number in moved:
                     group.kill(self._agents[number])
             case "restart":
                 remembering = event["remembering"]
-                group.await_ready(
-                    [self._start_agent(group, number, number in remembering) for number in event["agents"]]
-                )
+                group.await_ready([self._start_agent(group, number, number in remembering) for number in moved])
             case "pause":
-                for number in event["agents"]:
+                for number in moved:
                     self._agents[number].pause()
             case "resume":
-                for number in event["agents"]:
+                for number in moved:
                     self._agents[number].resume()
+
+    @property
+    def _lone(self) -> list[int]:
+        """Agents that have a process to themselves."""
+        carried = {number for of_host in self._hosts.values() for number in of_host}
+        return [number for number in range(1, self._plan.world.links.agents + 1) if number not in carried]
+
+    def _host_brief(self, host: int, carried: Sequence[int]) -> HostBrief:
+        login = self._logins[host_name(host)]
+        return HostBrief(host, tuple(self._agent_brief(number, login, checkpoint=None) for number in carried))
 
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
-        brief = self._agent_brief(number, login, remembers)
+        warm = number in self._plan.timeline.warm
+        checkpoint = str(self._private / f"agent-{number}.npz") if warm else None
+        brief = self._agent_brief(number, login, checkpoint, remembers=remembers)
         program = self._programs.get(number)
         child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
         self._agents[number] = child
@@ -238,7 +255,9 @@ class Launcher:
             triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
+            forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
+            hosts=self._hosts,
             journal=str(self._out / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
         )
@@ -246,7 +265,7 @@ class Launcher:
     def _centre_brief(self, login: Login) -> CentreBrief:
         return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm)
 
-    def _agent_brief(self, number: int, login: Login, remembers: bool) -> AgentBrief:
+    def _agent_brief(self, number: int, login: Login, checkpoint: str | None, *, remembers: bool = False) -> AgentBrief:
         plan, row = self._plan, number - 1
         links = plan.world.links
         return AgentBrief(
@@ -262,9 +281,17 @@ class Launcher:
             reports=plan.reports,
             brief=plan.brief_of(row),
             hears_centre=plan.centre is not None,
-            checkpoint=str(self._private / f"agent-{number}.npz") if number in plan.timeline.warm else None,
+            checkpoint=checkpoint,
             remembers=remembers,
         )
+
+
+def hosts_of(plan: Plan, programs: Collection[int]) -> dict[int, tuple[int, ...]]:
+    """The processes that carry several agents, and which; programs fly on their own, and so does who would be alone."""
+    size = plan.scenario.agents.per_process
+    ours = [number for number in range(1, plan.world.links.agents + 1) if number not in programs]
+    carried = [tuple(ours[first : first + size]) for first in range(0, len(ours), size)]
+    return {host: of_host for host, of_host in enumerate(carried, 1) if len(of_host) > 1}
 
 
 def _prepare_kernels(world: World) -> None:

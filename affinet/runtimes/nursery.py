@@ -46,6 +46,7 @@ ROLES: Mapping[str, Callable[[], None]] = {
     "netem": medium_process.main,
     "centre": centre_process.main,
     "agent": agent_process.main,
+    "host": agent_process.host,
 }
 
 

@@ -20,7 +20,7 @@ from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
 from netem.core.listing import listed
-from netem.processes.supervised import BEAT_S
+from netem.processes.supervised import BEAT_S, called
 
 _GRACE_S = 1.2
 # To start takes a second of processor time, and there may be a hundred on two cores.
@@ -54,6 +54,7 @@ class ProcessGroup:
         self._nursery: Nursery | None = None
         self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
+        self._host_of: dict[str, str] = {}
 
     def __enter__(self) -> ProcessGroup:
         return self
@@ -83,17 +84,27 @@ class ProcessGroup:
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         self.await_ready([child])
 
-    def fork(self, role: str, brief: Any, number: int | None = None, *, trusted: bool = False) -> Child:
+    def fork(
+        self,
+        role: str,
+        brief: Any,
+        number: int | None = None,
+        *,
+        trusted: bool = False,
+        carrying: Collection[int] = (),
+    ) -> Child:
         """Have the nursery fork a process.
 
         Parameters
         ----------
         role, number
-            What it is to be, and of an agent which.
+            What it is to be, and of an agent or a host which.
         brief
             What it is told.
         trusted
             Whether it runs no code of a user's own.
+        carrying
+            Which agents it carries, if several.
 
         Raises
         ------
@@ -102,6 +113,7 @@ class ProcessGroup:
         """
         assert self._nursery is not None, "start the nursery first"
         name = named(role, number)
+        self._host_of |= dict.fromkeys(map(called, carrying), name)
         with self._log(name) as log:
             process = self._nursery.fork(name, log)
         return self._brief(Child(role, number, process, Path(log.name), trusted), brief)
@@ -245,14 +257,18 @@ class ProcessGroup:
             with suppress(RunFailed):  # it has left by now
                 child.look()
         looks = {child.name: child.looks for child in staying if child.looks is not None}
-        trusted = [child.name for child in staying if child.role != "agent"]
+        trusted = [child.name for child in staying if child.role not in {"agent", "host"}]
         if blamed := stalled(looks, self._patience_s, trusted):
             said = _said_of([child for child in staying if child.name in blamed])
             raise RunFailed(f"{said}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run")
 
     def _lately(self, child: Child) -> Beat | None:
         """What a child does, unless it has not said so for a while, or never does."""
-        return child.doing if self.now_s - child.beat_s <= _LATE_BEATS * BEAT_S else None
+        if child.doing is None or self.now_s - child.beat_s > _LATE_BEATS * BEAT_S:
+            return None
+        return child.doing._replace(
+            waits=tuple(dict.fromkeys(self._host_of.get(who, who) for who in child.doing.waits))
+        )
 
     def _hear(self, child: Child) -> list[Event]:
         before = child.doing

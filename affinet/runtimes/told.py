@@ -51,6 +51,7 @@ _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "nursery": {"ready": {}, "failed": {"reason": _is_text}},
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
+    "host": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "netem": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "centre": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "world": {

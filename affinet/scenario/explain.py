@@ -84,7 +84,7 @@ def _also(source: Source, keys: Sequence[str]) -> str:
         return ""
     named = ", ".join(f"{one_line(key) or 'the file'} ({source.place(key)})" for key in keys[:_MOST_NAMED])
     etc = ", ..." if len(keys) > _MOST_NAMED else ""
-    return f"; {len(keys)} more mistake{'s' * (len(keys) > 1)}: {named}{etc}"
+    return f"; at least {len(keys)} more mistake{'s' * (len(keys) > 1)}: {named}{etc}"
 
 
 def mistakes(error: ValidationError, model: type[BaseModel]) -> list[Mistake]:
@@ -107,7 +107,8 @@ def _mistake(model: type[BaseModel], problem: Mapping[str, Any]) -> Mistake:
         known = sorted(forms.bare(table.kind).model_fields)
         near = hint(loc[-1], known)
         meant = ".".join(filter(None, (table.key, near.split("'")[1]))) if near else None
-        says = f"unknown key; {near}known here: {', '.join(known)}"
+        above = f"{loc[-1]!r} is a key of the file itself; " if not near and loc[-1] in model.model_fields else ""
+        says = f"unknown key; {near}{above}known here: {', '.join(known)}"
         return Mistake(where.key, says, (table.path or "the file", where.key), 0, meant)
     return Mistake(where.key, _says(where, problem), (where.path or "the file", code), 2 if code == "missing" else 1)
 

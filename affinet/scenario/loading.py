@@ -82,7 +82,9 @@ def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = Non
         if not isinstance(raw, dict):
             raise TypeError(f"{FILE} holds no table")
     except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise ScenarioError(f"{out}: no run directory: {error}; name one that `affinet run` printed") from error
+        of_tests = "" if out.exists() else ", or a failed test: pytest keeps those of its last three sessions"
+        named = f"name one that `affinet run` printed{of_tests}"
+        raise ScenarioError(f"{out}: no run directory: {error}; {named}") from error
     origin, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
     scenario = _validated(inputs.anchored(raw, out.absolute()), origin, asked_from)
     shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}

@@ -245,7 +245,8 @@ class DynamicsSection(Section):
 class AgentsSection(Section):
     """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s.
 
-    `limit` is the longest input they command, in m/s, or m/s2 of double integrators: longer ones are shortened.
+    `limit` is the longest input they command, in m/s, or m/s2 of double integrators: longer ones are shortened. `per_process`
+    is how many of them a process carries.
     """
 
     estimator: str
@@ -253,6 +254,7 @@ class AgentsSection(Section):
     leaders: Literal["pilot", "distances"] = "pilot"
     leader_gain: NotNegative = 1.0
     limit: Positive | None = None
+    per_process: Annotated[int, Field(ge=1, le=1000)] = 1
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 

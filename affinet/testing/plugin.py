@@ -1,10 +1,12 @@
-"""The pytest plugin: fixture `swarm`, marks for seeds and runtime, and a report that says how to repeat a failure.
+"""The pytest plugin: fixture `swarm`, marks for seeds and runtime, and a report that says how to fly and check a failure again.
 
 What it needs is imported when a test asks for it: pytest loads this file in every environment where affinet is installed.
 """
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING
 
@@ -103,6 +105,7 @@ def pytest_runtest_makereport(
     if report.when == "call" and report.failed and runs is not None:
         runs.failed = True
         report.sections += [("affinet run", says) for says in _kept(runs)]
+        report.sections += [("affinet check", f"check again: {_checked_again(item)}")]
     return report
 
 
@@ -112,8 +115,17 @@ def _kept(runs: SwarmRuns) -> list[str]:
     try:
         return [
             f"seed {plan.scenario.seed}, {runs.runtime}\nrecording: {out / 'run.rrd'}\n"
-            f"repeat: affinet replay {on_a_command_line(out)} --runtime {runs.runtime}"
+            f"fly the same bits again: affinet replay {on_a_command_line(out)} --runtime {runs.runtime}"
             for plan, out in runs.keep()
         ]
     except Exception as error:  # noqa: BLE001 - whatever goes wrong here, the test's own failure is what counts
         return [f"the run could not be recorded: {error!r}"]
+
+
+def _checked_again(item: pytest.Item) -> str:
+    """The command that flies and checks in this test alone, from where pytest was called."""
+    file = os.path.relpath(item.path, item.config.invocation_params.dir)
+    runtime = item.config.getoption("--affinet-runtime")
+    where = "" if runtime == _RUNTIMES[0] else f" --affinet-runtime={runtime}"
+    _, _, test = item.nodeid.partition("::")
+    return f"pytest {shlex.quote(f'{file}::{test}')}{where}"

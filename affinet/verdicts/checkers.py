@@ -18,10 +18,12 @@ from netem.core import channels
 from netem.faults.fault import Fault, Verb
 from netem.loading.calling import Calling
 from netem.loading.returned import WrongReturn, shown
+from netem.medium.verdict import Verdict
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
 
 _CORRELATION_TIMES = 40.0  # in a run that says something: four to a batch, as short series find theirs too short
+_KEPT_BACK = (Verdict.CUT, Verdict.PARTITION)
 
 Signal = Callable[[Evidence], Mask]
 
@@ -81,40 +83,46 @@ def converged(level: float, by: float) -> Checker:
 def recovers(level: float, within: float) -> Checker:
     """So many seconds after each fault that ends, and until another begins, the tracking error is below a level (m2).
 
-    A fault is not looked at where another still holds at its end, or begins before the error has had its time. Vacuous where
-    none is left, or none of them ever lifted the error above the level.
+    A fault is looked at where it lifted the error: it rose from below the level to above it since the fault began, or since
+    an earlier one did and has been above ever since. Not where another fault still holds at its end, or begins before the
+    error has had its time. Vacuous where no fault is left to look at.
     """
     name = f"recovers({level:g}, within={within:g})"
     above_zero(name, level=level)
     times(name, within=within)
 
     def check(evidence: Evidence) -> CheckResult:
-        faults = [bite.fault for bite in evidence.bites if bite.at is not None]
-        spent = 0
+        faults = [bite.fault for bite in evidence.bites if bite.touched]
+        above: Mask = ~(evidence.error < level)
+        lifted, why = 0, f"no fault that ended had lifted the error above {level:g} m²"
         for fault in sorted(faults, key=lambda fault: fault.end or evidence.ticks):
             if fault.end is None or _others_hold(faults, fault, fault.end):
                 continue
             deadline = fault.end + evidence.tick(within)
             following = [other.start for other in faults if other is not fault and other.start >= fault.end]
             end = min([evidence.ticks, *following])
-            if deadline >= end or (evidence.error[fault.start : end] < level).all():
+            if deadline >= end:
                 continue
-            spent += 1
-            good = evidence.error[deadline:end] < level
-            if not good.all():
-                tick = deadline + int(np.argmin(good))
+            if not _lifted(above[:end], faults, fault):
+                if above[fault.start : end].any():
+                    why += f": it was above before '{fault.describe()}' began, at {fault.start * evidence.dt:g} s"
+                continue
+            lifted += 1
+            late = above[deadline:end]
+            if late.any():
+                tick = deadline + int(np.argmax(late))
                 after = (tick - fault.end) * evidence.dt
                 says = f"{evidence.error[tick]:.4g} m² {after:g} s after the end of '{fault.describe()}'"
                 return CheckResult(name, "fail", tick, says)
-        if not spent:
-            return CheckResult(name, "vacuous", None, f"no fault that ended had lifted the error above {level:g} m²")
-        return CheckResult(name, "pass", None, f"after {spent} faults")
+        if not lifted:
+            return CheckResult(name, "vacuous", None, why)
+        return CheckResult(name, "pass", None, f"after {lifted} faults")
 
     return Checker(name, check)
 
 
 def below(metric: str, level: float, *, since: float = 0.0, until: float | None = None) -> Checker:
-    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever it is defined."""
+    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever there is any."""
     name = f"below({metric!r}, {level:g})"
     if metric not in METRICS:
         raise ValueError(f"{name}: no metric {metric!r}; {among(metric, METRICS)}")
@@ -123,6 +131,8 @@ def below(metric: str, level: float, *, since: float = 0.0, until: float | None 
 
     def check(evidence: Evidence) -> CheckResult:
         span = span_of(evidence, since, until)
+        if not span:
+            return CheckResult(name, "vacuous", None, "the run ended before")
         values = of_run(evidence, metric, span)
         if np.isnan(values).all():
             return CheckResult(name, "vacuous", None, f"there is no {METRICS[metric].says} in any of its ticks")
@@ -138,22 +148,23 @@ def never_heard_across_a_cut() -> Checker:
     name = "never_heard_across_a_cut()"
 
     def check(evidence: Evidence) -> CheckResult:
-        newest, links, cuts = evidence.arrays["newest"], evidence.plan.world.links, 0
+        newest, verdicts = evidence.arrays["newest"], evidence.arrays["verdicts"]
+        links, kept_back = evidence.plan.world.links, 0
         for number, fault in enumerate(evidence.timeline.faults):
             if fault.verb not in (Verb.CUT, Verb.PARTITION) or fault.trigger is not None:
                 continue
             held = evidence.timeline.held(number)
             under = newest[fault.start : fault.end][:, :, held]
-            cuts += under.size
+            kept_back += int(np.isin(verdicts[fault.start : fault.end][:, :, held], _KEPT_BACK).sum())
             heard = np.argwhere(under >= fault.start)
             if len(heard):
                 tick, channel, place = heard[0].tolist()
                 row = int(np.flatnonzero(held)[place])
                 who = f"{links.dst[row]} heard {links.src[row]} on {evidence.plan.channels[channel]}"
                 return CheckResult(name, "fail", fault.start + tick, f"{who} across '{fault.describe()}'")
-        return CheckResult(
-            name, "pass" if cuts else "vacuous", None, f"{cuts} times silent" if cuts else "nothing was cut"
-        )
+        if not kept_back:
+            return CheckResult(name, "vacuous", None, "nothing was cut")
+        return CheckResult(name, "pass", None, f"{kept_back} messages were cut")
 
     return Checker(name, check)
 
@@ -207,7 +218,7 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
 
 
 def collision_free(distance: float) -> Checker:
-    """No two bodies come closer than a distance, in metres."""
+    """No two bodies come closer than a distance, in metres; vacuous where there never are two."""
     name = f"collision_free({distance:g})"
     above_zero(name, distance=distance)
 
@@ -215,7 +226,10 @@ def collision_free(distance: float) -> Checker:
         position, agents = evidence.position, evidence.plan.world.links.agents
         one, other = np.triu_indices(agents, 1)
         apart = np.linalg.norm(position[:, one] - position[:, other], axis=-1)
-        apart = np.where(evidence.embodied[:, one] & evidence.embodied[:, other], apart, np.inf)
+        both = evidence.embodied[:, one] & evidence.embodied[:, other]
+        if not both.any():
+            return CheckResult(name, "vacuous", None, "there were never two bodies")
+        apart = np.where(both, apart, np.inf)
         return every(
             name,
             evidence,
@@ -326,6 +340,14 @@ def _truths(name: str, signal: Signal, evidence: Evidence) -> Mask:
 
 def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:
     return any(other is not fault and other.start < tick and other.active(tick) for other in faults)
+
+
+def _lifted(above: Mask, faults: Sequence[Fault], fault: Fault) -> bool:
+    """Whether the error rose since a fault began, or stands where it rose since the first of all did."""
+    below = np.flatnonzero(~above[: fault.start])
+    last_below = int(below[-1]) if len(below) else -1
+    rises = 1 + np.flatnonzero(above[1:] & ~above[:-1])
+    return bool((rises > max(last_below, min(other.start for other in faults) - 1)).any())
 
 
 def _closest(apart: Array, one: Integers, other: Integers) -> str:

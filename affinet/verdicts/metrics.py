@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from affinet.verdicts.evidence import Evidence
 from analysis.metrics import consistency, errors
 from analysis.models.arrays import Array, Mask
@@ -39,26 +41,44 @@ class Seen(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """What it is called, its unit, and its value of each swarm, shape (..., S)."""
+    """What it is called, its unit, its value of each swarm, shape (..., S), and where there is something to take it of."""
 
     says: str
     unit: str
     of: Callable[[Seen], Array]
+    there: Callable[[Seen], Mask]
+
+
+def _somebody(seen: Seen) -> Mask:
+    return np.asarray(seen.present.any(axis=-1))
+
+
+def _some_edge(seen: Seen) -> Mask:
+    return np.asarray(seen.edges.known.any(axis=(-2, -1)))
+
+
+def _nis(seen: Seen) -> Array:
+    return consistency.of_innovations(seen.edges.nis, seen.edges.seen).mean
 
 
 METRICS: Mapping[str, Metric] = {
     "procrustes": Metric(
-        "Procrustes error", "m", lambda seen: errors.procrustes_error(seen.position, seen.nominal, seen.present)
+        "Procrustes error",
+        "m",
+        lambda seen: errors.procrustes_error(seen.position, seen.nominal, seen.present),
+        _somebody,
     ),
     "estimation_error": Metric(
         "estimation error",
         "m",
         lambda seen: errors.estimation_error(seen.edges.estimate, seen.edges.true, seen.edges.known),
+        _some_edge,
     ),
     "covariance_trace": Metric(
         "trace of the covariances",
         "m²",
         lambda seen: errors.covariance_trace(seen.edges.covariance, seen.nominal.shape[-1]),
+        _some_edge,
     ),
     "nees": Metric(
         "normalised estimation error squared",
@@ -66,11 +86,13 @@ METRICS: Mapping[str, Metric] = {
         lambda seen: (
             consistency.of_errors(seen.edges.estimate, seen.edges.true, seen.edges.covariance, seen.edges.known).mean
         ),
+        _some_edge,
     ),
     "nis": Metric(
         "normalised innovation squared",
         "",
-        lambda seen: consistency.of_innovations(seen.edges.nis, seen.edges.seen).mean,
+        _nis,
+        lambda seen: ~np.isnan(_nis(seen)),  # NaN of an edge that is measured for the first time
     ),
 }
 
@@ -99,11 +121,13 @@ def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any
 
 
 def of_run(evidence: Evidence, name: str, span: range) -> Array:
-    """A metric in each of these ticks of a run, shape (T,)."""
+    """A metric in each of these ticks of a run, shape (T,): NaN where nothing is there, infinite where it is no number."""
     part, arrays = slice(span.start, span.stop), evidence.arrays
     told: dict[str, Any] = {what: arrays[what][part] for what in ("estimate", "covariance")}
     told[NIS] = arrays[NIS][part] if NIS in arrays else None
     awake = (evidence.awake & evidence.present)[part, :, None]
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
     looked_at = seen(evidence.plan.world, evidence.present[part], arrays["verdicts"][part, 0], whole)
-    return METRICS[name].of(looked_at)[..., 0]
+    value, there = METRICS[name].of(looked_at)[..., 0], METRICS[name].there(looked_at)[..., 0]
+    of_something: Array = np.where(there, np.where(np.isnan(value), np.inf, value), np.nan)
+    return of_something

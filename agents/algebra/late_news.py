@@ -14,7 +14,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from agents.exchange import Heard
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Integers, Mask, chosen
 
 T = TypeVar("T", bound=tuple[Any, ...])
 
@@ -40,10 +40,21 @@ class TakenIn(NamedTuple):
 
 
 class RecentTicks(NamedTuple, Generic[T]):
-    """The last ticks, newest first, along an axis after the batch's: what was believed before each, and what was taken in."""
+    """The last ticks, newest first, along an axis after the batch's.
+
+    Parameters
+    ----------
+    before
+        What was believed before each.
+    ticks
+        What was taken in in each.
+    lived
+        How many of them there were, shape (...): beyond, nothing is remembered.
+    """
 
     before: T
     ticks: TakenIn
+    lived: Integers
 
 
 def refuse_forgetful(memory: int) -> None:
@@ -76,7 +87,7 @@ def blank(before: T, batch: tuple[int, ...], edges: tuple[int, int], memory: int
     nothing, no = np.zeros((*kept, *edges)), np.zeros((*kept, edges[0]), dtype=bool)
     own = np.zeros((*kept, edges[1]))
     repeated = _each(lambda array: np.repeat(np.expand_dims(array, axis), memory + 1, axis), before)
-    return RecentTicks(repeated, TakenIn(own, nothing, no, nothing, no))
+    return RecentTicks(repeated, TakenIn(own, nothing, no, nothing, no), np.zeros(batch, dtype=np.int64))
 
 
 def advanced(recent: RecentTicks[T], before: T, own: Array, measured: Array, seen: Mask) -> RecentTicks[T]:
@@ -91,11 +102,12 @@ def advanced(recent: RecentTicks[T], before: T, own: Array, measured: Array, see
         kept = past[(slice(None),) * axis + (slice(0, past.shape[axis] - 1),)]
         return np.concatenate([np.expand_dims(new, axis), kept], axis=axis)
 
-    return RecentTicks(_each(pushed, before, recent.before), _each(pushed, newest, recent.ticks))
+    lived = np.minimum(recent.lived + 1, recent.ticks.seen.shape[axis])
+    return RecentTicks(_each(pushed, before, recent.before), _each(pushed, newest, recent.ticks), lived)
 
 
-def filled_in(recent: RecentTicks[T], said: Heard) -> tuple[RecentTicks[T], int]:
-    """The ticks with the inputs that were heard, each where it belongs, and how many ticks ago news of them begins.
+def filled_in(recent: RecentTicks[T], said: Heard) -> tuple[RecentTicks[T], Integers]:
+    """The ticks with the inputs that were heard, each where it belongs, and how many ticks ago news begins, shape (...).
 
     What is older than all of them is lost, and what is known stays as it was heard first.
 
@@ -108,15 +120,16 @@ def filled_in(recent: RecentTicks[T], said: Heard) -> tuple[RecentTicks[T], int]
     """
     ticks = recent.ticks
     ago = np.arange(ticks.known.shape[-2])[:, None]
-    arrived = said.fresh[..., None, :] & (np.broadcast_to(said.age, said.fresh.shape)[..., None, :] == ago)
+    remembered = ago < recent.lived[..., None, None]
+    arrived = said.fresh[..., None, :] & (np.broadcast_to(said.age, said.fresh.shape)[..., None, :] == ago) & remembered
     news = arrived & ~ticks.known
     inputs = np.where(news[..., None], said.fields["velocity"][..., None, :, :], ticks.inputs)
-    oldest = int((ago * news).max(initial=0))
+    oldest = (ago * news).max(axis=(-2, -1), initial=0)
     return recent._replace(ticks=ticks._replace(inputs=inputs, known=ticks.known | arrived)), oldest
 
 
 def reprocessed(
-    recent: RecentTicks[T], oldest: int, step: Callable[[T, TakenIn], tuple[T, Array]]
+    recent: RecentTicks[T], oldest: Integers, step: Callable[[T, TakenIn], tuple[T, Array]]
 ) -> tuple[T, RecentTicks[T], Array]:
     """What is believed now, the ticks with what was believed before each, and the innovations of this one.
 
@@ -125,22 +138,25 @@ def reprocessed(
     recent
         With all that was heard.
     oldest
-        How many ticks ago there is news. Where there is none, the same ticks give the same bits again.
+        How many ticks ago there is news, shape (...); who has none so old keeps what it believed.
     step
         What a tick makes of a belief, and its innovations.
     """
     axis = recent.ticks.seen.ndim - 2
-    believed = _at(recent.before, oldest, axis)
+    first = int(oldest.max(initial=0))
+    believed = _at(recent.before, first, axis)
     after: list[T] = []
     innovation = np.zeros(0)
-    for ago in range(oldest, -1, -1):
+    for ago in range(first, -1, -1):
         believed, innovation = step(believed, _at(recent.ticks, ago, axis))
+        if ago:
+            believed = chosen(oldest >= ago, believed, _at(recent.before, ago - 1, axis))
         after.insert(0, believed)
-    if not oldest:
+    if not first:
         return believed, recent, innovation
 
     def renewed(old: Array, *new: Array) -> Array:
-        untouched = old[(slice(None),) * axis + (slice(oldest, None),)]
+        untouched = old[(slice(None),) * axis + (slice(first, None),)]
         return np.concatenate([np.stack(new, axis=axis), untouched], axis=axis)
 
     return believed, recent._replace(before=_each(renewed, recent.before, *after[1:])), innovation
@@ -152,7 +168,7 @@ def unheard(
     """What is believed after a tick in which nothing was measured and nothing heard, and the ticks with it."""
     quiet = _at(recent.ticks, 0, recent.ticks.seen.ndim - 2)
     passed = advanced(recent, before, own, np.zeros_like(quiet.measured), np.zeros_like(quiet.seen))
-    believed, passed, _ = reprocessed(passed, 0, step)
+    believed, passed, _ = reprocessed(passed, np.zeros_like(passed.lived), step)
     return believed, passed
 
 

@@ -19,6 +19,7 @@ from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor, called
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
+from netem.wire.arrays import WHOLE, WireError, numbers, packed
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
@@ -94,7 +95,7 @@ class CentreNode:
     def _input(self, agent: int, said: dict[str, Any]) -> Any:
         name = DERIVATIVES[self._swarm.order - 1]
         whose = f"agent {agent} on {INPUT!r}: {name!r}"
-        return messages.numbers(said.get(name), whose, (self._swarm.dimension,))
+        return numbers(said.get(name), whose, (self._swarm.dimension,))
 
     def _measurements(self, said: dict[int, dict[str, Any]]) -> tuple[Any, Any]:
         agents, slots = self._swarm.neighbours.shape
@@ -102,15 +103,11 @@ class CentreNode:
         seen = np.zeros((agents, slots), dtype=bool)
         for agent, observed in said.items():
             whose, slots_of = f"agent {agent} on {MEASUREMENT!r}", self._slots[agent - 1]
-            whom = messages.numbers(observed.get("neighbours"), f"{whose}: 'neighbours'", (None,), "iu").tolist()
+            whom = numbers(observed.get("neighbours"), f"{whose}: 'neighbours'", (-1,), WHOLE).tolist()
             if strangers := [neighbour for neighbour in whom if neighbour not in slots_of]:
-                raise messages.WireError(
-                    f"{whose}: 'neighbours': it has none called {strangers} (see docs/protocol.md)"
-                )
+                raise WireError(f"{whose}: 'neighbours': it has none called {strangers} (see docs/protocol.md)")
             rows = [slots_of[neighbour] for neighbour in whom]
-            given = messages.numbers(
-                observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._swarm.dimension)
-            )
+            given = numbers(observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._swarm.dimension))
             measured[agent - 1, rows], seen[agent - 1, rows] = given, True
         return measured, seen
 
@@ -122,9 +119,9 @@ class CentreNode:
                 k=tick,
                 src=CENTRE,
                 seq=number,
-                relative=told.relative[agent - 1],
-                covariance=told.covariance[agent - 1],
-                nis=told.nis[agent - 1],
+                relative=packed(told.relative[agent - 1]),
+                covariance=packed(told.covariance[agent - 1]),
+                nis=packed(told.nis[agent - 1]),
             )
             voice.say(messages.pack(message))
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
 
-from analysis.models.arrays import Array
 from netem.core.plain import shown
 from netem.wire import messages
+from netem.wire.arrays import WireError
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
 
@@ -55,26 +55,14 @@ class Broadcasts:
         whose = f"agent {agent} on {channel!r}"
         try:
             said = messages.unpack_relayed(data)
-        except messages.WireError as error:
-            raise messages.WireError(f"{whose}: {error}") from error
+        except WireError as error:
+            raise WireError(f"{whose}: {error}") from error
         if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
-            raise messages.WireError(
+            raise WireError(
                 f"{whose} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
                 f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
             )
         self._streams.check(f"{said.src} {said.channel}", said.seq)
         if (said.src, said.channel) not in awaited:
-            raise messages.WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
+            raise WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
         return said
-
-
-def fields(said: messages.Broadcast) -> dict[str, Array]:
-    """The named fields of a broadcast as arrays, for who has to change them.
-
-    Raises
-    ------
-    WireError
-        When one is no nested list of numbers or truths.
-    """
-    whose = f"agent {said.src} on {said.channel!r}"
-    return {name: messages.numbers(field, f"{whose}: {name!r}", None, "iufb") for name, field in said.payload.items()}

@@ -40,6 +40,10 @@ class Keys:
         """What a centralized filter tells an agent (centre to agent, past the medium)."""
         return f"affinet/{self.run}/agent/{agent}/told"
 
+    def roster(self, host: int) -> str:
+        """Who of a host's agents takes part in a tick (medium to host)."""
+        return f"affinet/{self.run}/host/{host}/roster"
+
     @property
     def sense(self) -> str:
         """The world's raw sensing of a tick (world to medium)."""

@@ -1,7 +1,8 @@
 """Messages <-> MessagePack, validated: the only place that packs or unpacks what travels over Zenoh.
 
-Every message is a map of plain numbers and nested lists with `k` (tick), `src` (who says it) and `seq` (its number on its
-key, from 0). The maps are spelled out in docs/protocol.md; an agent needs nothing of ours to speak them.
+Every message is a map with `k` (tick), `src` (who says it) and `seq` (its number on its key, from 0). Arrays in it are bytes,
+by `netem.wire.arrays`: what a message is made of is checked here, in C, and what its arrays hold by whoever reads them, who
+knows their shapes. The maps are spelled out in docs/protocol.md; an agent needs nothing of ours to speak them.
 """
 
 from __future__ import annotations
@@ -11,18 +12,12 @@ from functools import cache
 from typing import Any, TypeVar
 
 import msgspec
-import numpy as np
 
-from analysis.models.arrays import Array, Integers, Mask
-from netem.core.plain import as_array, located, plainly, shown
+from netem.core.plain import located, plainly
 from netem.faults.control import Answer, Order
-from netem.medium.verdict import VerdictCodes
+from netem.wire.arrays import Packed, WireError
 
 T = TypeVar("T")
-
-
-class WireError(ValueError):
-    """A message that does not say what its key promises."""
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,7 +30,7 @@ class Sighted(_Message, frozen=True, kw_only=True):
     `by` is the number of the method it was found by, `method` that of the method used from now on.
     """
 
-    position: Array
+    position: bytes
     done: bool
     by: int
     method: int
@@ -54,11 +49,22 @@ class Sense(_Message, frozen=True, kw_only=True):
     src: str
     seq: int
     last: bool
-    measured: Array
-    position: Array
-    motion: Array | None
+    measured: bytes
+    position: bytes
+    motion: bytes | None
     sightings: list[Sighted] | None
     fired: list[int]
+
+
+class Roster(_Message, frozen=True, kw_only=True):
+    """Medium to host: who of its agents gets an inbox in tick k, who of them was restarted, and who of those remembers."""
+
+    k: int
+    src: str
+    seq: int
+    awake: list[int]
+    restarted: list[int]
+    remembering: list[int]
 
 
 class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="sense"):
@@ -76,9 +82,9 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     seq: int
     clock: int
     neighbours: list[int]
-    measured: Array
-    position: Array | None
-    motion: Array | None
+    measured: bytes
+    position: bytes | None
+    motion: bytes | None
     sighting: Sighted | None
 
 
@@ -123,10 +129,10 @@ class Act(_Message, frozen=True, kw_only=True):
     k: int
     src: int
     seq: int
-    input: Array
-    estimate: Array
-    known: Mask
-    covariance: Array
+    input: Packed
+    estimate: Packed
+    known: Packed
+    covariance: Packed
     psi: float
     feasible: bool | None
     reports: dict[str, Any]
@@ -143,9 +149,9 @@ class Told(_Message, frozen=True, kw_only=True):
     k: int
     src: str
     seq: int
-    relative: Array
-    covariance: Array
-    nis: Array
+    relative: bytes
+    covariance: bytes
+    nis: bytes
 
 
 class Journal(_Message, frozen=True, kw_only=True):
@@ -161,12 +167,12 @@ class Journal(_Message, frozen=True, kw_only=True):
     k: int
     src: str
     seq: int
-    verdicts: VerdictCodes
-    odd: Integers
-    apart: Integers
+    verdicts: bytes
+    odd: bytes
+    apart: bytes
     late: int
-    dropped: Integers
-    released: Integers
+    dropped: bytes
+    released: bytes
     handed: list[int]
     injected: list[Any] | None
 
@@ -232,41 +238,9 @@ def pack_exchange(k: int, seq: int, broadcasts: Sequence[bytes]) -> bytes:
     return _ENCODER.encode(_Relayed(k=k, src="netem", seq=seq, messages=[msgspec.Raw(said) for said in broadcasts]))
 
 
-def numbers(given: Any, whose: str, shape: tuple[int | None, ...] | None, kinds: str = "iuf") -> Array:
-    """What somebody said as an array.
-
-    Parameters
-    ----------
-    given
-        A number, or nested lists of them.
-    whose
-        Who said it, and where: how the error begins.
-    shape
-        What it has to be, any length where it begins with None; None for any shape.
-    kinds
-        Of NumPy's data types, those that will do.
-
-    Raises
-    ------
-    WireError
-        When it is something else.
-    """
-    try:
-        array = np.array(given)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        array = np.array(None)
-    if array.shape == (0,) and shape and not shape[0]:
-        return np.empty([length or 0 for length in shape])
-    if not (shape is None or _fits(array.shape, shape)) or (array.dtype.kind not in kinds and array.size):
-        what = "truths" if kinds == "b" else "numbers"
-        of = "" if shape is None else f" of shape ({', '.join('any' if n is None else str(n) for n in shape)})"
-        raise WireError(f"{whose}: expected {what}{of}, got {shown(given)} (see docs/protocol.md)")
-    return array
-
-
 @cache
 def _decoder(kind: Any) -> Any:
-    return msgspec.msgpack.Decoder(kind, dec_hook=as_array)
+    return msgspec.msgpack.Decoder(kind)
 
 
 def _read(kind: Any, name: str, data: bytes, root: str = "$") -> Any:
@@ -276,7 +250,3 @@ def _read(kind: Any, name: str, data: bytes, root: str = "$") -> Any:
         raise WireError(f"{name}: {located(error, root)} (see docs/protocol.md)") from error
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise WireError(f"{name}: not MessagePack: {error} (see docs/protocol.md)") from error
-
-
-def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    return shape == wanted or (wanted[:1] == (None,) and len(shape) == len(wanted) and shape[1:] == wanted[1:])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,6 +71,11 @@ def agent_name(agent: int) -> str:
     return f"agent-{agent}"
 
 
+def host_name(host: int) -> str:
+    """The name under which a process logs in that carries several agents."""
+    return f"host-{host}"
+
+
 @dataclass(frozen=True)
 class Login:
     """Where a process connects, and as whom."""
@@ -99,13 +104,27 @@ def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
     )
 
 
-def hub(login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
-    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do."""
+def hub(
+    login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+) -> dict[str, Any]:
+    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do.
+
+    Parameters
+    ----------
+    login, dictionary_file
+        Its own, and the file with everybody's password.
+    keys
+        Those of the run.
+    agents
+        All agents.
+    hosts
+        For each process that carries several of them, which.
+    """
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "access_control": _access(keys, agents),
+            "access_control": _access(keys, agents, hosts),
         },
         login,
         dictionary_file=dictionary_file,
@@ -124,18 +143,12 @@ def _config(base: dict[str, Any], login: Login, **auth: str) -> dict[str, Any]:
     }
 
 
-def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
+def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> dict[str, Any]:
+    carried = {agent for of_host in hosts.values() for agent in of_host}
     rights = [
         _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
-        *(
-            _rights(
-                agent_name(agent),
-                says=[keys.broadcast(agent, "*"), keys.act(agent)],
-                hears=[keys.inbox(agent), keys.told(agent)],
-                learns=[keys.broadcast("*", "*"), keys.act("*")],
-            )
-            for agent in agents
-        ),
+        *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
+        *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
         _rights(
             CENTRE,
             says=[keys.told("*")],
@@ -151,6 +164,15 @@ def _access(keys: Keys, agents: Iterable[int]) -> dict[str, Any]:
         "subjects": [{"id": name, "usernames": [name]} for name, _ in rights],
         "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
     }
+
+
+def _of_agents(name: str, keys: Keys, agents: Iterable[int], roster: list[str]) -> tuple[str, list[dict[str, Any]]]:
+    return _rights(
+        name,
+        says=[key for agent in agents for key in (keys.broadcast(agent, "*"), keys.act(agent))],
+        hears=roster + [key for agent in agents for key in (keys.inbox(agent), keys.told(agent))],
+        learns=[keys.broadcast("*", "*"), keys.act("*")],
+    )
 
 
 def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:

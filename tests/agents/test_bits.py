@@ -26,6 +26,7 @@ from agents.exchange import Heard
 from agents.laws.double import DoubleConstantVelocity, DoubleVaryingVelocity
 from agents.laws.single import ConstantVelocity, Rest, Static, VaryingVelocity
 from analysis.models.arrays import chosen
+from netem.core.channels import INPUT
 
 TICKS, RUNS, LATE = 10, 3, 3
 
@@ -235,6 +236,39 @@ def test_a_restarted_agent_is_a_fresh_one_and_the_others_go_on(estimator, plans)
     for now, fresh, before in zip(leaves(chosen(restarted, new, flown)), leaves(new), leaves(flown), strict=True):
         assert now[restarted].tobytes() == fresh[restarted].tobytes()
         assert now[~restarted].tobytes() == before[~restarted].tobytes()
+
+
+@pytest.mark.parametrize("sigma_n", [0.0, 0.1])
+@pytest.mark.parametrize("kind", [EdgeKalmanFilter, JointEdgeFilter])
+def test_a_batch_in_which_some_began_anew_gives_the_bits_of_each_agent_alone(kind, sigma_n, plans, monkeypatch):
+    """What is heard late takes those back who were there, and nobody beyond his own beginning."""
+    monkeypatch.setitem(ESTIMATORS, "anew", kind(coefficients=(0.8,), sigma_n=sigma_n))
+    everybody, links = agent_of(plans[2], "anew", "constant-velocity"), plans[2].world.links
+    measured, seen, fresh, position, _ = draw(everybody, links, 1, ())
+    begins = np.arange(links.agents) % 4 * 2  # in which tick each of them does, for the first or the second time
+    late = (np.arange(links.agents) % 3 == 0)[:, None]  # who hears anything late
+
+    def flown(agent, rows, of_all):
+        state, ticks = agent.init(begins[rows].shape), []
+        for tick in range(TICKS):
+            state = chosen(begins[rows] == tick, agent.init(begins[rows].shape), state)
+            state, said = agent.sense(state, tick, measured[tick][rows], seen[tick][rows], None)
+            if of_all is None:
+                heard = gather(said, links.neighbours, fresh[tick])
+                heard = {name: each._replace(age=np.where(late, each.age, 0)) for name, each in heard.items()}
+            else:
+                heard = row_of(of_all[tick][0], rows)
+            state, action = agent.act(state, tick, heard, position[tick][rows], None, None)
+            ticks.append((heard, action, state))
+        return ticks
+
+    together = flown(everybody, np.arange(links.agents), None)
+    assert max(heard[INPUT].age.max() for heard, _, _ in together) >= 2
+    for row in range(links.agents):
+        alone = flown(replace(everybody, brief=everybody.brief.of(row)), row, together)
+        for (_, action, state), (_, all_action, all_state) in zip(alone, together, strict=True):
+            for one, many in zip(leaves((action, state)), leaves((all_action, all_state)), strict=True):
+                assert one.tobytes() == many[row].tobytes()
 
 
 MISSING = ("rkf", "ga-rkf-conral", "imm", "edge-kf", "joint-kf", "silent-kf", "conral")

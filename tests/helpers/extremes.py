@@ -85,7 +85,7 @@ _FLOWN: dict[str, Any] = {
     },
     "time": SHORT,
     "sensing": {"samples": 2, "sigma": 0.1},
-    "agents": {"estimator": "ga-rkf", "law": "varying-velocity", "leader_gain": 1.0, "limit": 5.0},
+    "agents": {"estimator": "ga-rkf", "law": "varying-velocity", "leader_gain": 1.0, "limit": 5.0, "per_process": 2},
 }
 # The same keys, otherwise said; together they say them all.
 BASES: dict[str, dict[str, Any]] = {

@@ -5,7 +5,7 @@ import sys
 
 import zenoh
 
-from agents.process import AgentBrief, AgentNode
+from agents.process import AgentBrief, AgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.keys import Keys
@@ -20,7 +20,7 @@ def main() -> None:
     keys = Keys(brief.run)
     aside = zenoh.Config.from_json5(json.dumps(client(brief.login)))
     with Session(client(brief.login)) as session, zenoh.open(aside) as side:
-        node = AgentNode(session, supervisor, brief)
+        node = AgentsNode(session, supervisor, [brief])
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
         private = [key for peer in PEERS for key in (keys.inbox(peer), keys.told(peer))]
         inboxes = [side.declare_subscriber(key, zenoh.handlers.FifoChannel(10_000)) for key in private]

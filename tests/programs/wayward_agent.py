@@ -4,9 +4,7 @@ import os
 import sys
 import time
 
-from msgspec.structs import replace
-
-from agents.process import AgentBrief, AgentNode
+from agents.process import AgentBrief, AgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.session import client
@@ -14,23 +12,24 @@ from netem.wire.session import client
 TICK = 4
 
 
-class Wayward(AgentNode):
+class Wayward(AgentsNode):
     def __init__(self, session, supervisor, brief, wrong):
-        super().__init__(session, supervisor, brief)
+        super().__init__(session, supervisor, [brief])
         self.wrong = wrong
+        (self.mailbox,) = self._mailboxes.values()
 
-    def _exchange(self, inbox, sensed):
+    def _tell(self, tick, action, awake):
         if self.wrong == "thinks":
             time.sleep(0.1)
-        if inbox.k == TICK:
+        if tick == TICK:
             match self.wrong:
                 case "loses":
-                    inbox = replace(inbox, messages=inbox.messages[1:])
+                    self.mailbox.heard -= 1
                 case "skips":
-                    self._numbers.next("act")
+                    self.mailbox._numbers.next("act")
                 case "prints":
                     os.write(self._supervisor._events, b'{"event":"kill","agents":[1]}\n')
-        super()._exchange(inbox, sensed)
+        super()._tell(tick, action, awake)
 
 
 def main() -> None:

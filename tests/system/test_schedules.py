@@ -20,7 +20,7 @@ from tests.system.test_runtimes import OCTAHEDRON
 pytestmark = PROCESSES
 
 ENDERS = {"heal", "restart", "resume", "rejoin", "replace"}
-ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none")
+ESTIMATORS = ("ga-rkf", "rkf", "conral", "ral", "none", "edge-kf", "joint-kf")
 COARSE = ("time.dt=0.05", "time.duration=4")
 CORRIDOR = loading.load("corridor", COARSE)
 SCHEDULES = strategies.schedules(CORRIDOR, strategies.VERBS)

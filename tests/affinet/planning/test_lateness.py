@@ -17,8 +17,16 @@ def profile(**keys):
     return (f"network.profiles.x={{{said}}}", 'network.profile="x"')
 
 
-def fault(said):
-    return (f"timeline=[{{{said}}}]",)
+def fault(*said):
+    return (f"timeline=[{', '.join(f'{{{one}}}' for one in said)}]",)
+
+
+def hold(verb, whom, at, until):
+    return f'verb="{verb}",{whom},at={at},until={until},in_flight="hold"'
+
+
+ALL, FOURTH = 'links=["all"]', "agents=[4]"
+SOON = "{tracking_error_below=1e3, lasting=0.3}"
 
 
 BAD = '[{model="gilbert-elliott",p=0.2,r=0.3,bad=LOST,extra_delay=0.12}]'
@@ -61,6 +69,54 @@ AIRS = {
     ),
     "held": (
         ("network.delay_ticks=2", *fault(f'verb="cut",links=["all"],{HOLDS}')),
+        "timeline: cut, messages held",
+        8,
+    ),
+    "delayed twice at once": (
+        fault(*(f'verb="delay",at={at},lasts=1,{ALL},delay=0.12' for at in (0.5, 0.6))),
+        "timeline: delay",
+        5,
+    ),
+    "delayed twice, one after the other": (
+        fault(*(f'verb="delay",at={at},lasts=0.5,{ALL},delay=0.12' for at in (0.5, 1.0))),
+        "timeline: delay",
+        3,
+    ),
+    "delayed once more on a condition": (
+        fault(f'verb="delay",when={SOON},{ALL},delay=0.12', f'verb="delay",at=0.5,{ALL},delay=0.12'),
+        "timeline: delay",
+        5,
+    ),
+    "held, and held again at once": (
+        ("network.delay_ticks=2", *fault(hold("cut", ALL, 0.5, 0.9), hold("cut", ALL, 0.9, 1.3))),
+        "timeline: cut, messages held",
+        16,
+    ),
+    "held twice at once": (
+        ("network.delay_ticks=2", *fault(hold("cut", ALL, 0.5, 0.9), hold("cut", ALL, 0.8, 1.3))),
+        "timeline: cut, messages held",
+        16,
+    ),
+    "held again while under way": (
+        ("network.delay_ticks=2", *fault(hold("cut", ALL, 0.5, 0.9), hold("cut", ALL, 0.95, 1.3))),
+        "timeline: cut, messages held",
+        15,
+    ),
+    "held by a cut, then by a pause": (
+        ("network.delay_ticks=2", *fault(hold("cut", ALL, 0.5, 0.9), hold("pause", FOURTH, 0.9, 1.3))),
+        "timeline: cut and pause, messages held",
+        16,
+    ),
+    "held on this link, then on that": (
+        (
+            "network.delay_ticks=2",
+            *fault(hold("cut", 'links=["6->4"]', 0.5, 0.9), hold("cut", 'links=["5->4"]', 0.9, 1.3)),
+        ),
+        "timeline: cut, messages held",
+        8,
+    ),
+    "held, and delayed": (
+        fault(f'verb="delay",at=0.2,{ALL},delay=0.12', hold("cut", ALL, 0.5, 0.9)),
         "timeline: cut, messages held",
         8,
     ),

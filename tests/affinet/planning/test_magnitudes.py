@@ -1,5 +1,6 @@
 """Numbers of any size: refused in one line that names the key, or flown."""
 
+import re
 from contextlib import suppress
 from dataclasses import fields
 from importlib.metadata import entry_points
@@ -8,6 +9,7 @@ from math import inf, nan
 import pytest
 import tomli_w
 from extremes import BASES, changed, numeric_fields, places
+from flying import plan_of
 
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
@@ -268,3 +270,8 @@ def test_what_cannot_fly_is_found_before_it_does(name, overrides, check, words):
 def test_leaders_just_below_the_bound_fly(name, gain):
     made = planning.make(loading.load(name, [f"agents.leader_gain={gain}", "time.duration=1.0"]))
     assert rehearse(made).outcome.tracking_error["max"] < 1.5
+
+
+def test_what_a_run_takes_of_the_memory_is_one_line_in_a_unit_that_fits():
+    (fits,) = [found for found in plan_of("corridor", "time.duration=1").findings if found.check == "memory"]
+    assert re.fullmatch(r"100 ticks of 7 agents take [1-9]\d{0,2}(\.\d+)? [KM]iB of memory; .* GiB", fits.says)

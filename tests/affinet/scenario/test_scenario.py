@@ -522,7 +522,7 @@ def test_of_several_mistakes_the_first_is_told_and_the_others_are_named_with_the
     with pytest.raises(ScenarioError) as error:
         loading.load(str(file))
     assert str(error.value) == (
-        "bad.toml:2: seed: should be greater than or equal to 0, got -1; 1 more mistake: time.dt (bad.toml:14)"
+        "bad.toml:2: seed: should be greater than or equal to 0, got -1; at least 1 more mistake: time.dt (bad.toml:14)"
     )
 
 

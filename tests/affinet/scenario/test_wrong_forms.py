@@ -111,7 +111,7 @@ WRONG_FORMS = [
     pytest.param(
         "manoeuvre={ keyframes = [{ time = 0 }, { time = 1 }] }",
         "manoeuvre.keyframes.1.theta: is missing; it has no default: give a list, like [[1.0, 0.0], [0.0, 1.0]] "
-        "(1 more like it in manoeuvre.keyframes.theta); 1 more mistake: manoeuvre.keyframes.1.offset (override)",
+        "(1 more like it in manoeuvre.keyframes.theta); at least 1 more mistake: manoeuvre.keyframes.1.offset (override)",
         id="missing in every element",
     ),
 ]  # fmt: skip
@@ -130,7 +130,9 @@ def test_355_wrong_edges_are_one_line(tmp_path, capsys):
     assert line.startswith(
         'swarm.toml:4: formation.edges.1: should be text in quotes, like "1-2", got [1, 2] (354 more'
     )
-    assert line.endswith("4 more mistakes: manoeuvre (swarm.toml), time (swarm.toml), sensing (swarm.toml), ...")
+    assert line.endswith(
+        "at least 4 more mistakes: manoeuvre (swarm.toml), time (swarm.toml), sensing (swarm.toml), ..."
+    )
 
 
 def test_what_is_missing_because_it_was_misspelt_is_one_mistake(tmp_path):
@@ -141,7 +143,7 @@ def test_what_is_missing_because_it_was_misspelt_is_one_mistake(tmp_path):
     with pytest.raises(ScenarioError) as error:
         loading.load(str(file))
     assert str(error.value).startswith("swarm.toml:3: manouvre: unknown key; did you mean 'manoeuvre'? known here: ")
-    assert str(error.value).endswith("; 1 more mistake: tmie (swarm.toml:4)")
+    assert str(error.value).endswith("; at least 1 more mistake: tmie (swarm.toml:4)")
 
 
 # ---- words

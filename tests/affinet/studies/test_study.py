@@ -145,6 +145,11 @@ def test_quick_forms_have_as_much_noise_in_a_second_as_the_full_ones(name):
         ('check = "lower"', 'check = "higher"', r"^tiny\.toml:31: claims\.2\.check: .*'lower'.*got \"higher\""),
         ("level = 1e9", "level = 0.0", "the level of 'flat' must be above 1, below which nothing is"),
         ("runs = 3", "rnus = 3", r"^tiny\.toml:8: full\.rnus: unknown key; did you mean \'runs\'"),
+        (
+            "\n[[axes]]\n",
+            '\n[[axes]]\nalong = "availability"\n',
+            r"axes\.1\.along: unknown key; 'along' is a key of the file itself",
+        ),
         ('"ga-rkf" }\nlevel', '"nobody" }\nlevel', "no axis 'estimator' has the label 'nobody'"),
     ],
 )

@@ -19,7 +19,8 @@ for module in ("affinet.testing.swarm", "netem.medium.journal", "world.recording
 pytest_plugins = ["pytester"]
 
 SHORT = '"corridor", "time.dt=0.05", "time.duration=1"'
-SAYS_WHERE = re.compile(r"^seed (\d+), (\w+)\nrecording: (.+)\nrepeat: affinet (.+)$", re.MULTILINE)
+SAYS_WHERE = re.compile(r"^seed (\d+), (\w+)\nrecording: (.+)\nfly the same bits again: affinet (.+)$", re.MULTILINE)
+CHECK_AGAIN = re.compile(r"^check again: pytest (.+)$", re.MULTILINE)
 
 
 @pytest.fixture
@@ -133,6 +134,24 @@ def test_breaks(swarm):
     capfd.readouterr()
     assert main(shlex.split(command)) == 0
     assert f"the same bits as {Path(recording).parent}" in capfd.readouterr().err.replace("\n", "")
+
+
+@pytest.mark.parametrize(("options", "mark"), [((), ""), (("--affinet-runtime=processes",), "inprocess")])
+def test_a_failure_says_how_to_check_it_again(tested, pytester, options, mark):
+    mark = f'@pytest.mark.affinet_runtime("{mark}")' if mark else ""
+    text = f"""
+@pytest.mark.affinet_seeds(7, 8)
+{mark}
+def test_breaks(swarm):
+    swarm({SHORT}).fly().check(bounded(1e-9))
+"""
+    first, second = CHECK_AGAIN.findall(tested(text, *options).stdout.str())
+    assert first != second
+    arguments = shlex.split(second)
+    assert tuple(arguments[1:]) == options
+    again = pytester.runpytest_inprocess(f"--basetemp={pytester.path / 'base'}", *arguments)
+    assert outcomes(again) == {"failed": 1}
+    again.stdout.fnmatch_lines(["*Broken: bounded(1e-09): fail: *", "seed 8, inprocess"])
 
 
 def test_a_test_that_passes_leaves_nothing(tested, pytester):

@@ -204,6 +204,51 @@ def test_recovers_fails_after_the_first_fault_that_is_not_made_good():
     assert verdict(checkers.recovers(1.0, within=0.5)(with_error(under(*entries), error))) == ("fail", 30)
 
 
+def above(*spans):
+    """An error that is 5 m2 in these spans of ticks, and small else."""
+    tick = np.arange(TICKS)
+    return np.where(np.any([(tick >= start) & (tick < end) for start, end in spans], axis=0), 5.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("spans", "expected"),
+    [
+        ([(0, 45)], "vacuous"),
+        ([(15, 45)], "vacuous"),
+        ([(15, TICKS)], "vacuous"),
+        ([(15, 25), (30, 45)], "pass"),
+        ([(20, 45)], "pass"),
+    ],
+    ids=["since take-off", "lifted before", "lifted before, for good", "lifted again", "lifted in its first tick"],
+)
+def test_recovers_looks_at_no_fault_before_which_the_error_was_above_already(spans, expected):
+    found = checkers.recovers(1.0, within=1.0)(with_error(under(CUT), above(*spans)))
+    assert verdict(found) == (expected, None)
+    if expected == "vacuous":
+        assert found.says.endswith("it was above before 'cut 2->4' began, at 1 s")
+
+
+@pytest.mark.parametrize(
+    ("spans", "expected"),
+    [
+        ([(16, 55)], ("pass", None)),
+        ([(16, TICKS)], ("fail", 60)),
+        ([(8, 55)], ("vacuous", None)),
+    ],
+    ids=["made good", "not made good", "lifted before both"],
+)
+def test_recovers_looks_at_a_fault_that_begins_under_what_an_earlier_one_lifted(spans, expected):
+    earlier = CUT | {"at": 0.5, "until": 0.75}  # ticks 10 to 14; what it lifts has until 34
+    assert verdict(checkers.recovers(1.0, within=1.0)(with_error(under(earlier, CUT), above(*spans)))) == expected
+
+
+def test_recovers_counts_no_fault_that_touched_nothing():
+    deaf = {"verb": "lie", "at": 1.0, "until": 2.0, "agents": [4], "matrix": [[2.0, 0.0], [0.0, 2.0]]}
+    run = with_error(evidence(timeline(deaf), "agents.estimator=rkf", *NO_DELAY), above((25, 45)))
+    assert [bite.touched for bite in run.bites] == [0]
+    assert verdict(checkers.recovers(1.0, within=1.0)(run)) == ("vacuous", None)
+
+
 PARTITION = {"verb": "partition", "at": 1.0, "until": 2.0, "groups": [[1, 2, 3], [4, 5, 6, 7]]}
 
 
@@ -250,8 +295,9 @@ def test_what_a_cut_does_not_forbid_may_be_heard(tick, link, spoken):
         ({"verb": "lose", "at": 1.0, "links": ["all"], "loss": 1.0},),
         (CUT | {"at": 5.0, "until": 6.0},),
         ({"verb": "cut", "when": CONDITION, "links": ["2->4"]},),
+        ({"verb": "depart", "at": 0.5, "agents": [2], "body": "vanish"}, CUT),
     ],
-    ids=["nothing", "no cut", "after the end", "never came"],
+    ids=["nothing", "no cut", "after the end", "never came", "nobody spoke"],
 )
 def test_never_heard_is_vacuous_when_nothing_was_cut(entries):
     assert verdict(checkers.never_heard_across_a_cut()(under(*entries))) == ("vacuous", None)
@@ -443,6 +489,38 @@ def test_a_run_that_diverged_is_judged_without_warnings(checker):
 def test_nobody_collides_with_a_body_that_is_gone(body, expected):
     run = evidence("formation.spread=0.0", timeline({"verb": "depart", "at": 1.0, "agents": [6], "body": body}))
     assert verdict(checkers.collision_free(0.2)(side_by_side(run, 30, 3, 6))) == expected
+
+
+def test_collision_free_is_vacuous_where_there_are_never_two_bodies():
+    gone = {"verb": "depart", "at": 0.0, "agents": [2, 3, 4, 5, 6, 7], "body": "vanish"}
+    assert verdict(checkers.collision_free(0.2)(evidence(timeline(gone)))) == ("vacuous", None)
+
+
+EDGE_METRICS = ["estimation_error", "covariance_trace", "nees"]
+
+
+@pytest.mark.parametrize("metric", EDGE_METRICS)
+def test_below_is_vacuous_where_no_edge_is_estimated(metric):
+    run = evidence(*HONEST)
+    nobody = tampered(run, known=np.zeros_like(run.arrays["known"]))
+    assert verdict(checkers.below(metric, 1e6)(run)) == ("pass", None)
+    assert verdict(checkers.below(metric, 1e6)(nobody)) == ("vacuous", None)
+    some = run.arrays["known"] & (np.arange(TICKS) >= 40)[:, None, None]
+    assert verdict(checkers.below(metric, 1e6)(tampered(run, known=some))) == ("pass", None)
+
+
+@pytest.mark.parametrize("metric", EDGE_METRICS)
+def test_what_is_no_number_any_more_is_not_below(metric):
+    run = evidence(*HONEST)
+    lost = {name: changed(run.arrays[name], 17, np.nan) for name in ("estimate", "covariance")}
+    assert verdict(checkers.below(metric, 1e6)(tampered(run, **lost))) == ("fail", 17)
+    astray = tampered(run, position=changed(run.arrays["position"], 17, np.nan))
+    assert verdict(checkers.below("procrustes", 1e6)(astray)) == ("fail", 17)
+
+
+def test_below_is_vacuous_when_the_run_ends_before():
+    found = checkers.below("procrustes", 1.0, since=10.0)(evidence(*HONEST))
+    assert (found.verdict, found.says) == ("vacuous", "the run ended before")
 
 
 def test_agreement_passes_where_neighbours_perceive_the_same_map():

@@ -143,6 +143,11 @@ def test_a_scenario_that_is_no_table_is_no_run(text, verb, run, tmp_path, capsys
     assert line.endswith("name one that `affinet run` printed")
 
 
+def test_a_run_that_is_gone_may_have_been_that_of_a_test(tmp_path, capsys):
+    line = said(capsys, "replay", tmp_path / "pytest-3", "--out", tmp_path / "again", status=2)
+    assert line.endswith("printed, or a failed test: pytest keeps those of its last three sessions")
+
+
 @pytest.mark.parametrize(
     ("changes", "differs"),
     [

@@ -64,6 +64,7 @@ REMEMBERED = (
     truth(3, NEIGHBOURS),
     real(3, NEIGHBOURS, 2),
     truth(3, NEIGHBOURS),
+    whole(4),
 )
 F, Q = kalman.motion("constant-velocity", 0.013, 0.7)
 
@@ -72,8 +73,9 @@ def _brief(**held):
     return SimpleNamespace(dt=0.013, **held)
 
 
-def _recent(before, *taken_in):
-    return late_news.RecentTicks(Belief(before, 2.0 * before), late_news.TakenIn(*taken_in))
+def _remembered(given):
+    before, *taken_in, lived = given[:7]
+    return late_news.RecentTicks(Belief(before, 2.0 * before), late_news.TakenIn(*taken_in), lived)
 
 
 def _lived(belief, gone):
@@ -187,18 +189,18 @@ CASES = {
         lambda mean, spread, edges: Belief(mean, spread).placed(edges), real(5, 2), covariance(4, 4), real(2)
     ),
     "agents.algebra.late_news.advanced": of(
-        lambda *given: late_news.advanced(_recent(*given[:6]), Belief(given[6], given[6]), *given[7:]),
+        lambda *given: late_news.advanced(_remembered(given), Belief(given[7], given[7]), *given[8:]),
         *(*REMEMBERED, real(2), real(2), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
     "agents.algebra.late_news.filled_in": of(
-        lambda *given: late_news.filled_in(_recent(*given[:6]), Heard({"velocity": given[6]}, *given[7:]))[0],
+        lambda *given: late_news.filled_in(_remembered(given), Heard({"velocity": given[7]}, *given[8:])),
         *(*REMEMBERED, real(NEIGHBOURS, 2), truth(NEIGHBOURS), whole(4, NEIGHBOURS)),
     ),
     "agents.algebra.late_news.reprocessed": of(
-        lambda *given: late_news.reprocessed(_recent(*given), 2, _step), *REMEMBERED
+        lambda *given: late_news.reprocessed(_remembered(given), given[7], _step), *REMEMBERED, whole(3)
     ),
     "agents.algebra.late_news.unheard": of(
-        lambda *given: late_news.unheard(_recent(*given[:6]), Belief(given[6], given[6]), given[7], _step),
+        lambda *given: late_news.unheard(_remembered(given), Belief(given[7], given[7]), given[8], _step),
         *(*REMEMBERED, real(2), real(2)),
     ),
     "agents.estimators.joint_kf.corrected": of(

@@ -41,7 +41,9 @@ EXEMPT = {
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
-        netem.wire.broadcasts.fields netem.wire.messages.numbers world.acts.Acts.beliefs
+        agents.arrivals.Arrivals.sensed agents.arrivals.Arrivals.heard agents.arrivals.Arrivals.told
+        agents.batch.beside_others agents.batch.put_back agents.batch.come_back agents.algebra.late_news.blank
+        world.acts.Acts.together world.carrier.ProcessesActed.input
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
         world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting

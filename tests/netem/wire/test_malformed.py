@@ -3,15 +3,15 @@
 import msgpack
 import numpy as np
 import pytest
-from flying import plan_of
 from msgspec.structs import asdict
 
-from agents.process import AgentNode
+from agents.arrivals import Arrivals
 from netem.core.links import Links
 from netem.core.plain import shown
-from netem.wire.broadcasts import Broadcasts, fields
+from netem.wire import messages
+from netem.wire.arrays import Form, WireError
+from netem.wire.broadcasts import Broadcasts
 from netem.wire.keys import Keys
-from netem.wire.messages import WireError
 from netem.wire.sequence import UninstructedLoss
 from world.acts import Acts
 
@@ -51,7 +51,9 @@ def broadcast(data, key=None, tick=TICK, awaited=None):
 
 
 def act(data):
-    return Acts(KEYS, LINKS, 2, {"place": (2,)}).read(KEYS.act(2), data, TICK, {1, 2, 3})
+    reader = Acts(KEYS, LINKS, 2, {"place": (2,)})
+    read = reader.read(KEYS.act(2), data, TICK, {1, 2, 3})
+    return reader.together({2: read})
 
 
 EXTENSION, TIMESTAMP = msgpack.packb(msgpack.ExtType(5, b"abc")), msgpack.packb(msgpack.Timestamp(1, 2))
@@ -145,44 +147,43 @@ def test_a_broadcast_that_fits_is_read_as_it_was_said():
     assert asdict(broadcast(msgpack.packb(SAID))) == SAID
 
 
-@pytest.mark.parametrize("packed", [wrong for wrong in WRONG if wrong.id in {"text", "nil", "map", "bytes", "ragged"}])
-def test_where_the_medium_has_to_change_what_it_cannot_read_it_names_the_agent(packed):
-    said = broadcast(with_field(SAID, "payload", b"\x81\xa8velocity" + packed))
-    with pytest.raises(WireError, match=r"^agent 2 on 'input': 'velocity': expected numbers, got "):
-        fields(said)
-
-
 # ---- acts
 
 
-def test_an_act_that_fits_is_read_as_it_was_said():
-    read = act(msgpack.packb(ACT))
-    assert {
-        name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(read).items()
-    } == {
-        **ACT,
-        "reports": read.reports,
-    }
-    assert read.reports["place"].tolist() == [1.0, 2.0]
+BYTES = {name: np.array(ACT[name]).tobytes() for name in ("input", "estimate", "known", "covariance")}
 
 
-def test_beliefs_are_padded_to_the_widest():
+@pytest.mark.parametrize("own", [{}, BYTES], ids=["lists", "bytes"])
+def test_an_act_that_fits_is_read_as_it_was_said(own):
+    done = act(msgpack.packb(ACT | own))
+    assert {name: getattr(done, name)[1].tolist() for name in BYTES} == {name: ACT[name] for name in BYTES}
+    assert done.reports["place"][1].tolist() == [1.0, 2.0]
+    assert np.isnan(done.reports["place"][[0, 2]]).all()
+
+
+@pytest.mark.parametrize("none", [[], b""], ids=["a list", "bytes"])
+@pytest.mark.parametrize("bytes_", [True, False], ids=["bytes", "lists"])
+def test_beliefs_are_padded_to_the_widest(none, bytes_):
     reader = Acts(KEYS, LINKS, 2, {})
-    own = {**ACT, "src": 1, "estimate": [[4.0, 5.0]], "known": [True], "covariance": [[1.0, 0.0, 1.0]], "reports": {}}
-    none = {**ACT, "src": 3, "estimate": [], "known": [], "covariance": [], "reports": {}}
+    edges = {"estimate": [[4.0, 5.0]], "known": [True], "covariance": [[1.0, 0.0, 1.0]]}
+    said = {name: np.array(value).tobytes() for name, value in edges.items()} if bytes_ else edges
+    own = {**ACT, "src": 1, **said, "reports": {}}
+    nothing = {**ACT, "src": 3, "estimate": none, "known": none, "covariance": none, "reports": {}}
     read = {
-        src: reader.read(KEYS.act(src), msgpack.packb(plain), TICK, {1, 2, 3}) for src, plain in ((1, own), (3, none))
+        src: reader.read(KEYS.act(src), msgpack.packb(plain), TICK, {1, 2, 3})
+        for src, plain in ((1, own), (3, nothing))
     }
-    believed = reader.beliefs(read)
-    assert believed.estimate.tolist() == [[[4.0, 5.0], [0.0, 0.0]], [[0.0, 0.0]] * 2, [[0.0, 0.0]] * 2]
-    assert believed.known.tolist() == [[True, False], [False, False], [False, False]]
-    assert believed.covariance.shape == (3, 2, 3)
+    done = reader.together(read)
+    assert done.input.tolist() == [[1.0, 2.0], [0.0, 0.0], [1.0, 2.0]]
+    assert done.estimate.tolist() == [[[4.0, 5.0], [0.0, 0.0]], [[0.0, 0.0]] * 2, [[0.0, 0.0]] * 2]
+    assert done.known.tolist() == [[True, False], [False, False], [False, False]]
+    assert done.covariance.shape == (3, 2, 3)
 
 
 @pytest.mark.parametrize("packed", WRONG)
 def test_an_input_of_anything_else_names_its_agent(packed):
     with pytest.raises(
-        WireError, match=r"^agent 2: Act: input: expected (numbers of shape \(2\)|a .*list of float64.*), got "
+        WireError, match=r"^agent 2: Act: input: expected (numbers of shape \(2\)|`bytes \| array`), got "
     ):
         act(with_field(ACT, "input", packed))
 
@@ -202,7 +203,7 @@ def test_beliefs_about_more_than_its_neighbours_name_their_agent(field):
         act(msgpack.packb(ACT | {field: ACT[field] * 2}))
 
 
-@pytest.mark.parametrize("packed", [wrong for wrong in WRONG if wrong.id != "truths"])  # a report may be truths
+@pytest.mark.parametrize("packed", WRONG)
 def test_reports_of_anything_else_name_their_agent(packed):
     with pytest.raises(WireError, match=r"^agent 2: Act: reports: place: expected numbers of shape \(2\), got "):
         act(with_field(ACT, "reports", b"\x81\xa5place" + packed))
@@ -228,41 +229,29 @@ def test_an_act_that_is_none_of_this_tick_names_its_agent(plain, says):
 # ---- an agent that hears them
 
 
-class Unconnected(AgentNode):
-    """Agent 4 of the corridor, whose neighbours are 1, 6 and others, without a network."""
-
-    def __init__(self):
-        plan = plan_of("corridor")
-        links = plan.world.links
-        self._agent = plan.agents
-        self._neighbours = tuple((links.neighbours[3, links.present[3]] + 1).tolist())
-        self._slot = {number: slot for slot, number in enumerate(self._neighbours)}
-        self._width = len(self._neighbours)
-        self._channels = self._agent.channels()
-        self._silence = {"input": {"velocity": [0.0, 0.0]}}
-
-
-def heard(velocity):
-    node = Unconnected()
-    said = {node._slot[6]: {"velocity": velocity}}
-    return node._rows("input", "velocity", said)[node._slot[6]].tolist()
+def heard(payload):
+    forms = {"input": {"velocity": Form((2,), truths=False)}}
+    arrivals = Arrivals({1: (7,), 2: (5, 6)}, width=2, dimension=2, forms=forms)
+    said = messages.Broadcast(k=TICK, src=6, channel="input", seq=0, payload=payload)
+    inbox = messages.ExchangeInbox(k=TICK, src="netem", seq=0, messages=[said])
+    return arrivals.heard(TICK, {2: inbox})["input"].fields["velocity"][1, 1].tolist()
 
 
 def test_what_a_neighbour_says_is_heard_as_numbers():
-    assert heard([1, 2.5]) == [1.0, 2.5]
+    assert heard({"velocity": [1, 2.5]}) == [1.0, 2.5]
+    assert heard({"velocity": np.array([1.0, 2.5]).tobytes()}) == [1.0, 2.5]
 
 
-@pytest.mark.parametrize("packed", [wrong for wrong in WRONG if wrong.id != "truths"])
+@pytest.mark.parametrize("packed", WRONG)
 def test_what_a_neighbour_says_that_is_no_such_field_names_the_neighbour(packed):
     velocity = msgpack.unpackb(packed)
     with pytest.raises(WireError, match=r"^agent 6 on 'input': 'velocity': expected numbers of shape \(2\), got "):
-        heard(velocity)
+        heard({"velocity": velocity})
 
 
 def test_a_neighbour_that_leaves_a_field_out_is_named():
-    node = Unconnected()
     with pytest.raises(WireError, match=r"^agent 6 on 'input': 'velocity': expected numbers of shape \(2\), got None"):
-        node._rows("input", "velocity", {node._slot[6]: {"speed": [1.0, 2.0]}})
+        heard({"speed": [1.0, 2.0]})
 
 
 def test_what_is_shown_of_anything_is_short():

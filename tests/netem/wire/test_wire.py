@@ -1,6 +1,7 @@
 """The wire: every message survives the trip, and what is no such message is refused by name and field."""
 
 import re
+import struct
 from dataclasses import asdict, replace
 
 import msgpack
@@ -9,11 +10,12 @@ import pytest
 from airs import IMPAIRMENTS, mixture
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import to_builtins
 from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief
+from agents.process import AgentBrief, HostBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
@@ -25,10 +27,10 @@ from netem.impairments.delay import DelayLaw
 from netem.loading.choice import Choice
 from netem.process import MediumBrief
 from netem.wire import messages
-from netem.wire.messages import WireError
+from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, WireError, channel_rows, numbers, packed
 from netem.wire.session import Login
 
-SIGHTED = messages.Sighted(position=np.array([1.5, 2.0]), done=True, by=0, method=1)
+SIGHTED = messages.Sighted(position=packed([1.5, 2.0]), done=True, by=0, method=1)
 
 
 def name(message):
@@ -51,9 +53,9 @@ MESSAGES = [
         src="world",
         seq=7,
         last=False,
-        measured=np.array([[0.5, -1.0]]),
-        position=np.array([[1.0, 2.0], [0.5, 3.0]]),
-        motion=np.array([[[0.25, 0.0], [1.0, 2.0]], [[0.0, -4.0], [3.0, 0.5]]]),
+        measured=packed([[0.5, -1.0]]),
+        position=packed([[1.0, 2.0], [0.5, 3.0]]),
+        motion=packed([[[0.25, 0.0], [1.0, 2.0]], [[0.0, -4.0], [3.0, 0.5]]]),
         sightings=[SIGHTED] * 2,
         fired=[1],
     ),
@@ -63,9 +65,9 @@ MESSAGES = [
         seq=14,
         clock=9,
         neighbours=[2],
-        measured=np.array([[0.5, 1.0]]),
+        measured=packed([[0.5, 1.0]]),
         position=None,
-        motion=np.array([[0.25, 0.0], [1.0, 2.0]]),
+        motion=packed([[0.25, 0.0], [1.0, 2.0]]),
         sighting=SIGHTED,
     ),
     messages.Broadcast(
@@ -77,10 +79,10 @@ MESSAGES = [
         k=7,
         src=3,
         seq=7,
-        input=np.array([1.0, 2.0]),
-        estimate=np.array([[1.0, 0.0]]),
-        known=np.array([True]),
-        covariance=np.array([[0.5, 0.0, 0.5]]),
+        input=packed([1.0, 2.0]),
+        estimate=packed([[1.0, 0.0]]),
+        known=packed([True], TRUTH),
+        covariance=packed([[0.5, 0.0, 0.5]]),
         psi=0.25,
         feasible=True,
         reports={"place": [1.0, 2.0]},
@@ -90,15 +92,16 @@ MESSAGES = [
         k=7,
         src="netem",
         seq=7,
-        verdicts=np.array([[0, 1], [2, 7]], dtype=np.uint8),
-        odd=np.array([[1, 0, 9, 0, 8]]),
-        apart=np.array([[4, 1, 1, 0]]),
+        verdicts=packed([[0, 1], [2, 7]], CODE),
+        odd=packed([[1, 0, 9, 0, 8]], WHOLE),
+        apart=packed([[4, 1, 1, 0]], WHOLE),
         late=1,
-        dropped=np.array([[3, 1, 1, 0, 5]]),
-        released=np.array([[4, 1, 1, 1]]),
+        dropped=packed([[3, 1, 1, 0, 5]], WHOLE),
+        released=packed([[4, 1, 1, 1]], WHOLE),
         handed=[1, 0],
         injected=None,
     ),
+    messages.Roster(k=7, src="netem", seq=7, awake=[1, 3], restarted=[3], remembering=[]),
 ]
 FIELDS = [
     pytest.param(message, field, id=f"{name(message)}.{field}") for message in MESSAGES for field in plain(message)
@@ -113,9 +116,13 @@ def test_a_message_survives_the_trip(message):
 @pytest.mark.parametrize("message", MESSAGES, ids=name)
 def test_a_message_is_a_plain_map_for_any_messagepack_codec(message):
     np.testing.assert_equal(
-        {name: value for name, value in plain(message).items() if name != "phase"}, to_plain(message_fields(message))
+        {name: value for name, value in plain(message).items() if name != "phase"}, plainly(message_fields(message))
     )
     assert {"k", "src", "seq"} <= plain(message).keys()
+
+
+def plainly(value):
+    return to_builtins(value, builtin_types=(bytes,))
 
 
 def message_fields(message):
@@ -127,11 +134,11 @@ def test_an_inbox_is_known_by_its_phase(message):
     same(messages.unpack_inbox(messages.pack(message)), message)
 
 
-def test_arrays_travel_as_nested_lists_and_arrive_as_arrays():
-    assert plain(MESSAGES[0])["measured"] == [[0.5, -1.0]]
-    arrived = messages.unpack(messages.Sense, messages.pack(MESSAGES[0]))
-    assert arrived.measured.dtype == np.float64
-    assert arrived.measured.shape == (1, 2)
+def test_arrays_travel_as_their_bytes_and_arrive_as_arrays():
+    assert plain(MESSAGES[0])["measured"] == struct.pack("<2d", 0.5, -1.0)
+    arrived = numbers(messages.unpack(messages.Sense, messages.pack(MESSAGES[0])).measured, "", (-1, 2))
+    assert arrived.dtype == np.float64
+    assert arrived.tolist() == [[0.5, -1.0]]
 
 
 def test_numpy_scalars_travel_as_numbers():
@@ -143,10 +150,65 @@ def test_an_undefined_indicator_travels_as_nan():
     assert np.isnan(messages.unpack(messages.Act, messages.pack(changed(MESSAGES[5], psi=np.nan))).psi)
 
 
-def test_numbers_arrive_bit_for_bit():
-    numbers = np.array([0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf])
-    arrived = messages.unpack(messages.Act, messages.pack(changed(MESSAGES[5], input=numbers))).input
-    assert arrived.tobytes() == numbers.tobytes()
+@pytest.mark.parametrize("way", [packed, np.ndarray.tolist], ids=["bytes", "a list"])
+def test_numbers_arrive_bit_for_bit(way):
+    said = np.array([0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0, np.inf])
+    arrived = messages.unpack(messages.Act, messages.pack(changed(MESSAGES[5], input=way(said)))).input
+    assert numbers(arrived, "", (6,)).tobytes() == said.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("said", "shape", "dtype"),
+    [
+        (np.arange(6.0).reshape(3, 2)[:, ::-1], (3, 2), FLOAT),
+        (np.arange(6).reshape(3, 2).T, (-1, 3), WHOLE),
+        (np.array([True, False]), (2,), TRUTH),
+        (np.array(2.5), (), FLOAT),
+        (np.empty((0, 2)), (-1, 2), FLOAT),
+        (np.array([[7, 255]], np.uint8), (-1, 2), CODE),
+    ],
+)
+def test_an_array_of_any_layout_travels_row_by_row(said, shape, dtype):
+    arrived = numbers(packed(said, dtype), "", shape, dtype)
+    np.testing.assert_array_equal(arrived, said)
+    assert arrived.dtype == dtype
+    assert not arrived.flags.writeable
+
+
+FORMS = {"local": Form((2, 2), truths=False), "feasible": Form((), truths=True)}
+THETA = {"local": [[1, 2], [3.5, 4]], "feasible": True}
+THETA_BYTES = {"local": packed(THETA["local"]), "feasible": packed(True, TRUTH)}
+
+
+@pytest.mark.parametrize("one", [THETA, THETA_BYTES], ids=["lists", "bytes"])
+@pytest.mark.parametrize("other", [THETA, THETA_BYTES], ids=["lists", "bytes"])
+def test_what_several_say_on_a_channel_is_gathered_however_each_says_it(one, other):
+    rows = channel_rows(FORMS, [one, None, other], ["agent 1", "", "agent 3"])
+    assert rows["local"].tolist() == [THETA["local"], [[0.0, 0.0]] * 2, THETA["local"]]
+    assert rows["feasible"].tolist() == [True, False, True]
+    assert (rows["local"].dtype, rows["feasible"].dtype) == (FLOAT, TRUTH)
+
+
+@pytest.mark.parametrize(
+    ("field", "wrong", "says"),
+    [
+        ("local", bytes(31), "'local': expected numbers of shape (2, 2), got 31 bytes"),
+        ("local", bytes(40), "'local': expected numbers of shape (2, 2), got 40 bytes"),
+        ("local", None, "'local': expected numbers of shape (2, 2), got None"),
+        ("local", [1.0, 2.0, 3.0, 4.0], "'local': expected numbers of shape (2, 2), got [1.0, 2.0, 3.0, 4.0]"),
+        ("feasible", b"\2", "'feasible': expected truths of shape (), got 1 bytes"),
+        ("feasible", 1, "'feasible': expected truths of shape (), got 1"),
+    ],
+)
+def test_who_says_something_else_on_a_channel_is_named(field, wrong, says):
+    with pytest.raises(WireError, match=f"^{re.escape(f'agent 3: {says}')}"):
+        channel_rows(FORMS, [THETA_BYTES, THETA_BYTES | {field: wrong}], ["agent 1", "agent 3"])
+
+
+def test_two_wrong_lengths_do_not_make_up_for_each_other():
+    short, long = THETA_BYTES | {"local": bytes(24)}, THETA_BYTES | {"local": bytes(40)}
+    with pytest.raises(WireError, match=r"^agent 1: 'local': .* got 24 bytes"):
+        channel_rows(FORMS, [short, long], ["agent 1", "agent 3"])
 
 
 @pytest.mark.parametrize("message", MESSAGES[:2], ids=name)
@@ -195,15 +257,8 @@ def test_a_field_of_the_wrong_type_is_named(message, field):
         ("k", True, "k: expected `int`, got `bool`"),
         ("psi", None, "psi: expected `float`, got `None`"),
         ("psi", True, "psi: expected `float`, got `bool`"),
-        ("input", ["x", {}], "input: expected a nested list of float64, or one, got ['x', {}]"),
-        (
-            "input",
-            [[1.0], [1.0, 2.0]],
-            "input: expected a rectangular list of float64, got [[1.0], [1.0, 2.0]]",
-        ),
-        ("known", [1], "known: expected a nested list of bool, or one, got [1]"),
-        ("known", ["yes"], "known: expected a nested list of bool, or one, got ['yes']"),
-        ("covariance", [None], "covariance: expected a nested list of float64, or one, got [None]"),
+        ("input", {}, "input: expected `bytes | array`, got `object`"),
+        ("known", True, "known: expected `bytes | array`, got `bool`"),
     ],
 )
 def test_no_type_is_taken_for_another(field, wrong, says):
@@ -212,15 +267,17 @@ def test_no_type_is_taken_for_another(field, wrong, says):
         messages.unpack(messages.Act, data)
 
 
-def test_numbers_that_an_array_cannot_hold_are_refused():
-    for wrong in ([[300]], [[-1]], [[0.5]]):
-        with pytest.raises(WireError, match="uint8"):
-            messages.unpack(messages.Journal, msgpack.packb(plain(MESSAGES[6]) | {"verdicts": wrong}))
+@pytest.mark.parametrize("wrong", [["x", {}], [[1.0], [1.0, 2.0]], [None, 1.0], [True, False], "ab", 1.0])
+def test_no_list_of_anything_else_is_taken_for_numbers(wrong):
+    with pytest.raises(
+        WireError, match=rf"^agent 3: expected numbers of shape \(2\), got {re.escape(repr(wrong)[:5])}"
+    ):
+        numbers(wrong, "agent 3", (2,))
 
 
 def test_an_overlong_value_is_shortened_in_the_message():
-    with pytest.raises(WireError, match=r"Act: .*input") as error:
-        messages.unpack(messages.Act, msgpack.packb(plain(MESSAGES[5]) | {"input": ["x" * 10_000]}))
+    with pytest.raises(WireError, match=r"expected numbers") as error:
+        numbers(["x" * 10_000], "agent 3", (2,))
     assert len(str(error.value)) < 200
 
 
@@ -302,7 +359,7 @@ def test_any_value_of_any_field_is_read_as_it_came_or_refused_by_the_name_of_the
 
 def broadcast(src):
     return messages.Broadcast(
-        k=7, src=src, channel="theta", seq=7, payload={"local": np.eye(2) * src, "feasible": True}
+        k=7, src=src, channel="theta", seq=7, payload={"local": packed(np.eye(2) * src), "feasible": True}
     )
 
 
@@ -353,6 +410,7 @@ MEDIUM = MediumBrief(
     seed=2**64 - 1,
     links=LINKS,
     channels=("sense", "theta"),
+    forms={"theta": {"local": Form((2, 2), truths=False)}},
     profiles=(PROFILE, DEGRADED),
     faults=(
         Fault(Verb.CUT, 3, 6, pairs=((1, 2), (2, 1)), under_way=UnderWay.HOLD),
@@ -375,6 +433,7 @@ MEDIUM = MediumBrief(
     injected=(Fault(Verb.CUT, 5, None, pairs=((2, 3),)),),
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
+    hosts={1: (1, 3)},
     journal="/tmp/run/journal.arrows",
     batch=50,
 )
@@ -403,13 +462,14 @@ AGENT = AgentBrief(
 
 
 def plain_of(brief):
-    return msgpack.unpackb(msgpack.packb(to_plain(brief)))
+    return msgpack.unpackb(msgpack.packb(to_plain(brief)), strict_map_key=False)
 
 
 @pytest.mark.parametrize(
     "brief",
     [
         *(BRIEF, replace(BRIEF, mission=None), AGENT, replace(AGENT, limit=None, checkpoint=None, remembers=False)),
+        HostBrief(2, (AGENT, replace(AGENT, agent=3))),
         *(MEDIUM, *MEDIUM.faults, *MEDIUM.triggers),
     ],
     ids=[
@@ -417,6 +477,7 @@ def plain_of(brief):
         "no mission",
         "agent",
         "no limit, no checkpoint",
+        "host",
         "medium",
         *(f.verb for f in MEDIUM.faults),
         "above",
