@@ -59,7 +59,7 @@ def _into_its_directory(
         except KeyboardInterrupt:
             _go_on(kept)
             raise
-        done = _reported(study, results, parsed, out)
+        done = _reported(study, results, parsed, out, flown=of[identity.GRID])
         if done:
             kept.clear()
         return done
@@ -84,15 +84,17 @@ def _flown(
     return results
 
 
-def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, out: Path) -> bool:
+def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, out: Path, *, flown: str) -> bool:
     try:
-        judged = record.recorded(study, results, judging.judge(study, results), quick=parsed.quick)
+        verdicts = judging.judge(study, results)
+        judged = record.recorded(study, results, verdicts, flown=flown, quick=parsed.quick)
         record.write(out, judged)
         show.claims(judged, record.full_study(parsed.study), out)
         report.draw(out, study, results)
     except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
         log = report.failed(out)
-        _note(f"{out} has the data, but not all of the report: {error!r}; {log} says where")
+        where = "" if log is None else f"; {log} says where"
+        _note(f"{out} has the data, but not all of the report: {error!r}{where}")
         return False
     return True
 

@@ -27,6 +27,8 @@ from affinet.studies.study import Study
 Identity = Mapping[str, str]
 Module = tuple[str, str]  # "module:Class", and the folder it lies in
 
+GRID = "the grid"
+
 # All that a cell goes through when it flies, a test finds, and no more: a figure may be mended while a study is under way.
 _FLIES: Mapping[str, Sequence[str]] = {
     "affinet": ("planning", "runtimes", "scenario", "verdicts", "studies/batch.py", "studies/study.py"),
@@ -42,7 +44,7 @@ _OF_PLANS = [field.name for field in fields(Plan) if field.name != "findings"]  
 def of_cells(study: Study, plans: Sequence[Plan], *, quick: bool) -> Identity:
     """That of the cells of a study, flown here."""
     flies = digest([getattr(plan, name) for plan in plans for name in _OF_PLANS])
-    return {"the grid": record.grid(study, quick=quick), "what flies": flies, **here(own_modules(plans))}
+    return {GRID: record.grid(study, quick=quick), "what flies": flies, **here(own_modules(plans))}
 
 
 def own_modules(plans: Iterable[Plan]) -> list[Module]:

@@ -62,10 +62,14 @@ def _joined(tables: list[pa.Table]) -> pa.Table:
     return pa.concat_tables(tables, promote_options="default")
 
 
-def failed(out: Path) -> Path:
-    """Write down of what a report has just failed; the file that says so."""
+def failed(out: Path) -> Path | None:
+    """Write down of what a report has just failed; the file that says so, if there is room for one."""
     log = out / "report.log"
-    log.write_text(traceback.format_exc(), encoding="utf-8")
+    try:
+        log.write_text(traceback.format_exc(), encoding="utf-8")
+    except OSError:
+        log.unlink(missing_ok=True)
+        return None
     return log
 
 

@@ -1,10 +1,12 @@
 """A study that was killed goes on from the cells that it has kept, and ends with the bits of one that was not."""
 
+import errno
 import os
 import shutil
 import subprocess
 import sys
 from dataclasses import fields, replace
+from importlib import resources
 from pathlib import Path
 
 import grimp
@@ -16,7 +18,7 @@ from flying import PROCESSES, plan_of
 
 from affinet import rooms
 from affinet.cli import commands
-from affinet.studies import cells, identity, pool, study
+from affinet.studies import cells, identity, pool, record, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here, Lost
 from affinet.studies.sharing import Piece
@@ -340,3 +342,34 @@ def test_the_rounding_of_this_machine_is_told(threads, alike):
     environment = os.environ | {"OPENBLAS_NUM_THREADS": threads, "PYTHONHASHSEED": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert (done.stdout.strip() == identity._rounding()) == alike
+
+
+def test_what_is_edited_while_a_study_flies_is_not_what_is_recorded(small, tmp_path, monkeypatch):
+    scenario = small.with_name("own.toml")
+    scenario.write_text((resources.files("affinet.shipped") / "scenarios" / "corridor.toml").read_text())
+    small.write_text(STUDY.replace('scenario = "corridor"', 'scenario = "own.toml"'))
+    flown, fly_all = record.grid(study.load(str(small)), quick=True), study.fly
+
+    def edited(*given):
+        results = [*fly_all(*given)]
+        scenario.write_text(scenario.read_text().replace("spread = 1.0", "spread = 5.0"))
+        return iter(results)
+
+    monkeypatch.setattr(study, "fly", edited)
+    assert fly(small, tmp_path / "out", "--quick") == 0
+    assert record.read(tmp_path / "out" / record.FILE).flown == flown != record.grid(study.load(str(small)), quick=True)
+
+
+def test_a_disk_that_is_full_leaves_no_verdicts_that_are_not_whole(small, tmp_path, monkeypatch, capsys):
+    def no_room(path, *_, **__):
+        path.touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_text", no_room)
+        assert fly(small, tmp_path / "out", "--quick") == 1
+    left_over = {file.name for file in (tmp_path / "out").iterdir()}
+    assert left_over == {"cells", "curves.parquet", "runs.parquet"}
+    assert capsys.readouterr().err.splitlines()[-1].endswith("OSError(28, 'No space left on device')")
+    assert fly(small, tmp_path / "out", "--quick") == 0
+    assert record.read(tmp_path / "out" / record.FILE).quick
