@@ -25,6 +25,13 @@ def module(room: str, path: str) -> str:
     return ".".join([*(["affinet"] if _WITHIN and room in _ROOMS else []), room, path])
 
 
+def folder(room: str) -> Path:
+    """In which a room lies, or affinet itself."""
+    if room == _HERE.name:
+        return _HERE
+    return (_HERE if _WITHIN else _HERE.parent) / room
+
+
 def refuse_shadows() -> None:
     """Go on if the rooms are affinet's own.
 

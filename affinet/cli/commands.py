@@ -26,7 +26,7 @@ from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
-from affinet.runtimes.interruption import Interrupted, ended_by_signals
+from affinet.runtimes.interruption import Interrupted
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
@@ -42,7 +42,6 @@ from netem.processes.user_code import UserCodeError
 from world.books import history
 
 if TYPE_CHECKING:
-    from affinet.studies.study import Result
     from affinet.testing.hunt import Counterexample
     from affinet.verdicts.checking import Checker
     from affinet.verdicts.outcome import Outcome
@@ -206,36 +205,9 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
 
 
 def _study(parsed: argparse.Namespace) -> int:
-    from affinet.studies import judging, record, report  # pyarrow and matplotlib take a while to import
-    from affinet.studies import study as studies
+    from affinet.cli import studying  # pyarrow and matplotlib take a while to import
 
-    study = studies.load(parsed.study)
-    planned = studies.plans(study, quick=parsed.quick)
-    out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
-    results: list[Result] = []
-    with directories.unless_empty(out), ended_by_signals():
-        try:
-            with show.Grid(study.title, [plan.world.ticks for _, plan in planned]) as grid:
-                for result in studies.fly(planned, study.size(quick=parsed.quick).runs, grid.look):
-                    results.append(result)
-                    grid.see(result)
-        except BrokenExecutor:
-            gone = f"a process that flew cases is gone, for want of memory perhaps; {out} has those done"
-            print(gone, file=sys.stderr)  # noqa: T201
-            return FAIL
-        finally:
-            if results:  # whatever happened meanwhile, what was flown is kept
-                report.save(out, study, results)
-    try:
-        judged = record.recorded(study, results, judging.judge(study, results), quick=parsed.quick)
-        record.write(out, judged)
-        show.claims(judged, record.full_study(parsed.study), out)
-        report.draw(out, study, results)
-    except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
-        log = report.failed(out)
-        print(one_line(f"{out} has the data, but not all of the report: {error!r}; {log} says where"), file=sys.stderr)  # noqa: T201
-        return FAIL
-    return PASS
+    return PASS if studying.fly_and_report(parsed) else FAIL
 
 
 def _design(parsed: argparse.Namespace) -> int:

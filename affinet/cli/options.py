@@ -153,7 +153,19 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     study.add_argument("study", help=f"a TOML file, or one of: {', '.join(files.shipped('studies'))}")
     study.add_argument("--quick", action="store_true", help="a coarse version, of fewer runs")
-    study.add_argument("--out", type=_path, metavar="DIR", help="default: studies/NAME, numbered where that is taken")
+    study.add_argument(
+        "--out",
+        type=_path,
+        metavar="DIR",
+        help="default: studies/NAME, numbered where that is taken; one that was interrupted there goes on",
+    )
+    where = study.add_mutually_exclusive_group()
+    where.add_argument(
+        "--jobs", type=_count, metavar="N", help="in so many processes (default: as many as processors; 1: this one)"
+    )
+    where.add_argument(
+        "--dask", metavar="ADDRESS", help="on the workers of the Dask scheduler there, like tcp://host:8786"
+    )
 
 
 def _add_design(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

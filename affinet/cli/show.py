@@ -100,11 +100,20 @@ class Grid:
         Of each case, by which it takes its part of the time.
     now
         The time, in seconds.
+    there
+        Which share of each has flown before; none, if it is not given.
     """
 
-    def __init__(self, title: str, ticks: Sequence[int], now: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(
+        self,
+        title: str,
+        ticks: Sequence[int],
+        now: Callable[[], float] = time.perf_counter,
+        there: Sequence[float] = (),
+    ) -> None:
         self._title, self._ticks, self._now = title, ticks, now
-        self._shares, self._done = [0.0] * len(ticks), 0
+        self._shares, self._done = list(there) or [0.0] * len(ticks), 0
+        self._before = self._flown / sum(ticks)
         self._began = now()
         self._bar = Bar(title, sum(ticks), bar.BarColumn(), bar.TextColumn(_SAYS), says=self._says(), every_s=math.inf)
 
@@ -137,7 +146,9 @@ class Grid:
         said = (
             f"{self._done}/{len(self._ticks)} cases",
             f"{int(100 * share)} %",
-            left(self._now() - self._began, share),
+            left(
+                self._now() - self._began, (share - self._before) / max(1.0 - self._before, share - self._before, 1e-9)
+            ),
         )
         return "  ".join(filter(None, said))
 

@@ -72,6 +72,13 @@ def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[
     return {name: folder for name, folder in found.items() if folder is not None}
 
 
+def files_of_modules(name: str, folder: Path) -> list[Path]:
+    """The files of "module:Class", of its package if it is in one, and of all that was imported from its folder so far."""
+    top = folder / name.partition(":")[0].partition(".")[0]
+    package = [file for file in top.rglob("*") if file.is_file() and "__pycache__" not in file.parts]
+    return sorted({*modules.sources(str(folder)), *package})
+
+
 def keep(given: Scenario, journal: Path | None, out: Path) -> Scenario:
     """Copy all that a run reads into its directory; the scenario that names the copies.
 
@@ -166,9 +173,7 @@ class _Copies:
         if folder not in self._shelves:
             self._shelves[folder] = self._name(Path("modules"))
         copy = self._shelves[folder]
-        top = folder / name.partition(":")[0].partition(".")[0]
-        package = [file for file in top.rglob("*") if file.is_file() and "__pycache__" not in file.parts]
-        for file in sorted({*modules.sources(str(folder)), *package}):
+        for file in files_of_modules(name, folder):
             self._copy(file, f"{copy}/{file.relative_to(folder).as_posix()}")
         return copy
 

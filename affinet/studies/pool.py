@@ -6,77 +6,56 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, MutableSequence, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
-from typing import ClassVar, TypeVar
+from collections.abc import Callable, Generator, Iterable, MutableSequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, ProcessPoolExecutor, wait
+from dataclasses import dataclass
 
-Given = TypeVar("Given")
-Made = TypeVar("Made")
-
-_LOOKS_S = 0.5  # seconds from one look at how far the others are to the next
+from affinet.studies.executor import LOOKS_S, Executor, Given, Here, Lost, Made, Telling, Watch, numbered
 
 
-class _Telling:
-    """Where the work of this process says how far it is; nowhere outside of a pool."""
-
-    shares: ClassVar[MutableSequence[float]] = [0.0]
-    number: ClassVar[int] = 0
-
-
-def processors() -> int:
-    """How many there are, and so at how many pieces of work a pool is at a time."""
-    return os.cpu_count() or 1
+def on_this_machine(jobs: int | None = None) -> Executor:
+    """So many processes, by default as many as there are processors; for one job, this one."""
+    jobs = jobs or os.cpu_count() or 1
+    return Here() if jobs == 1 else Processes(jobs)
 
 
-def tell(share: float) -> None:
-    """Say which share of the work at hand is done, from within it."""
-    _Telling.shares[_Telling.number] = share
+@dataclass(frozen=True)
+class Processes:
+    """Processes of this machine, as many as pieces of work are done at once.
 
-
-def in_processes(
-    work: Callable[[Given], Made],
-    given: Iterable[Given],
-    watch: Callable[[Sequence[float]], None] = lambda _: None,
-) -> Generator[Made]:
-    """What comes of each, in their order, as it is done; as many at a time as there are processors.
-
-    When whoever iterates stops, is interrupted or dies, no process is left behind.
-
-    Parameters
-    ----------
-    work, given
-        What to do, and with what.
-    watch
-        Told from time to time, while there is something to wait for, which share of each is done, as `tell` says.
+    When whoever iterates over what they do stops, is interrupted or dies, no process is left behind.
     """
-    context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
-    others = set(multiprocessing.active_children())
-    todo = list(given)
-    shares = context.RawArray("d", len(todo))
-    pool = ProcessPoolExecutor(processors(), mp_context=context, initializer=_begin, initargs=(shares,))
-    try:
-        for waiting in [pool.submit(_work, work, number, one) for number, one in enumerate(todo)]:
-            while not wait([waiting], timeout=_LOOKS_S).done:
-                watch(list(shares))
-            yield waiting.result()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    finally:
-        for worker in set(multiprocessing.active_children()) - others:
-            worker.kill()  # by itself it would wait for threads that a user's own code has started
-        pool.shutdown()
 
+    at_once: int
 
-def _work(work: Callable[[Given], Made], number: int, given: Given) -> Made:
-    _Telling.number = number
-    made = work(given)
-    tell(1.0)
-    return made
+    def each(self, work: Callable[[Given], Made], given: Iterable[Given], watch: Watch) -> Generator[tuple[int, Made]]:
+        """As `Executor.each`."""
+        context = multiprocessing.get_context("spawn")  # a fork would copy the threads of the libraries loaded here
+        others = set(multiprocessing.active_children())
+        todo = list(given)
+        shares = context.RawArray("d", len(todo))
+        pool = ProcessPoolExecutor(self.at_once, mp_context=context, initializer=_begin, initargs=(shares,))
+        try:
+            waiting = {pool.submit(numbered, work, number, one): number for number, one in enumerate(todo)}
+            while waiting:
+                done, _ = wait(waiting, timeout=LOOKS_S, return_when=FIRST_COMPLETED)
+                if not done:
+                    watch(list(shares))
+                for one in sorted(done, key=lambda future: waiting[future]):
+                    yield waiting.pop(one), one.result()
+        except BrokenExecutor as error:
+            raise Lost("a process that flew cases is gone, for want of memory perhaps") from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        finally:
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.kill()  # by itself it would wait for threads that a user's own code has started
+            pool.shutdown()
 
 
 def _begin(shares: MutableSequence[float]) -> None:
-    _Telling.shares = shares
+    Telling.shares = shares
     _end_with_the_parent()
 
 

@@ -98,13 +98,15 @@ def _digest(of: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(of, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def recorded(study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVerdict], *, quick: bool) -> StudyRecord:
-    """What is to be kept of a study that was flown and judged."""
+def recorded(
+    study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVerdict], *, flown: str, quick: bool
+) -> StudyRecord:
+    """What is to be kept of a study that was flown and judged; `flown` is its grid from before, whatever its files say now."""
     quantities = dict.fromkeys([study.quantity, *_compared(study)])
     return StudyRecord(
         title=study.title,
         source=study.source,
-        flown=grid(study, quick=quick),
+        flown=flown,
         quick=quick,
         runs=study.size(quick=quick).runs,
         confidence=intervals.CONFIDENCE,
@@ -117,9 +119,14 @@ def recorded(study: Study, results: Sequence[Result], verdicts: Sequence[ClaimVe
 
 
 def write(out: Path, record: StudyRecord) -> None:
-    """Write it into a directory."""
+    """Write it into a directory, whole or not at all."""
     kept = record.model_dump(mode="json")
-    (out / FILE).write_text(json.dumps(kept | {_SEAL: _digest(kept)}, indent=1, allow_nan=False) + "\n")
+    written = out / f"{FILE}.part"
+    try:
+        written.write_text(json.dumps(kept | {_SEAL: _digest(kept)}, indent=1, allow_nan=False) + "\n")
+        written.replace(out / FILE)
+    finally:
+        written.unlink(missing_ok=True)
 
 
 def read(file: Path) -> StudyRecord:

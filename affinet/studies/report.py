@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from affinet.planning import phases
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
-from affinet.studies import record
+from affinet.studies import cells, record
 from affinet.studies.batch import REPORT
 from affinet.studies.judging import graph_rates
 from affinet.studies.quantities import Quantity, over_time, said
@@ -36,15 +36,17 @@ _NORMALISED = {"nees": "NEES", "nis": "NIS", "target_nees": "NEES of targets", "
 def prepare(out: Path | str) -> Path:
     """The directory for what a study leaves, made before anything flies: this one, or by default one of this name.
 
+    One that holds a study which is not done is for the same study to go on in.
+
     Raises
     ------
     OSError
-        When it holds a study already, or cannot be made.
+        When it holds a study already that is done, or it cannot be made.
     """
     if isinstance(out, str):
         return directories.for_study(out)
     out.mkdir(parents=True, exist_ok=True)
-    if (out / record.FILE).exists():
+    if (out / record.FILE).exists() and not cells.unfinished(out):
         raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
     return out
 
@@ -60,10 +62,14 @@ def _joined(tables: list[pa.Table]) -> pa.Table:
     return pa.concat_tables(tables, promote_options="default")
 
 
-def failed(out: Path) -> Path:
-    """Write down of what a report has just failed; the file that says so."""
+def failed(out: Path) -> Path | None:
+    """Write down of what a report has just failed; the file that says so, if there is room for one."""
     log = out / "report.log"
-    log.write_text(traceback.format_exc(), encoding="utf-8")
+    try:
+        log.write_text(traceback.format_exc(), encoding="utf-8")
+    except OSError:
+        log.unlink(missing_ok=True)
+        return None
     return log
 
 

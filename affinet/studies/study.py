@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
@@ -29,15 +30,16 @@ from affinet.scenario.units import Finite, NotNegative
 from affinet.studies import checks
 from affinet.studies.batch import Runs, fly_together
 from affinet.studies.checks import Wrong
-from affinet.studies.pool import in_processes, processors, tell
+from affinet.studies.executor import Executor, tell
 from affinet.studies.quantities import Quantity
-from affinet.studies.sharing import Piece, batches, flown_by_case, in_turn
+from affinet.studies.sharing import Piece, batches, flown_by_case, in_turn, missing
 from analysis.models.arrays import Mask
 from netem.processes.user_code import UserCodeError
 
 Labels = dict[str, str]
 _FOLDER = "studies"
 _KEPT = 600  # moments of a curve
+_NOTHING: Mapping[Piece, Runs] = MappingProxyType({})
 
 
 # What checks compare with, and want to be told; the others need nothing.
@@ -267,14 +269,23 @@ def cases(study: Study, *, quick: bool) -> Iterator[Case]:
 
 
 def fly(
-    planned: Sequence[tuple[Case, Plan]], runs: int, watch: Callable[[Sequence[float]], None] = lambda _: None
+    planned: Sequence[tuple[Case, Plan]],
+    runs: int,
+    executor: Executor,
+    there: Mapping[Piece, Runs] = _NOTHING,
+    keep: Callable[[Piece, Runs], None] = lambda *_: None,
+    watch: Callable[[Sequence[float]], None] = lambda _: None,
 ) -> Iterator[Result]:
-    """So many runs of each case, in batches over all processors; each case in its turn, as soon as it is done.
+    """So many runs of each case, in batches; each case in its turn, as soon as it is done.
 
     Parameters
     ----------
     planned, runs
         The cases, and how many runs of each.
+    executor
+        Where they fly.
+    there, keep
+        What came of pieces of it that have flown already, and what is told of each piece as it is done.
     watch
         Told from time to time which share of each case has flown.
 
@@ -282,15 +293,27 @@ def fly(
     ------
     UserCodeError
         When a user's own code does something wrong: in which case, as well as it can be known.
+    Lost
+        When who flew them is gone.
     """
-    shared = batches([plan for _, plan in planned], runs, processors())
-    given = [[_part(*planned[piece.case], piece) for piece in batch] for batch in shared]
+    wanted = missing(there, len(planned), runs)
+    shared = batches([plan for _, plan in planned], wanted, executor.at_once)
 
     def look(shares: Sequence[float]) -> None:
-        watch(flown_by_case(shares, shared, len(planned), runs))
+        watch(flown_by_case(shares, shared, there, len(planned), runs))
 
-    with closing(in_processes(_fly, given, look)) as flown:
-        for (case, plan), whole in zip(planned, in_turn(shared, flown, len(planned)), strict=True):
+    def coming() -> Generator[tuple[Piece, Runs]]:
+        yield from there.items()
+        given = [[_part(*planned[piece.case], piece) for piece in batch] for batch in shared]
+        with closing(executor.each(_fly, given, look)) as flown:
+            for number, made in flown:
+                pieces = list(zip(shared[number], made, strict=True))
+                for one in pieces:
+                    keep(*one)
+                yield from pieces
+
+    with closing(coming()) as pieces:
+        for (case, plan), whole in zip(planned, in_turn(pieces, len(planned), runs), strict=True):
             yield Result(case.labels, plan, whole)
 
 

@@ -4,7 +4,7 @@ import io
 import os
 import pty
 import sys
-from contextlib import closing
+from contextlib import closing, suppress
 from types import SimpleNamespace
 
 import pytest
@@ -57,6 +57,24 @@ def test_where_there_is_no_terminal_a_study_says_a_line_for_each_case(monkeypatc
     assert log.getvalue().splitlines()[1:] == ["losses: 2/2 cases  100 %  about 0:00:00 left  zhao7, none"]
 
 
+def test_what_has_flown_before_says_nothing_of_how_long_the_rest_takes(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", log := io.StringIO())
+    clock = Clock()
+    with Grid("losses", [100, 300], clock, there=[1.0, 0.0]) as grid:
+        grid.see(done("zhao7", "rkf"))
+        clock.seconds = 10.0
+        grid.look([1.0, 0.5])
+        grid.see(done("zhao7", "none"))
+    assert log.getvalue().splitlines()[0] == "losses: 1/2 cases  25 %  zhao7, rkf"
+
+
+def written_to(terminal):
+    """All that was, in whatever pieces, until its other end was closed."""
+    with suppress(OSError):
+        while piece := os.read(terminal, 65536):
+            yield piece.decode()
+
+
 def test_at_a_terminal_a_study_shows_how_far_it_is_within_a_case(monkeypatch):
     terminal, shown = pty.openpty()
     monkeypatch.setenv("TERM", "xterm")
@@ -67,8 +85,7 @@ def test_at_a_terminal_a_study_shows_how_far_it_is_within_a_case(monkeypatch):
         with Grid("losses", [100, 100], clock) as grid:
             clock.seconds = 10.0
             grid.look([0.5, 0.0])
-        screen.flush()
-        drawn = os.read(terminal, 65536).decode()
+    drawn = "".join(written_to(terminal))
     os.close(terminal)
     assert "0/2 cases  25 %  about 0:00:30 left" in drawn
     assert "━" in drawn

@@ -12,6 +12,7 @@ from affinet.cli import show
 from affinet.scenario.sections import ScenarioError
 from affinet.studies import judging, record, study
 from affinet.studies.batch import fly_all
+from affinet.studies.executor import Here
 from affinet.studies.record import JudgedClaim, StudyRecord
 from analysis.claims.checks import ClaimVerdict
 from analysis.claims.intervals import Decision
@@ -57,7 +58,7 @@ def two(tmp_path):
 
 
 def test_cases_of_other_ticks_are_not_called_paired(two):
-    results = [*study.fly(study.plans(two, quick=True), 3)]
+    results = [*study.fly(study.plans(two, quick=True), 3, Here())]
     *paired, apart = judging.judge(two, results)
     assert apart.found.endswith("(the runs compared do not meet the same draws)")
     assert not any("draws" in one.found for one in paired)
@@ -76,7 +77,7 @@ def test_runs_are_paired_where_they_meet_the_same_draws(over):
 
 
 def test_it_is_read_as_it_was_written_and_what_is_no_number_is_null(two, tmp_path):
-    results = [*study.fly(study.plans(two, quick=True)[:1], 1)]
+    results = [*study.fly(study.plans(two, quick=True)[:1], 1, Here())]
     verdicts = [ClaimVerdict(claim.says, Decision.UNDECIDED, "f") for claim in judging.all_spelled_out(two)]
     kept = record.recorded(two, results, verdicts, quick=True)
     record.write(tmp_path, kept)

@@ -14,6 +14,7 @@ from affinet.cli import commands
 from affinet.scenario.sections import ScenarioError
 from affinet.studies import judging, record, report, study
 from affinet.studies.batch import Runs
+from affinet.studies.executor import Here
 from affinet.studies.quantities import NAMES, over_time
 from analysis.claims import checks
 from analysis.claims.intervals import Decision
@@ -60,7 +61,7 @@ to = { estimator = "ga-rkf", availability = "0.5" }
 
 def flown(what):
     """What comes of it, flown quickly."""
-    return [*study.fly(study.plans(what, quick=True), what.quick.runs)]
+    return [*study.fly(study.plans(what, quick=True), what.quick.runs, Here())]
 
 
 def reported(out, what, results):

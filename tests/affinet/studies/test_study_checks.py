@@ -12,7 +12,7 @@ from flying import PROCESSES, plan_of
 
 from affinet.cli import commands
 from affinet.scenario.sections import ScenarioError
-from affinet.studies import study
+from affinet.studies import pool, study
 from affinet.studies.batch import fly_all
 from analysis.figures import curves
 
@@ -213,27 +213,27 @@ def test_the_study_that_these_are_mistakes_in_is_right(tmp_path):
 # ---- what was flown is kept
 
 
-@pytest.fixture
-def one_by_one(monkeypatch):
-    """As many processors as the study has cases, so that each is a batch."""
-    monkeypatch.setattr(study, "processors", lambda: 4)
-
-
 class Done:
-    """Batches flown in this process: no worker, no wait."""
+    """Batches flown in this process, as many as the study has cases: no worker, no wait."""
+
+    at_once = 4
 
     def __init__(self, fail_after=None):
         self.fail_after = fail_after
 
-    def __call__(self, work, given, _watch):
+    def each(self, work, given, _watch):
         for number, one in enumerate(given):
             if number == self.fail_after:
                 raise KeyboardInterrupt
-            yield work(one)
+            yield number, work(one)
+
+
+def fly_in(executor, monkeypatch):
+    monkeypatch.setattr(pool, "on_this_machine", lambda _: executor)
 
 
 def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(study, "in_processes", Done())
+    fly_in(Done(), monkeypatch)
     monkeypatch.setattr(curves, "curves", lambda *_: [][0])
     out = tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 1
@@ -250,25 +250,23 @@ def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monk
     assert "test_study_checks.py" in (out / "report.log").read_text()
 
 
-@pytest.mark.usefixtures("one_by_one")
 def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "in_processes", Done(fail_after=3))
+    fly_in(Done(fail_after=3), monkeypatch)
     out = tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 130
     assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
 
 
-@pytest.mark.usefixtures("one_by_one")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT], ids=lambda one: one.name)
 def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_path, monkeypatch, capsys):
     class Ended(Done):
-        def __call__(self, work, given, _watch):
+        def each(self, work, given, _watch):
             for place, one in enumerate(given):
                 if place == 3:
                     signal.raise_signal(number)
-                yield work(one)
+                yield place, work(one)
 
-    monkeypatch.setattr(study, "in_processes", Ended())
+    fly_in(Ended(), monkeypatch)
     before, out = signal.getsignal(number), tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 128 + number
     assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
@@ -280,7 +278,10 @@ def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_
 
 WAITS = """
 import os, sys, time
-from affinet.studies.pool import in_processes
+from affinet.studies.pool import Processes
+
+def nothing(_):
+    pass
 
 def work(fifo):
     with open(fifo, "w") as tell:
@@ -289,7 +290,7 @@ def work(fifo):
         time.sleep(60)
 
 if __name__ == "__main__":
-    list(in_processes(work, [sys.argv[1]] * 4))
+    list(Processes(2).each(work, [sys.argv[1]] * 4, nothing))
 """
 
 
@@ -319,48 +320,48 @@ def test_no_worker_outlives_the_process_that_waits_for_it(number, tmp_path):
 def test_work_that_fails_ends_all_that_is_under_way(tmp_path):
     script = tmp_path / "fails.py"
     script.write_text(
-        "from affinet.studies.pool import in_processes\n"
+        "from affinet.studies.pool import Processes\n"
         "def work(number):\n    return 1 // number\n"
         'if __name__ == "__main__":\n'
-        "    print(list(in_processes(work, [1, 1])))\n    list(in_processes(work, [0, 1, 1]))\n"
+        "    print(sorted(Processes(2).each(work, [1, 1], print)))\n    list(Processes(2).each(work, [0, 1, 1], id))\n"
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=100, check=False)
-    assert done.stdout == "[1, 1]\n"
+    assert done.stdout.splitlines()[-1] == "[(0, 1), (1, 1)]"
     assert done.returncode == 1
     assert "ZeroDivisionError" in done.stderr.splitlines()[-1]
 
 
 TELLS = """
 import os, sys
-from affinet.studies.pool import in_processes, tell
+from affinet.studies.executor import tell
+from affinet.studies.pool import on_this_machine
 
 def work(given):
     share, told, go_on = given
     tell(share)
-    os.close(os.open(told, os.O_WRONLY))
+    os.close(os.open(told, os.O_RDWR))
     os.close(os.open(go_on, os.O_RDONLY))
     return share
 
 if __name__ == "__main__":
     seen = []
     def watch(shares):
-        if not seen:
-            os.close(os.open(sys.argv[1], os.O_RDONLY))  # it has told by now
-        seen.append(shares)
-        if len(seen) == 2:
+        seen.append(shares[0])
+        if shares[0] and len(seen) > 1:
             os.close(os.open(sys.argv[2], os.O_WRONLY))
-    print(list(in_processes(work, [(0.25, *sys.argv[1:])], watch)), seen[1])
+    print(list(on_this_machine(int(sys.argv[3])).each(work, [(0.25, *sys.argv[1:3])], watch)), seen[-1])
 """
 
 
-def test_work_says_how_far_it_is_to_whom_waits_for_it(tmp_path):
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_work_says_how_far_it_is_to_whom_waits_for_it(jobs, tmp_path):
     script, told, go_on = tmp_path / "tells.py", tmp_path / "told", tmp_path / "go_on"
     script.write_text(TELLS)
     for fifo in (told, go_on):
         os.mkfifo(fifo)
-    command = [sys.executable, str(script), str(told), str(go_on)]
+    command = [sys.executable, str(script), str(told), str(go_on), jobs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-    assert done.stdout == "[0.25] [0.25]\n", done.stderr
+    assert done.stdout == "[(0, 0.25)] 0.25\n", done.stderr
 
 
 def test_a_flight_tells_which_share_of_it_is_done():

@@ -20,7 +20,6 @@ from affinet.planning import making
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
-from affinet.studies import study
 from affinet.testing.swarm import Broken, SwarmRuns
 from affinet.verdicts.checkers import always, eventually
 from affinet.verdicts.checking import Checker
@@ -737,12 +736,10 @@ values = { all = ["network.availability=1.0"], half = ["network.availability=0.5
     ],
     ids=["one of them", "nobody knows which"],
 )
-def test_of_cases_that_fly_together_the_one_is_named_whose_code_fails(fails, named, folder, capsys, monkeypatch):
-    monkeypatch.setattr(study, "processors", lambda: 1)  # both are one batch
-    monkeypatch.setattr(study, "in_processes", lambda work, given, _: (work(one) for one in given))
+def test_of_cases_that_fly_together_the_one_is_named_whose_code_fails(fails, named, folder, capsys):
     name = write(folder, broken(ESTIMATOR, (SENSED, f"1 / 0 if {fails} else {SENSED}")))
     (folder / "mine.toml").write_text(SET.format(name) + MINE + SHARES)
-    assert main(["study", "mine.toml"]) == 3
+    assert main(["study", "mine.toml", "--jobs", "1"]) == 3  # both are one batch
     line = capsys.readouterr().err.splitlines()[-1]
     assert line.startswith(f"{named}: {name}:Own.sense in tick 0: ZeroDivisionError: division by zero")
 
