@@ -26,6 +26,7 @@ from affinet.studies.identity import Identity, differences
 from affinet.studies.sharing import Piece
 from analysis.metrics.indicator import Bounds
 from analysis.models.arrays import Array
+from netem.processes.system_errors import about
 
 FOLDER = "cells"  # in the directory of a study that is not done
 _DONE = "cells-done"
@@ -63,7 +64,7 @@ class Cells:
         """Keep what came of a piece: it is on the disk when this returns."""
         file = self.folder / f"{piece.case}-{piece.runs.start}-{piece.runs.stop}{_ENDING}"
         written = file.with_suffix(_UNFINISHED)
-        with written.open("wb") as cell:
+        with about(written), written.open("wb") as cell:
             cell.write(_sealed(_packed(self.of, piece, runs)))
             cell.flush()
             os.fsync(cell.fileno())

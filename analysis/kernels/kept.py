@@ -47,7 +47,11 @@ def place(kernel: Kernel, sizes: tuple[int, ...]) -> Path:
 
 def folder() -> Path:
     """Where compiled kernels are kept."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "affinet" / "kernels"
+    try:
+        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:  # neither HOME nor the system says where: as in containers that run under any number of a user
+        caches = Path(os.devnull)  # in which nobody can keep anything: it is said, with the way out
+    return caches / "affinet" / "kernels"
 
 
 def _read(file: str) -> bytes | None:

@@ -373,3 +373,13 @@ def test_a_disk_that_is_full_leaves_no_verdicts_that_are_not_whole(small, tmp_pa
     assert capsys.readouterr().err.splitlines()[-1].endswith("OSError(28, 'No space left on device')")
     assert fly(small, tmp_path / "out", "--quick") == 0
     assert record.read(tmp_path / "out" / record.FILE).quick
+
+
+def test_a_disk_that_is_full_under_a_cell_is_said_with_the_cell(small, tmp_path, monkeypatch, capsys):
+    def no_room(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", no_room)
+    assert fly(small, tmp_path / "out", "--quick") == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert ".part': No space left on device; free some room" in said

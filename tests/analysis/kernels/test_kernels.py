@@ -406,3 +406,14 @@ def draws_of(cache):
     uniform(3, Purpose.LOSS, tick=7)
     ((_, file),) = [one for one in kernels_of.prepared()["netem.core.draws._drawn LLLLLLd"] if one[0] == ()]
     return cache / "affinet" / "kernels" / Path(file).name
+
+
+def test_who_has_no_home_keeps_no_kernels_and_is_told(monkeypatch):
+    def nobody():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", nobody)
+    with pytest.warns(UserWarning, match="set XDG_CACHE_HOME"):
+        file = kept._keep(kept.folder() / "mine.o", b"code")
+    assert Path(file).read_bytes() == b"code"
