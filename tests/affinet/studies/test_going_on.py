@@ -376,7 +376,7 @@ def test_a_disk_that_is_full_leaves_no_verdicts_that_are_not_whole(small, tmp_pa
 
 
 def test_a_disk_that_is_full_under_a_cell_is_said_with_the_cell(small, tmp_path, monkeypatch, capsys):
-    def no_room(descriptor):
+    def no_room(_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", no_room)
