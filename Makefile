@@ -48,8 +48,9 @@ imports: $(READY) ## import-linter: who may know whom
 picture: $(READY) ## docs/pictures/house.svg and the contracts in docs/architecture.md, from imports and pyproject.toml
 	$(BIN)/python docs/draw_house.py
 
-bench: $(READY) ## the tick against the floor
-	$(BIN)/python bench/lockstep.py
+bench: $(READY) ## speed against peers, and against the run kept last; fails where a ratio is 20 % worse
+	$(UV) sync --locked --quiet --inexact --group bench --compile-bytecode
+	$(BIN)/python bench/all.py
 
 $(READY): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv

@@ -143,12 +143,12 @@ class Arrivals:
 
     def _clock(self, inboxes: Mapping[int, messages.SenseInbox]) -> Reading:
         """One reading for all, where they agree, spares looking up the manoeuvre for each."""
-        first, *others = {inbox.clock for inbox in inboxes.values()}
-        if not others:
-            return first
-        clock = np.full(self._shape[0], first)
-        clock[self._of(inboxes)] = [inbox.clock for inbox in inboxes.values()]
-        return clock
+        told = [inbox.clock for inbox in inboxes.values()]
+        if told.count(told[0]) == len(told):
+            return told[0]
+        clocks = np.full(self._shape[0], told[0])
+        clocks[[self._rows[agent] for agent in inboxes]] = told
+        return clocks
 
     def _position(self, inboxes: Mapping[int, messages.SenseInbox]) -> Array | None:
         told = {self._rows[agent]: inbox.position for agent, inbox in inboxes.items() if inbox.position is not None}
@@ -184,9 +184,6 @@ class Arrivals:
         sighting.by[rows] = [one.by for one in said]
         sighting.method[rows] = [one.method for one in said]
         return sighting
-
-    def _of(self, inboxes: Mapping[int, messages.SenseInbox]) -> list[int]:
-        return [self._rows[agent] for agent in inboxes]
 
 
 def forms_of(spoken: Channels) -> dict[str, dict[str, Form]]:

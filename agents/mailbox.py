@@ -40,7 +40,6 @@ class Mailbox:
     ) -> None:
         keys = Keys(run)
         self.agent, self.neighbours = agent, neighbours
-        self.slot = {number: slot for slot, number in enumerate(neighbours)}
         self.begin()
         self._inbox = session.hears(keys.inbox(agent), _WAITING)
         self._told = session.hears(keys.told(agent), _WAITING) if hears_centre else None

@@ -5,8 +5,7 @@ They hear the medium, let `Agent` decide, and speak, each on keys of its own.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NoReturn
@@ -149,8 +148,11 @@ class AgentsNode:
                 return
             tick = inboxes[awake[0]].k
             self._supervisor.works(tick)
-            with _at(tick):
+            try:
                 self._live(tick, inboxes)
+            except UserCodeError as error:
+                error.tick = tick
+                raise
 
     def _taking_part(self) -> Sequence[int]:
         if self._roster is None:
@@ -166,9 +168,10 @@ class AgentsNode:
         return self._mailboxes[agent].next_inbox()
 
     def _live(self, tick: int, inboxes: Mapping[int, messages.SenseInbox]) -> None:
-        idle = ~np.isin(self._numbers, [*inboxes])
-        before, some_idle = self._state, bool(idle.any())
-        living = beside_others(before, idle, tick) if some_idle else before
+        before, living = self._state, self._state
+        if some_idle := len(inboxes) < len(self._mailboxes):
+            idle = ~np.isin(self._numbers, [*inboxes])
+            living = beside_others(before, idle, tick)
         sensed = self._arrivals.sensed(inboxes)
         state = self._speak(tick, living, sensed, inboxes)
         self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
@@ -235,15 +238,6 @@ class Roster:
         called = messages.unpack(messages.Roster, self._ear.next().data)
         self._calls.check("roster", called.seq)
         return called
-
-
-@contextmanager
-def _at(tick: int) -> Iterator[None]:
-    try:
-        yield
-    except UserCodeError as error:
-        error.tick = tick
-        raise
 
 
 def main() -> NoReturn:

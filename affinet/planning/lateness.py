@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain as concatenated
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +45,7 @@ def of(given: Scenario, formation: Formation, links: Links, script: Script) -> L
         When a profile cannot ever deliver, or selects nothing.
     """
     degraded = [given.network.model_copy(update={"profile": name, "links": []}) for name, _ in script.profiles]
-    groups = concatenated.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
+    groups = chain.from_iterable(classes(network, formation, links) for network in (given.network, *degraded))
     air = _distinct(_of_class(one, given) for one in groups if one.comms)
     under_way = max((cause.ticks for cause in air), default=0.0)
     delayed = _delayed(script, links, given)
@@ -109,11 +108,11 @@ def _held(script: Script, links: Links, given: Scenario, under_way: float) -> La
     holding = [fault for fault in script.faults if fault.under_way is UnderWay.HOLD]
     waiting = sum(_lasts(fault, given) for fault in holding if fault.trigger is not None)
     timeline = Timeline(links, [fault for fault in holding if fault.trigger is None])
-    longest, chain, free = (np.zeros(len(links)) for _ in range(3))
+    longest, held, free = (np.zeros(len(links)) for _ in range(3))
     for start, end, segment in _segments(timeline, given):
         free = np.where(segment.holds, 0.0, free + (end - start))
-        chain = np.where(segment.holds, chain + (end - start), np.where(free > under_way, 0.0, chain))
-        longest = np.maximum(longest, chain)
+        held = np.where(segment.holds, held + (end - start), np.where(free > under_way, 0.0, held))
+        longest = np.maximum(longest, held)
     verbs = " and ".join(sorted({str(fault.verb) for fault in holding}))
     return Late(f"timeline: {verbs}, messages held", waiting + float(longest.max(initial=0.0)))
 

@@ -54,7 +54,8 @@ def connected(address: str, own: Sequence[Module]) -> Iterator[Workers]:
         said = f"no Dask scheduler at {address!r}: {error}; give an address like tcp://host:8786, where one is started"
         raise NoCluster(one_line(said)) from error
     with client:
-        yield Workers(client, _of_same_bits(client, address, own), identity.here(own), tuple(own))
+        ours = identity.here(own)
+        yield Workers(client, _of_same_bits(client, address, own, ours), ours, tuple(own))
 
 
 @dataclass(frozen=True)
@@ -118,12 +119,11 @@ class Workers:
         return bool(self.client.scheduler_info()["workers"])
 
 
-def _of_same_bits(client: Client, address: str, own: Sequence[Module]) -> int:
+def _of_same_bits(client: Client, address: str, own: Sequence[Module], ours: Identity) -> int:
     """How many workers there are, all of which would give the bits that this process would."""
     found: dict[str, Any] = client.run(identity.here, own, on_error="return")
     if not found:
         raise NoCluster(f"the Dask scheduler at {address!r} has no workers: start some, like `dask worker {address}`")
-    ours = identity.here(own)
     for worker, theirs in found.items():
         if isinstance(theirs, BaseException):
             said = f"worker {worker} cannot fly: {type(theirs).__name__}: {theirs}"

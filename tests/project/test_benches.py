@@ -16,7 +16,10 @@ SMALLEST = {
         "| zhao7, constant velocity, conral | conral | 0: -0.591, 12: -2.16, 28: -0.707, 44: -0.999 |\n",
     ),
     "leaders": (("--swarms", "swarm50"), "| swarm50 | 8 | 7.0 | "),
-    "lockstep": (("--ticks", "5", "--rounds", "1", "--swarms", "corridor"), "| corridor, 7 agents | "),
+    "all": (
+        ("--only", "runs", "tick7", "growth", "--rounds", "1", "--share", "0.03"),
+        "| tick over processes of 5 agents each, 10 to 40 agents of 4 neighbours | ",  # the last of them
+    ),
     "verdicts": (("--ticks", "2", "--rounds", "1"), "| 60 of 10 agents | 4 | "),
 }
 ELSEWHERE = {
@@ -24,18 +27,17 @@ ELSEWHERE = {
     "kills": "system/test_kills.py",
     "redcho": "system/test_redcho.py",
 }
-STARTED_BY = {"floor": "lockstep"}
 
 
 def test_no_script_is_left_out():
     scripts = {file.stem for file in BENCH.glob("*.py") if '__name__ == "__main__"' in file.read_text()}
-    assert scripts == {*SMALLEST, *ELSEWHERE, *STARTED_BY}
+    assert scripts == {*SMALLEST, *ELSEWHERE}
     assert all(f'"{script}.py"' in (ROOT / "tests" / file).read_text() for script, file in ELSEWHERE.items())
 
 
 @pytest.mark.parametrize("script", SMALLEST)
 def test_a_script_runs_at_its_smallest_size(script):
-    # lockstep.py died of a TypeError: messages had got fields it did not give.
+    # A script died of a TypeError: messages had got fields it did not give.
     size, row = SMALLEST[script]
     command = [sys.executable, str(BENCH / f"{script}.py"), *size]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -10,6 +10,7 @@ from contextlib import closing
 
 import pytest
 from rich.progress import BarColumn
+from terminals import written_to
 
 from affinet.cli.progress import Bar
 from world.recording.logbook import RECORDING
@@ -128,8 +129,6 @@ def test_at_a_terminal_a_bar_is_all_there_is(monkeypatch):
         here.setattr(sys, "stderr", screen)
         with Bar("corridor", 1000, BarColumn(), every_s=0.001) as bar:
             bar.see(420, "4.20 s")
-        screen.flush()
-        drawn = os.read(terminal, 65536).decode()
-    os.close(terminal)
+    drawn = written_to(terminal)
     assert "━" in drawn
     assert "42 %" not in drawn

@@ -4,10 +4,11 @@ import io
 import os
 import pty
 import sys
-from contextlib import closing, suppress
+from contextlib import closing
 from types import SimpleNamespace
 
 import pytest
+from terminals import written_to
 
 from affinet.cli.progress import left
 from affinet.cli.show import Grid
@@ -68,13 +69,6 @@ def test_what_has_flown_before_says_nothing_of_how_long_the_rest_takes(monkeypat
     assert log.getvalue().splitlines()[0] == "losses: 1/2 cases  25 %  zhao7, rkf"
 
 
-def written_to(terminal):
-    """All that was, in whatever pieces, until its other end was closed."""
-    with suppress(OSError):
-        while piece := os.read(terminal, 65536):
-            yield piece.decode()
-
-
 def test_at_a_terminal_a_study_shows_how_far_it_is_within_a_case(monkeypatch):
     terminal, shown = pty.openpty()
     monkeypatch.setenv("TERM", "xterm")
@@ -85,7 +79,6 @@ def test_at_a_terminal_a_study_shows_how_far_it_is_within_a_case(monkeypatch):
         with Grid("losses", [100, 100], clock) as grid:
             clock.seconds = 10.0
             grid.look([0.5, 0.0])
-    drawn = "".join(written_to(terminal))
-    os.close(terminal)
+    drawn = written_to(terminal)
     assert "0/2 cases  25 %  about 0:00:30 left" in drawn
     assert "━" in drawn

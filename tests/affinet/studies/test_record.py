@@ -79,7 +79,7 @@ def test_runs_are_paired_where_they_meet_the_same_draws(over):
 def test_it_is_read_as_it_was_written_and_what_is_no_number_is_null(two, tmp_path):
     results = [*study.fly(study.plans(two, quick=True)[:1], 1, Here())]
     verdicts = [ClaimVerdict(claim.says, Decision.UNDECIDED, "f") for claim in judging.all_spelled_out(two)]
-    kept = record.recorded(two, results, verdicts, quick=True)
+    kept = record.recorded(two, results, verdicts, flown=record.grid(two, quick=True), quick=True)
     record.write(tmp_path, kept)
     assert record.read(tmp_path / record.FILE) == kept
     (mean,) = kept.cases

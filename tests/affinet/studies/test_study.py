@@ -68,7 +68,8 @@ def reported(out, what, results):
     """All that is written down of it, in a new directory."""
     out.mkdir()
     report.save(out, what, results)
-    record.write(out, record.recorded(what, results, judging.judge(what, results), quick=True))
+    flown = record.grid(what, quick=True)
+    record.write(out, record.recorded(what, results, judging.judge(what, results), flown=flown, quick=True))
     report.draw(out, what, results)
 
 
