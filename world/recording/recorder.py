@@ -263,7 +263,8 @@ class Recorder:
 
     def _log_agents(self, time: list[rr.TimeColumn], conditions: Sequence[Conditions], position: Array) -> None:
         agents = self._formation.agents
-        colours = np.array([self._agent_colours(now) for now in conditions]).ravel()
+        of_conditions = {id(now): self._agent_colours(now) for now in {id(now): now for now in conditions}.values()}
+        colours = np.concatenate([of_conditions[id(now)] for now in conditions])
         columns = rr.Points3D.columns(positions=spatial(position).reshape(-1, 3), colors=colours)
         for path in ("swarm/agents", "swarm/trail"):
             self._stream.send_columns(path, time, columns.partition([agents] * len(conditions)))
