@@ -371,8 +371,11 @@ def main() -> None:
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
     with supervisor.confessing(), Session(config) as session:
-        from netem.medium import journal  # takes a while to import: everybody else can log in by now
+        # These take a while to import: everybody else can log in by now.
+        from netem.core.arrow import do_without_pandas
+        from netem.medium import journal
 
+        do_without_pandas()
         with journal.Writer(Path(brief.journal), brief.links, brief.channels, brief.batch) as writer:
             node = MediumNode(session, supervisor, brief, writer)
             node.await_everybody()
