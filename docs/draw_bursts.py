@@ -7,21 +7,19 @@ python docs/draw_bursts.py STUDY
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import h5netcdf
 import matplotlib as mpl
 import numpy as np
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from pyarrow import Table
 
 PICTURE = Path(__file__).parent / "pictures" / "bursts.png"
 
 _GRAPH, _BURST = "zhao7", "mean burst (s)"
-_INDEPENDENT, _HALF_A_SECOND = "0.0143", "0.5"
+_INDEPENDENT, _HALF_A_SECOND = 0.0143, 0.5
 _SHOWN = {"none": ("no estimator", "C7"), "rkf": ("RKF", "C1"), "ga-rkf": ("GA-RKF", "C0")}
 _OTHERS = {"ral": ("RAL", "C4"), "conral": ("conRAL", "C2")}
 _LOST = 1.0  # m²
@@ -48,12 +46,12 @@ def draw(study: Path, picture: Path) -> None:
     mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False})
     figure = Figure(figsize=(10.0, 3.0), layout="constrained", dpi=160)
     left, middle, right = figure.subplots(1, 3, sharey=True)
-    moments, runs = (pq.read_table(study / name) for name in ("curves.parquet", "runs.parquet"))
-    _over_time(left, _of(moments, "graph", _GRAPH), _INDEPENDENT)
+    with h5netcdf.File(study / "results.nc", decode_vlen_strings=True) as results:
+        _over_time(left, results, _INDEPENDENT)
+        _over_time(middle, results, _HALF_A_SECOND)
+        _over_bursts(right, results)
     left.set_title("30 % lost, each message for itself")
-    _over_time(middle, _of(moments, "graph", _GRAPH), _HALF_A_SECOND)
     middle.set_title("30 % lost, in bursts of half a second")
-    _over_bursts(right, _of(runs, "graph", _GRAPH))
     right.set_title("30 % lost: how long may a burst last?")
     for panel in (left, middle, right):
         panel.axhline(_LOST, color="black", ls="--", lw=0.8)
@@ -64,29 +62,28 @@ def draw(study: Path, picture: Path) -> None:
     figure.savefig(picture)
 
 
-def _over_time(panel: Axes, moments: Table, burst: str) -> None:
+def _over_time(panel: Axes, results: h5netcdf.File, burst: float) -> None:
     for estimator, (label, colour) in _SHOWN.items():
-        one = _of(_of(moments, _BURST, burst), "estimator", estimator)
-        panel.plot(_column(one, "seconds"), _column(one, "mean_error"), color=colour, label=label, lw=1.2)
+        error = _at(results, "mean_tracking_error", {"graph": _GRAPH, "estimator": estimator, _BURST: burst})
+        panel.plot(results["time"][:], error, color=colour, label=label, lw=1.2)
     panel.set_xlabel("time (s)")
 
 
-def _over_bursts(panel: Axes, runs: Table) -> None:
+def _over_bursts(panel: Axes, results: h5netcdf.File) -> None:
     for estimator, (label, colour) in (_SHOWN | _OTHERS).items():
-        mine = _of(runs, "estimator", estimator)
-        bursts = sorted(set(mine[_BURST].to_pylist()), key=float)
-        means = [_column(_of(mine, _BURST, burst), "mean_error").mean() for burst in bursts]
-        panel.plot([float(burst) for burst in bursts], means, color=colour, label=label, marker="o", ms=3, lw=1.2)
+        means = _at(results, "tracking_error", {"graph": _GRAPH, "estimator": estimator}).mean(axis=1)
+        panel.plot(results[_BURST][:], means, color=colour, label=label, marker="o", ms=3, lw=1.2)
     panel.set_xscale("log")
     panel.set_xlabel("mean burst (s)")
 
 
-def _of(table: Table, axis: str, label: str) -> Table:
-    return table.filter(pc.equal(table[axis], label))
-
-
-def _column(table: Table, name: str) -> np.ndarray:
-    return np.nan_to_num(table[name].to_numpy(), nan=np.inf, posinf=1e300)
+def _at(results: h5netcdf.File, name: str, labels: Mapping[str, str | float]) -> np.ndarray:
+    """What is over the other dimensions, at these labels."""
+    variable = results[name]
+    places = (
+        results[axis][:].tolist().index(labels[axis]) if axis in labels else slice(None) for axis in variable.dimensions
+    )
+    return np.nan_to_num(variable[tuple(places)], nan=np.inf, posinf=1e300)
 
 
 if __name__ == "__main__":

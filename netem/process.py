@@ -6,7 +6,6 @@ changes it.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,14 +84,34 @@ class MediumBrief:
     batch: int
 
 
-class Arriving(NamedTuple):
-    """A broadcast on its way into an inbox: the tick it speaks of, who said it on which link and channel, how corrupted."""
+class Seen(NamedTuple):
+    """The measurements that arrive in a tick: their links, who is measured, and where those of each agent end, from 0 on."""
 
-    content: int
-    src: int
-    channel: int
-    link: int
-    mark: int
+    links: Integers
+    neighbours: list[int]
+    ends: list[int]
+
+
+class Heard(NamedTuple):
+    """The broadcasts that arrive in a tick, by receiver, and to each in order.
+
+    Parameters
+    ----------
+    content, said
+        The tick each speaks of, and who said it on which channel.
+    changed
+        Which of them arrive as something that nobody said.
+    rows
+        What `Relayed.arriving` has of each.
+    ends
+        Where those of each agent end, from 0 on.
+    """
+
+    content: list[int]
+    said: list[tuple[int, str]]
+    changed: list[int]
+    rows: Integers
+    ends: list[int]
 
 
 @dataclass(frozen=True)
@@ -105,18 +124,16 @@ class Decided:
         What was decided.
     awake
         Numbers of the agents that hear and speak.
-    seen
-        The rows of links whose measurement arrives, and where those of each agent end among them, from 0 on.
-    heard
-        For each agent, the broadcasts that reach it, in order.
+    seen, heard
+        The measurements and the broadcasts that arrive.
     entry, journal
         What is written down of it, and told the world.
     """
 
     relayed: Relayed
     awake: tuple[int, ...]
-    seen: tuple[Integers, list[int]]
-    heard: dict[int, list[Arriving]]
+    seen: Seen
+    heard: Heard
     entry: Entry
     journal: bytes
 
@@ -132,13 +149,14 @@ class MediumNode:
         self._written = journal
         self._awaited: set[tuple[int, str]] = set()
         self._links = brief.links
-        self._src, self._dst = brief.links.src.tolist(), brief.links.dst.tolist()
         self._ends = np.concatenate([[0], np.cumsum(brief.links.degree)])
+        self._agents = np.arange(1, brief.links.agents + 2)
         timeline = Timeline(brief.links, brief.faults, brief.triggers, brief.injected)
         path = None if brief.recorded is None else Path(brief.recorded)
         verdicts = recorded(path, brief.links, brief.channels)
         self._relay = Relay[Spoken](Medium(brief.seed, brief.channels, brief.profiles, timeline, verdicts))
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
+        self._voices = [(agent, name) for agent in agents for name in brief.channels]
         self._from_world = Sequences("world")
         self._reader = Broadcasts(keys, agents, self._spoken)
         self._numbers = Numbering()
@@ -147,6 +165,8 @@ class MediumNode:
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
+        self._streams = {agent: f"inbox {agent}" for agent in agents}
+        self._positioned = brief.positioned.tolist()
         self._rosters = {host: session.says(keys.roster(host)) for host in brief.hosts}
 
     def await_everybody(self) -> None:
@@ -191,7 +211,7 @@ class MediumNode:
             k=tick,
             src=HUB,
             seq=self._numbers.next("journal"),
-            handed=[len(heard[agent]) for agent in self._inboxes],
+            handed=np.diff(heard.ends).tolist(),
             verdicts=packed(entry.verdicts, CODE),
             odd=packed(entry.odd, WHOLE),
             apart=packed(entry.apart, WHOLE),
@@ -213,19 +233,27 @@ class MediumNode:
                     continue
                 question.answer(messages.pack(self._relay.obey(order, tick)))
 
-    def _seen(self, arrived: Mask) -> tuple[Integers, list[int]]:
+    def _seen(self, arrived: Mask) -> Seen:
         rows = np.flatnonzero(arrived)  # links toward one agent stand together
-        return rows, np.searchsorted(rows, self._ends).tolist()
+        return Seen(rows, self._links.src[rows].tolist(), np.searchsorted(rows, self._ends).tolist())
 
-    def _heard(self, arriving: Integers) -> dict[int, list[Arriving]]:
-        heard: dict[int, list[Arriving]] = defaultdict(list)
-        for content, link, channel, mark in arriving.tolist():
-            heard[self._dst[link]].append(Arriving(content, self._src[link], channel, link, mark))
-        return heard
+    def _heard(self, arriving: Integers) -> Heard:
+        receiver = self._links.dst[arriving[:, 1]]
+        by_receiver = np.argsort(receiver, kind="stable")
+        rows = arriving[by_receiver]
+        content, link, channel, mark = rows.T
+        voices = (self._links.src[link] - 1) * len(self._brief.channels) + channel
+        return Heard(
+            content=content.tolist(),
+            said=[self._voices[voice] for voice in voices.tolist()],
+            changed=np.flatnonzero(changed_on_the_way(mark)).tolist(),
+            rows=rows,
+            ends=np.searchsorted(receiver[by_receiver], self._agents).tolist(),
+        )
 
     def _welcome_back(self, tick: int) -> None:
         for agent in self._relay.timeline.restarted(tick):
-            self._numbers.restart(f"inbox {agent}")
+            self._numbers.restart(self._streams[agent])
             self._reader.restart(agent)
 
     def _call(self, tick: int, awake: Collection[int]) -> None:
@@ -248,21 +276,20 @@ class MediumNode:
 
     def _hand_out_measurements(self, sense: messages.Sense, decided: Decided) -> None:
         clock = self._relay.timeline.clock(sense.k).tolist()
-        rows, ends = decided.seen
-        measured = _parts(sense.measured, len(self._src))
-        whom = [(self._src[row], measured[row]) for row in rows.tolist()]
+        links, neighbours, ends = decided.seen
+        measured, size = _rows(sense.measured, len(self._links), links)
         position = _parts(sense.position, len(self._inboxes))
         motion = None if sense.motion is None else _parts(sense.motion, len(self._inboxes))
         for agent in decided.awake:
-            seen = whom[ends[agent - 1] : ends[agent]]
+            start, end = ends[agent - 1], ends[agent]
             inbox = messages.SenseInbox(
                 k=sense.k,
                 src=HUB,
-                seq=self._numbers.next(f"inbox {agent}"),
+                seq=self._numbers.next(self._streams[agent]),
                 clock=clock[agent - 1],
-                neighbours=[src for src, _ in seen],
-                measured=b"".join([y for _, y in seen]),
-                position=position[agent - 1] if self._brief.positioned[agent - 1] else None,
+                neighbours=neighbours[start:end],
+                measured=measured[start * size : end * size],
+                position=position[agent - 1] if self._positioned[agent - 1] else None,
                 motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
             )
@@ -286,10 +313,15 @@ class MediumNode:
         return [called(agent) for agent in sorted({agent for agent, _ in tuple(self._awaited)})]
 
     def _hand_out_broadcasts(self, decided: Decided) -> None:
+        heard, ends = decided.heard, decided.heard.ends
+        said = {tick: self._relay.said(tick) for tick in set(heard.content)}
+        arriving = [said[tick][whose] for tick, whose in zip(heard.content, heard.said, strict=True)]
+        for n in heard.changed:
+            arriving[n] = self._as_it_arrives(arriving[n], heard.rows[n])
         for agent in decided.awake:
-            arriving = [self._as_it_arrives(each) for each in decided.heard[agent]]
-            seq = self._numbers.next(f"inbox {agent}")
-            self._inboxes[agent].say(messages.pack_exchange(decided.relayed.tick, seq, arriving))
+            seq = self._numbers.next(self._streams[agent])
+            handed = arriving[ends[agent - 1] : ends[agent]]
+            self._inboxes[agent].say(messages.pack_exchange(decided.relayed.tick, seq, handed))
 
     def _as_told(self, said: messages.Broadcast, data: bytes) -> bytes:
         if not self._relay.lies(said.k, said.channel, said.src):
@@ -298,14 +330,13 @@ class MediumNode:
             said, lambda fields: self._relay.as_told(said.k, said.channel, np.array([said.src]), fields)
         )
 
-    def _as_it_arrives(self, arriving: Arriving) -> bytes:
-        data = self._relay.said(arriving.content)[arriving.src, self._brief.channels[arriving.channel]]
-        if not changed_on_the_way(arriving.mark):
-            return data
-        mark = np.array([arriving.mark], dtype=np.uint8)
-        content, channel, link = (np.array([row]) for row in (arriving.content, arriving.channel, arriving.link))
+    def _as_it_arrives(self, data: bytes, row: Integers) -> bytes:
+        content, link, channel, mark = row[:, None]
+        corrupted = mark.astype(np.uint8)
         said = messages.unpack(messages.Broadcast, data)
-        return self._rewritten(said, lambda fields: self._relay.as_it_arrives(content, channel, link, mark, fields))
+        return self._rewritten(
+            said, lambda fields: self._relay.as_it_arrives(content, channel, link, corrupted, fields)
+        )
 
     def _rewritten(self, said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
         """A broadcast with its fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
@@ -318,7 +349,7 @@ class MediumNode:
     def _end(self, tick: int) -> None:
         self._call(tick, self._inboxes.keys())
         for agent, inbox in self._inboxes.items():
-            number = self._numbers.next(f"inbox {agent}")
+            number = self._numbers.next(self._streams[agent])
             inbox.say(messages.pack(messages.EndInbox(k=tick, src=HUB, seq=number)))
 
 
@@ -328,14 +359,23 @@ def _parts(data: bytes, count: int) -> list[bytes]:
     return [data[start : start + size] for start in range(0, size * count, size)]
 
 
+def _rows(data: bytes, count: int, which: Integers) -> tuple[bytes, int]:
+    """Of as many bytes for each of so many, those of some, one after the other; and how many each has."""
+    size = len(data) // count
+    return np.frombuffer(data, f"V{size}", count)[which].tobytes(), size
+
+
 def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
     with supervisor.confessing(), Session(config) as session:
-        from netem.medium import journal  # takes a while to import: everybody else can log in by now
+        # These take a while to import: everybody else can log in by now.
+        from netem.core.arrow import do_without_pandas
+        from netem.medium import journal
 
+        do_without_pandas()
         with journal.Writer(Path(brief.journal), brief.links, brief.channels, brief.batch) as writer:
             node = MediumNode(session, supervisor, brief, writer)
             node.await_everybody()

@@ -97,8 +97,11 @@ def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
     brief = supervisor.brief(WorldBrief)
-    from world.recording.logbook import RunWriter  # takes a second to import: the lifeline is to be watched by then
+    # These take a second to import: the lifeline is to be watched by then.
+    from netem.core.arrow import do_without_pandas
+    from world.recording.logbook import RunWriter
 
+    do_without_pandas()
     out = Path(brief.out)
     with supervisor.confessing(), Session(client(brief.login)) as session:
         last: list[Callable[[], None]] = []

@@ -13,10 +13,11 @@ from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.runtimes.interruption import ended_by_signals
 from affinet.scenario.words import one_line
-from affinet.studies import cells, cluster, identity, judging, pool, record, report
+from affinet.studies import cells, cluster, identity, judging, labelled, pool, record, report
 from affinet.studies import study as studies
 from affinet.studies.cells import Cells
 from affinet.studies.executor import Executor, Lost
+from affinet.studies.identity import Identity
 from affinet.studies.sharing import flown_by_case
 from affinet.studies.study import Case, Result, Study
 
@@ -80,8 +81,13 @@ def _flown(
                     grid.see(result)
         finally:
             if results:  # whatever happened meanwhile, what was flown is to be seen
-                report.save(kept.folder.parent, study, results)
+                labelled.write(kept.folder.parent, study, results, _about(parsed, kept.of))
     return results
+
+
+def _about(parsed: argparse.Namespace, of: Identity) -> dict[str, str]:
+    said = {"study": Path(parsed.study).stem, "size": "quick" if parsed.quick else "full", "flown": of[identity.GRID]}
+    return said | {name: of[name] for name in identity.VERSIONS}
 
 
 def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, out: Path, *, flown: str) -> bool:

@@ -138,6 +138,12 @@ def _be_called(name: str) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode())  # as `ps` and `top` show it
 
 
+def _take_turns() -> None:
+    """Have no process of the run interrupt another: whom a message wakes would, and its sender has more of them to send."""
+    if os.sched_getscheduler(0) == os.SCHED_OTHER:  # whoever has chosen another has reasons
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
 def main() -> None:
     """Import, then fork whenever the launcher asks, and be what was forked."""
     for package in (estimators, laws):
@@ -145,6 +151,7 @@ def main() -> None:
             import_module(module.name)
     kernels.prepare(json.loads(sys.argv[-1]))  # once for all: a fork shares them
     _be_called("nursery")
+    _take_turns()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, as it may come to us, it has nobody's exit status told
     go_on_without_a_launcher()
     try:

@@ -10,7 +10,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.side_by_side import NotABatch, side_by_side
 from affinet.scenario.words import among
 from affinet.studies.batch import REPORT
-from affinet.studies.quantities import NAMES
+from affinet.studies.labelled import is_name, is_number, taken
 from analysis.claims.checks import Span
 from analysis.models.information import reported
 from analysis.models.reports import NIS
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 Wrong = tuple[str, str]  # a key of the study, and what is wrong with it
 Planned = tuple["Case", Plan]
 
-_TAKEN = {"seconds", "run", "mean_error", *(f"{what}_{name}" for name in NAMES for what in ("mean", "std")), *NAMES}
 _PANELS = {
     "curves": "one for columns, one for rows, one for the curves",
     "map": "one for panels, one for rows, one for columns",
@@ -39,6 +38,8 @@ _PURSUED = {"found", "agreed", "ideal", "apart", "disagreed", "behind", "target_
 
 def of_file(study: Study) -> Iterator[Wrong]:
     """What is wrong with its axes and labels, as far as the file alone tells."""
+    yield from _of_text("title", study.title)
+    yield from _of_text("source", study.source)
     wrong = list(_of_axes(study)) or list(_of_labels(study)) or list(_of_figure(study))
     yield from wrong or _of_claims(study)
 
@@ -78,6 +79,7 @@ def of_plans(study: Study, planned: Sequence[Planned], every: Sequence[int]) -> 
             side_by_side(plan, [0])
         except NotABatch as error:
             yield "scenario", f"case {named(case.labels)}: {error}"
+    yield from _seeds(planned)
     moments = {id(plan): range(0, plan.world.ticks, step) for (_, plan), step in zip(planned, every, strict=True)}
     yield from _quantity("quantity", study.quantity, planned)
     for number, quantity in enumerate(study.also, start=1):
@@ -117,10 +119,20 @@ def _of_axes(study: Study) -> Iterator[Wrong]:
     for number, axis in enumerate(study.axes, start=1):
         if names.index(axis.name) < number - 1:
             yield f"axes.{number}.name", f"two axes are called {axis.name!r}: call each by a name of its own"
-        if axis.name in _TAKEN or REPORT in axis.name:
-            yield f"axes.{number}.name", f"{axis.name!r} is a column of the data already: give the axis another name"
+        if axis.name in taken() or REPORT in axis.name:
+            yield f"axes.{number}.name", f"{axis.name!r} is a name in the data already: give the axis another"
+        if not is_name(axis.name):
+            wanted = "a letter, a digit or _ first, no / and no control characters, and no space at the end"
+            yield f"axes.{number}.name", f"netCDF has no name {axis.name!r}, in which the data is kept: {wanted}"
+        for label in axis.values:
+            yield from _of_text(f"axes.{number}.values", label)
         if not axis.values:
             yield f"axes.{number}.values", 'has no label: give at least one, like { "as it is" = [] }'
+
+
+def _of_text(key: str, text: str) -> Iterator[Wrong]:
+    if "\0" in text:
+        yield key, f"{text!r} has the character 0, which netCDF cannot keep: leave it out"
 
 
 def _of_labels(study: Study) -> Iterator[Wrong]:
@@ -157,7 +169,7 @@ def _of_figure(study: Study) -> Iterator[Wrong]:
         yield "along", f"no axis is called {study.along!r}; {among(study.along, names)}"
     else:
         number = names.index(study.along)
-        if odd := [label for label in study.axes[number].values if not _is_number(label)]:
+        if odd := [label for label in study.axes[number].values if not is_number(label)]:
             yield (
                 f"axes.{number + 1}.values",
                 f"a sweep runs along numbers, and the label {odd[0]!r} is none: call it 0.5, say",
@@ -208,6 +220,15 @@ def _those(cases: Sequence[Case], labels: Mapping[str, str]) -> list[Case]:
     return [case for case in cases if labels.items() <= case.labels.items()]
 
 
+def _seeds(planned: Sequence[Planned]) -> Iterator[Wrong]:
+    (first, flown), *others = planned
+    for case, plan in others:
+        if (seed := plan.scenario.seed) != flown.scenario.seed:
+            has = f"{named(first.labels)} has the seed {flown.scenario.seed}, {named(case.labels)} {seed}"
+            yield "axes", f"all cases fly with the same seeds, so that they compare; {has}: leave it out of the axes"
+            return
+
+
 def _quantity(key: str, quantity: str, planned: Sequence[Planned]) -> Iterator[Wrong]:
     for case, plan in planned:
         reports = [name for name in plan.reports if name != NIS]  # which is a metric
@@ -246,10 +267,3 @@ def _span(key: str, span: Span, planned: Sequence[Planned], moments: Mapping[int
                 f"no moment lies in the span from {since:g} s {'on' if until is None else f'to {until:g} s'}: {last}",
             )
             return
-
-
-def _is_number(label: str) -> bool:
-    try:
-        return math.isfinite(float(label))
-    except ValueError:
-        return False

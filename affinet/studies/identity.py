@@ -37,7 +37,7 @@ _FLIES: Mapping[str, Sequence[str]] = {
     "netem": (".",),
     "world": (".",),
 }
-_VERSIONS = {"affinet", "python", "numpy", "scipy"}
+VERSIONS = ("affinet", "python", "numpy", "scipy")
 _OF_PLANS = [field.name for field in fields(Plan) if field.name != "findings"]  # which fly nowhere
 
 
@@ -70,7 +70,7 @@ def differences(one: Identity, other: Identity) -> Iterator[str]:
     """In which of their parts two of them differ, in words; of versions, what each has."""
     for name in dict.fromkeys([*one, *other]):
         if one.get(name) != other.get(name):
-            yield f"{name} ({one.get(name)}, here {other.get(name)})" if name in _VERSIONS else name
+            yield f"{name} ({one.get(name)}, here {other.get(name)})" if name in VERSIONS else name
 
 
 def digest(value: Any) -> str:

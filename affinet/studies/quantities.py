@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated
 
 import numpy as np
@@ -40,6 +40,12 @@ _ROOT_MEAN_SQUARES = frozenset(
     {"place_error", "found", "agreed", "ideal", "apart", "disagreed", "behind", "effort", "roughness"}
 )
 
+_OVER_TIME: Mapping[str, Callable[[Array], Array]] = {
+    "maximum": lambda values: values.max(axis=1),
+    "root_mean_square": lambda values: np.sqrt((values**2).mean(axis=1)),
+    "mean": lambda values: values.mean(axis=1),
+}
+
 
 def _known(name: str) -> str:
     if name not in NAMES and not (name.startswith(REPORT) and name.removeprefix(REPORT).isidentifier()):
@@ -70,8 +76,11 @@ def over_time(runs: Runs, quantity: str, span: Span) -> Array:
     if quantity == "error" and span == (0.0, None):
         return runs.mean_error
     values: Array = runs.quantities[quantity][:, within(runs.seconds, span)]
+    return np.asarray(_OVER_TIME[stands_for(quantity)](values), dtype=np.float64)
+
+
+def stands_for(quantity: str) -> str:
+    """What of it stands for a run over time, as the conventions of netCDF (CF) call it."""
     if quantity == "peak":
-        return np.asarray(values.max(axis=1), dtype=np.float64)
-    if quantity in _ROOT_MEAN_SQUARES:
-        return np.asarray(np.sqrt((values**2).mean(axis=1)), dtype=np.float64)
-    return np.asarray(values.mean(axis=1), dtype=np.float64)
+        return "maximum"
+    return "root_mean_square" if quantity in _ROOT_MEAN_SQUARES else "mean"

@@ -1,8 +1,4 @@
-"""What a study leaves: data as Parquet, figures, and the verdicts.
-
-`curves.parquet` has a row for each moment of each case, with mean and standard deviation over its runs; `runs.parquet` has a
-row for each run, with what stands for each quantity over its time.
-"""
+"""Where a study leaves what came of it, and the figures that it leaves."""
 
 from __future__ import annotations
 
@@ -11,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from affinet.planning import phases
 from affinet.planning.plan import Plan
@@ -49,17 +43,6 @@ def prepare(out: Path | str) -> Path:
     if (out / record.FILE).exists() and not cells.unfinished(out):
         raise FileExistsError(f"{str(out)!r} holds a study already; name another directory with --out")
     return out
-
-
-def save(out: Path, study: Study, results: list[Result]) -> None:
-    """Write the data into a directory."""
-    pq.write_table(_joined([_moments(one) for one in results]), out / "curves.parquet")
-    pq.write_table(_joined([_runs(one, study.since) for one in results]), out / "runs.parquet")
-
-
-def _joined(tables: list[pa.Table]) -> pa.Table:
-    """What only some cases have, estimators' reports, is null in the others."""
-    return pa.concat_tables(tables, promote_options="default")
 
 
 def failed(out: Path) -> Path | None:
@@ -177,20 +160,3 @@ def _curves(results: list[Result], quantity: Quantity, since: float) -> list[Cur
 def _changes(plan: Plan) -> list[float]:
     """When its graph changes, in seconds."""
     return [phase.start * plan.world.dt for phase in phases.phases(plan.swarm, plan.world.links, plan.faults)[1:]]
-
-
-def _moments(one: Result) -> pa.Table:
-    number = len(one.runs.seconds)
-    columns = {name: [label] * number for name, label in one.labels.items()} | {"seconds": one.runs.seconds}
-    with np.errstate(invalid="ignore", over="ignore"):
-        for name, values in one.runs.quantities.items():
-            columns |= {f"mean_{name}": values.mean(axis=0), f"std_{name}": values.std(axis=0)}
-    return pa.table(columns)
-
-
-def _runs(one: Result, since: float) -> pa.Table:
-    number = len(one.runs.mean_error)
-    labels = {name: [label] * number for name, label in one.labels.items()}
-    with np.errstate(invalid="ignore", over="ignore"):
-        overall = {name: over_time(one.runs, name, (since, None)) for name in one.runs.quantities}
-    return pa.table(labels | {"run": np.arange(number), "mean_error": one.runs.mean_error} | overall)

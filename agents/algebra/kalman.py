@@ -182,6 +182,21 @@ def correct(mean: Array, covariance: Array, observed: Array, R: Array, usable: M
     return Corrected(*_corrected(mean, covariance, observed, R, usable))
 
 
+def tracked(mean: Array, covariance: Array, F: Array, Q: Array, observed: Array, R: Array, usable: Mask) -> Corrected:
+    """The filters a tick later: `predict`, and `correct` where there is an observation (Algorithm 1), in one go.
+
+    Parameters
+    ----------
+    mean, covariance
+        Of filters, shapes (..., S) and (..., S, S).
+    F, Q
+        Of a model of motion, by derivatives, shape (..., O, O).
+    observed, R, usable
+        As in `correct`.
+    """
+    return Corrected(*_tracked(mean, covariance, F, Q, observed, R, usable))
+
+
 @Part
 def observe(mean: Array, P: Array, observed: Array, R: Array, corrected: Array, left: Array, room: Array) -> float:
     """One filter observed, into `corrected` and `left`; its innovation squared and normalised. `room` is (4 D, D)."""
@@ -228,6 +243,33 @@ def _corrected(S: int, D: int) -> Plain:
             corrected[row] = mean[row]
             for column in range(S):
                 left[row, column] = P[row, column]
+
+    return plain
+
+
+@kernel("(S),(S,S),(O,O),(O,O),(D),(D,D),()->(S),(S,S),()", "dddddd?->ddd")
+def _tracked(S: int, O: int, D: int) -> Plain:  # noqa: E741
+    rows = 4 * D
+
+    def plain(
+        mean: Array,
+        P: Array,
+        F: Array,
+        Q: Array,
+        observed: Array,
+        R: Array,
+        usable: bool,
+        corrected: Array,
+        left: Array,
+        nis: Array,
+    ) -> None:
+        nis[0] = np.nan
+        if usable:
+            ahead, spread = scratch(1, S)[0], scratch(S, S)
+            move(mean, P, F, Q, ahead, spread, scratch(O, O))
+            nis[0] = observe(ahead, spread, observed, R, corrected, left, scratch(rows, D))
+        else:
+            move(mean, P, F, Q, corrected, left, scratch(O, O))
 
     return plain
 

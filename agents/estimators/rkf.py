@@ -105,10 +105,9 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
 
     def sense(self, brief: Brief, state: Tracks, measured: Array, seen: Mask) -> tuple[Tracks, Mapping[str, Fields]]:
         """Predict every edge, correct those measured."""
-        mean, covariance = self.ahead(brief, state)
-        D = brief.dimension
-        R = brief.sensor.weight(measured, mean[..., :D], covariance[..., :D, :D])
-        return Tracks(*kalman.correct(mean, covariance, measured, R, seen), state.known | seen), {}
+        F, Q = kalman.motion(self.model, brief.dt, self.sigma_w)
+        R = self._weight(brief, state, measured)
+        return Tracks(*kalman.tracked(*state[:2], F, Q, measured, R, seen), state.known | seen), {}
 
     def fuse(
         self,
@@ -119,3 +118,10 @@ class RelativeKalmanFilter(EdgeFilters, Estimator[Tracks]):
     ) -> tuple[Tracks, Estimate]:
         """The filters' positions."""
         return state, self.estimate(brief, state, no_indicator(state.known))
+
+    def _weight(self, brief: Brief, state: Tracks, measured: Array) -> Array:
+        if brief.sensor.is_even:  # then it does not hang on what is predicted
+            return brief.sensor.common
+        mean, covariance = self.ahead(brief, state)
+        D = brief.dimension
+        return brief.sensor.weight(measured, mean[..., :D], covariance[..., :D, :D])

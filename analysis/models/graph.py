@@ -117,14 +117,17 @@ def algebraic_connectivity(adjacency: Mask, present: Mask | None = None) -> Arra
     present
         Which agents take part, shape (..., N); all by default. The others have no edges.
     """
-    edges = mutual(adjacency).astype(np.float64)
-    agents = edges.shape[-1]
-    degree = edges.sum(axis=-1)
-    if present is not None:
-        degree = np.where(present, degree, agents + 1.0)  # above every eigenvalue of the others
-    laplacian = degree[..., None] * np.eye(agents) - edges
-    second: Array = np.linalg.eigvalsh(laplacian)[..., :2][..., -1]
-    return np.maximum(second, 0.0) if agents > 1 else np.zeros(edges.shape[:-2])
+    agents, ticks = adjacency.shape[-1], adjacency.shape[:-2]
+    if agents < 2:
+        return np.zeros(ticks)
+    there = np.broadcast_to(True if present is None else present, (*ticks, agents))
+    pairs = mutual(adjacency).reshape(prod(ticks), agents**2)
+    graphs, tick = _distinct(np.concatenate([pairs, there.reshape(prod(ticks), agents)], axis=-1))
+    edges = graphs[:, :-agents].reshape(-1, agents, agents).astype(np.float64)
+    # The degree of who takes no part lies above every eigenvalue of the others.
+    degree = np.where(graphs[:, -agents:], edges.sum(axis=-1), agents + 1.0)
+    second = np.linalg.eigvalsh(degree[..., None] * np.eye(agents) - edges)[:, 1]
+    return np.maximum(second, 0.0)[tick].reshape(ticks)
 
 
 def connected(adjacency: Mask) -> Mask:
@@ -204,10 +207,19 @@ def stress_dimension(edges_up: Mask, edges: Edges, nominal: Array) -> Integers:
     rigidity = np.zeros((len(i), *nominal.shape))
     rigidity[rows, i - 1] = nominal[i - 1] - nominal[j - 1]
     rigidity[rows, j - 1] = nominal[j - 1] - nominal[i - 1]
-    patterns, tick = np.unique(edges_up.reshape(prod(edges_up.shape[:-1]), len(i)), axis=0, return_inverse=True)
+    patterns, tick = _distinct(edges_up.reshape(prod(edges_up.shape[:-1]), len(i)))
     singular = np.linalg.svd(patterns[..., None] * rigidity.reshape(len(i), nominal.size), compute_uv=False)
     rank = (singular > _SINGULAR * singular.max(axis=-1, keepdims=True, initial=0.0)).sum(axis=-1)
     return (patterns.sum(axis=-1) - rank)[tick].reshape(edges_up.shape[:-1])
+
+
+def _distinct(patterns: Mask) -> tuple[Mask, Integers]:
+    """The rows (m, k) without those that stand there again, and which of them each row is, shape (m,)."""
+    bits = np.zeros((len(patterns), patterns.shape[1] // 8 + 1), dtype=np.uint8)
+    packed = np.packbits(patterns, axis=-1)
+    bits[:, : packed.shape[1]] = packed
+    _, first, row = np.unique(bits.view(f"V{bits.shape[1]}")[:, 0], return_index=True, return_inverse=True)
+    return patterns[first], row
 
 
 def _ends(edges: Edges) -> tuple[Integers, Integers]:

@@ -111,7 +111,7 @@ class Sensor:
             When it says directions alone.
         """
         spread = self.spread(measured)
-        if self.reads == "coordinates":
+        if self.is_even:
             return spread
         surer = np.einsum("...ii", doubt) < np.einsum("...ii", spread)
         return np.where(surer[..., None, None], self._expected(expected, doubt), spread)
@@ -139,7 +139,7 @@ class Sensor:
             When it says directions alone.
         """
         self.require_positions()
-        if self.reads == "coordinates":
+        if self.is_even:
             return np.broadcast_to(self.covariance, (*measured.shape, measured.shape[-1]))
         if self.reads == "line-of-sight":
             return self._of_lines(measured[..., :, None] * measured[..., None, :])
@@ -161,6 +161,11 @@ class Sensor:
         return spread
 
     @property
+    def is_even(self) -> bool:
+        """Whether all its measurements have one covariance, which is then `common`."""
+        return self.reads == "coordinates"
+
+    @property
     def common(self) -> Array:
         """The covariance of every measurement, shape (D, D), in square metres.
 
@@ -170,7 +175,7 @@ class Sensor:
             When each measurement has its own, or says a direction alone.
         """
         self.require_positions()
-        if self.reads != "coordinates":
+        if not self.is_even:
             raise Unsuited(
                 "this estimator takes one covariance for all measurements, and this sensor gives each its own; "
                 "choose another, or a sensor of coordinates"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,26 @@ NAMES = pa.dictionary(pa.int8(), pa.string())
 
 class TableError(ValueError):
     """A file that is no such table."""
+
+
+class _WithoutPandas:
+    def find_spec(self, name: str, *_: Any) -> None:
+        """None, "look elsewhere", but for what is not to be found."""
+        if name == "pandas":
+            raise ModuleNotFoundError("this process does without pandas")
+
+
+def do_without_pandas() -> None:
+    """Keep Arrow from importing pandas at its first array, where it is installed: that takes longer than to start a swarm.
+
+    For a process that is ours alone: in it, no array is made of a series of pandas any more.
+    """
+    finder = _WithoutPandas()
+    sys.meta_path.insert(0, finder)
+    try:
+        pa.array([])  # Arrow looks for it once
+    finally:
+        sys.meta_path.remove(finder)
 
 
 class Stream:

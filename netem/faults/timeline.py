@@ -198,16 +198,17 @@ class Timeline:
 
     def paused(self, tick: int) -> list[int]:
         """Agents whose processes are to be stopped at this tick."""
-        now = self.at(tick).paused.copy()
-        if tick:
-            now &= ~self.at(tick - 1).paused
-        return (np.flatnonzero(now) + 1).tolist()
+        if not tick:
+            return _numbers(self.at(tick).paused)
+        before, now = self.at(tick - 1), self.at(tick)
+        return [] if now is before else _numbers(now.paused & ~before.paused)
 
     def resumed(self, tick: int) -> list[int]:
         """Agents whose processes go on at this tick."""
         if not tick:
             return []
-        return (np.flatnonzero(self.at(tick - 1).paused & ~self.at(tick).idle) + 1).tolist()
+        before, now = self.at(tick - 1), self.at(tick)
+        return [] if now is before else _numbers(before.paused & ~now.idle)
 
     def clock(self, tick: int) -> Integers:
         """What each agent's clock says in this tick, in ticks, shape (N,)."""
@@ -323,9 +324,14 @@ class Timeline:
         return mask
 
 
-def _by_tick(numbered: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
+def _numbers(agents: Mask) -> list[int]:
+    """The numbers of those among all agents, shape (N,)."""
+    return (np.flatnonzero(agents) + 1).tolist()
+
+
+def _by_tick(placed: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
     ticks: dict[int, list[int]] = {}
-    for number, tick in numbered:
+    for number, tick in placed:
         ticks.setdefault(tick, []).append(number)
     return ticks
 

@@ -1,7 +1,6 @@
 """The journal: every verdict a row, streamed to disk as Arrow; and an earlier run's journal as the judge of another.
 
-The file is an Arrow stream, so what a killed run has written can be read. Rows are in the order of ticks. A message has one row
-with its verdict when it is offered, a row `copied` if it is doubled, and a row more if it is dropped or released under way.
+The file is an Arrow stream, so what a killed run has written can be read. Which rows there are of a tick is in `rows.py`.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts
 from netem.medium.ledger import NOTHING, Accounts, Ledger
-from netem.medium.verdict import BY_THE_AIR, Verdict
+from netem.medium.rows import VERDICTS, Rows, rows_of
+from netem.medium.verdict import BY_THE_AIR, Verdict, VerdictCodes
 from netem.processes import system_errors
 
-VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")
-_DELIVERED, _DELAYED, _DROPPED, _COPIED, _RELEASED = range(5)
+_DELAYED, _DROPPED, _COPIED, _RELEASED = map(VERDICTS.index, ("delayed", "dropped", "copied", "released"))
 _REASON = np.array([kind.label for kind in Verdict])
 _MARK = np.array([mark.label for mark in Mark])
 
@@ -109,85 +108,40 @@ class Writer:
         if not self._entered:
             return
         entries, self._entered = self._entered, []
-        first = self.accounts.ticks
-        ledger = self.accounts.ledger.plus(_ledger(entries))
+        first, verdicts = self.accounts.ticks, np.stack([entry.verdicts for entry in entries])
+        ledger = self.accounts.ledger.plus(_ledger(verdicts, entries))
         self.accounts = Accounts(first + len(entries), ledger, self._in_flight)
-        parts = [rows for n, entry in enumerate(entries) for rows in self._of_tick(first + n, entry)]
-        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        written, self._offered = rows_of(first, verdicts, entries, self._offered)
         events = {
             first + n: json.dumps(entry.injected) for n, entry in enumerate(entries) if entry.injected is not None
         }
         with system_errors.about(self._path):
-            self._stream.write(self._table(_Rows(*columns), events), self.accounts)
+            self._stream.write(self._table(written, events), self.accounts)
 
-    def _of_tick(self, tick: int, entry: Entry) -> list[_Rows]:
-        due, mark, copy_due = _dense(tick, entry.verdicts.shape, entry.odd)
-        channel, link = np.nonzero(entry.verdicts != Verdict.SILENT)
-        kind = entry.verdicts[channel, link].astype(np.int64)
-        seq = self._offered[channel, link]
-        passed = kind <= Verdict.DELAYED
-        verdict = np.where(passed, kind - Verdict.DELIVERED + _DELIVERED, _DROPPED)
-        arrives = np.where(passed, due[channel, link], -1)
-        offered = _Rows(np.full_like(link, tick), channel, link, seq, verdict, kind, arrives, mark[channel, link])
-        doubled, on = np.nonzero(copy_due >= 0)
-        copies = _rows(tick, doubled, on, self._offered[doubled, on], _COPIED, Verdict.DELAYED, copy_due[doubled, on])
-        _, ch, li, number, why = entry.dropped.reshape(-1, 5).T
-        lost = _rows(tick, ch, li, number, _DROPPED, why, np.full_like(ch, -1))
-        _, ch, li, number = entry.released.reshape(-1, 4).T
-        freed = _rows(tick, ch, li, number, _RELEASED, Verdict.DELAYED, np.full_like(ch, tick))
-        self._offered += entry.verdicts != Verdict.SILENT
-        return [offered, copies, lost, freed]
-
-    def _table(self, rows: _Rows, events: dict[int, str]) -> dict[str, Any]:
-        event = np.full(len(rows.tick), None, dtype=object)
-        event[np.searchsorted(rows.tick, list(events))] = list(events.values())
+    def _table(self, written: Rows, events: dict[int, str]) -> dict[str, Any]:
+        event = np.full(len(written.tick), None, dtype=object)
+        event[np.searchsorted(written.tick, list(events))] = list(events.values())
         return {
-            "tick": rows.tick,
-            "src": self._links.src[rows.link],
-            "dst": self._links.dst[rows.link],
-            "channel": named(rows.channel, self._channels),
-            "seq": rows.seq,
-            "verdict": named(rows.verdict, VERDICTS),
-            "reason": named(rows.kind, _REASON, rows.kind < Verdict.DEAD),
-            "deliver_tick": pa.array(rows.deliver_tick, pa.int32(), mask=rows.deliver_tick < 0),
-            "mark": named(rows.mark, _MARK, rows.mark == Mark.NONE),
+            "tick": written.tick,
+            "src": self._links.src[written.link],
+            "dst": self._links.dst[written.link],
+            "channel": named(written.channel, self._channels),
+            "seq": written.seq,
+            "verdict": named(written.verdict, VERDICTS),
+            "reason": named(written.kind, _REASON, written.kind < Verdict.DEAD),
+            "deliver_tick": pa.array(written.deliver_tick, pa.int32(), mask=written.deliver_tick < 0),
+            "mark": named(written.mark, _MARK, written.mark == Mark.NONE),
             "event": event,
         }
 
 
-def _ledger(entries: Sequence[Entry]) -> Ledger:
+def _ledger(verdicts: VerdictCodes, entries: Sequence[Entry]) -> Ledger:
     return Ledger.of(
-        verdicts=np.stack([entry.verdicts for entry in entries]),
+        verdicts=verdicts,
         copies=np.array([entry.copies for entry in entries]),
         late=np.array([entry.late for entry in entries]),
         dropped=np.stack([entry.dropped_by_verdict for entry in entries]),
     )
-
-
-class _Rows(NamedTuple):
-    tick: Integers
-    channel: Integers
-    link: Integers
-    seq: Integers
-    verdict: Integers
-    kind: Integers
-    deliver_tick: Integers
-    mark: Integers
-
-
-def _rows(tick: int, channel: Integers, link: Integers, seq: Integers, verdict: int, kind: Any, due: Integers) -> _Rows:
-    def every(value: Any) -> Integers:
-        return np.broadcast_to(np.asarray(value, dtype=np.int64), link.shape)
-
-    return _Rows(every(tick), channel, link, seq, every(verdict), every(kind), due, every(Mark.NONE))
-
-
-def _dense(tick: int, shape: tuple[int, ...], odd: Integers) -> tuple[Integers, Integers, Integers]:
-    due, mark, copy_due = np.full(shape, tick), np.zeros(shape, dtype=np.int64), np.full(shape, -1)
-    channel, link, *details = odd.reshape(-1, 5).T
-    for field, values in zip((due, mark, copy_due), details, strict=True):
-        field[channel, link] = values
-    return due, mark, copy_due
 
 
 def read(path: Path) -> Any:

@@ -2,9 +2,9 @@
 
 import draw_bursts
 import draw_measurements
+import h5netcdf
+import h5py
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 
@@ -20,16 +20,18 @@ def left(tmp_path):
     def write(factor):
         folder = tmp_path / f"{factor:g}"
         folder.mkdir()
-        moments, runs = [], []
-        for graph in AXES["graph"]:
-            for number, estimator in enumerate(AXES["estimator"]):
-                for burst in AXES["mean burst (s)"]:
-                    labels = {"graph": graph, "estimator": estimator, "mean burst (s)": burst}
-                    error = factor * (1 + number) * float(burst)
-                    moments += [{**labels, "seconds": second, "mean_error": error} for second in (0.0, 1.0)]
-                    runs.append({**labels, "mean_error": np.nan if burst == "2" else error})
-        pq.write_table(pa.Table.from_pylist(moments), folder / "curves.parquet")
-        pq.write_table(pa.Table.from_pylist(runs), folder / "runs.parquet")
+        bursts = np.array([float(burst) for burst in AXES["mean burst (s)"]])
+        number = np.arange(len(AXES["estimator"]))[:, None]
+        error = np.broadcast_to(factor * (1 + number) * bursts, [len(labels) for labels in AXES.values()])
+        over_runs = np.where(bursts == 2.0, np.nan, error)
+        with h5netcdf.File(folder / "results.nc", "w") as file:
+            file.dimensions = {name: len(labels) for name, labels in AXES.items()} | {"run": 1, "time": 2}
+            for name in ("graph", "estimator"):
+                file.create_variable(name, (name,), data=np.array(AXES[name], dtype=object), dtype=h5py.string_dtype())
+            for name, values in (("mean burst (s)", bursts), ("time", np.arange(2.0))):
+                file.create_variable(name, (name,), data=values)
+            file.create_variable("tracking_error", (*AXES, "run"), data=over_runs[..., None])
+            file.create_variable("mean_tracking_error", (*AXES, "time"), data=np.stack([error, error], axis=-1))
         return folder
 
     return write

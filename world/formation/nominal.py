@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Formation:
         """D."""
         return self.nominal.shape[-1]
 
-    @property
+    @cached_property
     def is_leader(self) -> Mask:
         """Shape (N,)."""
         return np.isin(np.arange(1, self.agents + 1), self.leaders)

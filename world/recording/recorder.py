@@ -263,7 +263,9 @@ class Recorder:
 
     def _log_agents(self, time: list[rr.TimeColumn], conditions: Sequence[Conditions], position: Array) -> None:
         agents = self._formation.agents
-        colours = np.array([self._agent_colours(now) for now in conditions]).ravel()
+        apart = {id(now): now for now in conditions}  # they stay the same object for as long as nothing changes
+        colours_under = {which: self._agent_colours(now) for which, now in apart.items()}
+        colours = np.concatenate([colours_under[id(now)] for now in conditions])
         columns = rr.Points3D.columns(positions=spatial(position).reshape(-1, 3), colors=colours)
         for path in ("swarm/agents", "swarm/trail"):
             self._stream.send_columns(path, time, columns.partition([agents] * len(conditions)))

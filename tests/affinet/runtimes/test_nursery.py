@@ -71,6 +71,18 @@ def said_by(group, code, number=3):
     return said.decode().strip()
 
 
+POLICY = "import os; print(os.sched_getscheduler(0))"
+
+
+def test_it_does_not_interrupt_the_others_of_its_run(shared):
+    assert said_by(shared, POLICY) == str(os.SCHED_BATCH)
+
+
+def test_a_policy_that_a_user_has_chosen_stays(crew):
+    with crew("os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))") as group:
+        assert said_by(group, POLICY) == str(os.SCHED_IDLE)
+
+
 # ---- as good as fresh
 
 

@@ -8,7 +8,7 @@ from distributed import LocalCluster
 from flying import PROCESSES
 
 from affinet.cli import commands
-from affinet.studies import cluster, identity, study
+from affinet.studies import cluster, identity, labelled, study
 from affinet.studies.executor import Here
 
 pytestmark = PROCESSES
@@ -54,6 +54,13 @@ def test_cells_have_the_bits_that_they_have_here(scheduler, two, monkeypatch):
         for name, values in one.runs.quantities.items():
             np.testing.assert_array_equal(other.runs.quantities[name], values, strict=True)
         assert (one.runs.mean_error == other.runs.mean_error).all()
+
+
+def test_a_study_leaves_the_same_data_as_here(scheduler, two, tmp_path):
+    for name, where in (("here", ["--jobs", "1"]), ("there", ["--dask", scheduler])):
+        assert commands.main(["study", str(two), "--out", str(tmp_path / name), *where]) == 0
+    here, there = ((tmp_path / name / labelled.FILE).read_bytes() for name in ("here", "there"))
+    assert here == there
 
 
 def test_a_worker_that_would_give_other_bits_is_named(scheduler, two, tmp_path, monkeypatch, capsys):

@@ -369,7 +369,7 @@ def test_a_disk_that_is_full_leaves_no_verdicts_that_are_not_whole(small, tmp_pa
         full.setattr(Path, "write_text", no_room)
         assert fly(small, tmp_path / "out", "--quick") == 1
     left_over = {file.name for file in (tmp_path / "out").iterdir()}
-    assert left_over == {"cells", "curves.parquet", "runs.parquet"}
+    assert left_over == {"cells", "results.nc"}
     assert capsys.readouterr().err.splitlines()[-1].endswith("OSError(28, 'No space left on device')")
     assert fly(small, tmp_path / "out", "--quick") == 0
     assert record.read(tmp_path / "out" / record.FILE).quick

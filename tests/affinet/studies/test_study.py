@@ -2,8 +2,8 @@
 
 from functools import cache
 
+import netcdf
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from flying import PROCESSES, plan_of
 from matplotlib.text import Text
@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from affinet.cli import commands
 from affinet.scenario.sections import ScenarioError
-from affinet.studies import judging, record, report, study
+from affinet.studies import judging, labelled, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here
 from affinet.studies.quantities import NAMES, over_time
@@ -67,7 +67,7 @@ def flown(what):
 def reported(out, what, results):
     """All that is written down of it, in a new directory."""
     out.mkdir()
-    report.save(out, what, results)
+    labelled.write(out, what, results, {})
     flown = record.grid(what, quick=True)
     record.write(out, record.recorded(what, results, judging.judge(what, results), flown=flown, quick=True))
     report.draw(out, what, results)
@@ -89,12 +89,12 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     assert [claim.decision for claim in judged.claims] == ["undecided", "undecided"]
     assert [case.labels["estimator"] for case in judged.cases] == ["none", "none", "ga-rkf", "ga-rkf"]
     assert all(case.low < case.found < case.high for case in judged.cases)
-    moments, runs = (pq.read_table(out / f"{name}.parquet").to_pydict() for name in ("curves", "runs"))
-    assert len(runs["run"]) == 2 * 2 * 2
-    assert len(moments["seconds"]) == 2 * 2 * 20
-    assert set(moments["estimator"]) == {"none", "ga-rkf"}
-    assert np.isfinite(runs["mean_error"]).all()
-    assert {"mean_nees", "std_nees", "mean_nis", "std_nis"} <= set(moments)
+    data, _ = netcdf.read(out)
+    assert data["tracking_error"].values.shape == (1, 2, 2, 2)
+    assert data["mean_tracking_error"].values.shape == (1, 2, 2, 20)
+    assert data["estimator"].values.tolist() == ["none", "ga-rkf"]
+    assert np.isfinite(data["tracking_error"].values).all()
+    assert {"mean_nees", "std_nees", "mean_nis", "std_nis"} <= set(data)
     with Image.open(out / "figure.png") as figure:
         assert min(figure.size) > 300
     assert not (out / "consistency.png").exists()  # that goes with curves
@@ -500,18 +500,18 @@ def test_a_study_of_a_quantity_leaves_all_quantities_and_figures(pair, tmp_path,
     pair = pair.model_copy(update={"claims": pair.claims[:1]})  # the others look beyond these 0.2 s
     results = flown(pair)
     reported(tmp_path / "out", pair, results)
-    moments = pq.read_table(tmp_path / "out" / "curves.parquet").to_pydict()
-    assert moments["estimator"] == ["MLE"] * 20 + ["RKF"] * 20
-    for name in ("error", "procrustes", "estimation_error", "covariance_trace", "nees", "nis"):
-        values = np.concatenate([one.runs.quantities[name].mean(axis=0) for one in results])
-        np.testing.assert_array_equal(moments[f"mean_{name}"], values)
+    data, _ = netcdf.read(tmp_path / "out")
+    assert data["estimator"].values.tolist() == ["MLE", "RKF"]
+    for name in ("procrustes", "estimation_error", "covariance_trace", "nees", "nis"):
+        values = [one.runs.quantities[name].mean(axis=0) for one in results]
+        np.testing.assert_array_equal(data[f"mean_{name}"].values[0, 0], values)
     # The measurement is as uncertain in every tick, and the filter less and less.
-    traces = np.array(moments["mean_covariance_trace"]).reshape(2, 20)
+    traces = data["mean_covariance_trace"].values[0, 0]
     assert np.ptp(traces[0]) < 1e-12 < 0.1 < traces[1, 0] / traces[0, 0]
     assert traces[1, -1] < 0.2 * traces[0, -1]
     assert record.read(tmp_path / "out" / "claims.json").claims[0].found.startswith("ratio")
     # Nothing is filtered by MLE; the filter, and the measurement as an estimate, are as wrong as they say.
-    nees, nis = (np.array(moments[f"mean_{name}"]).reshape(2, 20) for name in ("nees", "nis"))
+    nees, nis = (data[f"mean_{name}"].values[0, 0] for name in ("nees", "nis"))
     assert np.isnan(nis[0]).all()
     for means in (nees[0], nees[1], nis[1]):
         assert 1.5 < means.mean() < 2.5

@@ -5,8 +5,8 @@ import signal
 import subprocess
 import sys
 
+import netcdf
 import psutil
-import pyarrow.parquet as pq
 import pytest
 from flying import PROCESSES, plan_of
 
@@ -115,7 +115,7 @@ NOT_FLOWN = [
     ),
     pytest.param([("set =", 'also = ["eror"]\nset =')], "got \"eror\"; did you mean 'error'?", id="also a quantity"),
     pytest.param([('name = "law"', 'name = "graph"')], "axes.2.name: two axes are called 'graph'", id="two of a name"),
-    pytest.param([('name = "graph"', 'name = "run"')], "axes.1.name: 'run' is a column of the data already", id="a column"),
+    pytest.param([('name = "graph"', 'name = "run"')], "axes.1.name: 'run' is a name in the data already", id="a name"),
     pytest.param([("{ zhao7 = [] }", "{}")], "axes.1.values: has no label: give at least one", id="no label"),
     pytest.param(
         [("full = ", 'skip = [{ graph = "zhao7" }]\nfull = ')], "small.toml:6: skip: leaves no case to fly", id="no case"
@@ -237,7 +237,7 @@ def test_a_study_whose_figure_fails_has_left_its_data_and_says_so(tmp_path, monk
     monkeypatch.setattr(curves, "curves", lambda *_: [][0])
     out = tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 1
-    assert len(pq.read_table(out / "runs.parquet")) == 4 * 2
+    assert netcdf.flown(out) == (4, 2)
     assert (out / "claims.json").exists()
     *cases, line = [line for line in capsys.readouterr().err.splitlines() if line]
     assert [case.partition(" cases")[0] for case in cases] == [
@@ -254,7 +254,7 @@ def test_a_study_that_is_interrupted_leaves_the_cases_that_are_done(tmp_path, mo
     fly_in(Done(fail_after=3), monkeypatch)
     out = tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 130
-    assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
+    assert netcdf.flown(out) == (3, 2)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT], ids=lambda one: one.name)
@@ -269,7 +269,7 @@ def test_a_study_that_is_told_to_end_leaves_the_cases_that_are_done(number, tmp_
     fly_in(Ended(), monkeypatch)
     before, out = signal.getsignal(number), tmp_path / "out"
     assert commands.main(["study", str(small(tmp_path)), "--quick", "--out", str(out)]) == 128 + number
-    assert len(pq.read_table(out / "runs.parquet")) == 3 * 2
+    assert netcdf.flown(out) == (3, 2)
     assert f"interrupted by {number.name}" in capsys.readouterr().err
     assert signal.getsignal(number) == before
 

@@ -225,3 +225,15 @@ def test_imm_refuses_a_probability_that_makes_no_chain(stay):
 def test_models_and_sigmas_are_told_apart():
     pairs = list(product(MODELS, (0.5, 1.0)))
     assert len({kalman.motion(model, DT, sigma)[1].tobytes() for model, sigma in pairs}) == len(pairs)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_tick_in_one_go_is_to_predict_and_then_to_correct_to_the_bit(model, dimension):
+    F, Q = kalman.motion(model, DT, 0.7)
+    apart = whole = kalman.unknown((4,), dimension, (10.0, 2.0, 1.0)[: kalman.ORDER[model]])
+    for y, made in zip(*sequence(dimension), strict=True):
+        *apart, surprise = kalman.correct(*kalman.predict(*apart, F, Q), y, covariance(dimension), made)
+        *whole, nis = kalman.tracked(*whole, F, Q, y, covariance(dimension), made)
+        pairs = zip((*apart, surprise), (*whole, nis), strict=True)
+        assert all(one.tobytes() == other.tobytes() for one, other in pairs)

@@ -227,6 +227,10 @@ CASES = {
         lambda mean, spread, seen, usable: kalman.correct(mean, spread, seen, NOISE, usable),
         *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
     ),
+    "agents.algebra.kalman.tracked": of(
+        lambda mean, spread, seen, usable: kalman.tracked(mean, spread, F, Q, seen, NOISE, usable),
+        *(real(NEIGHBOURS, 4), covariance(NEIGHBOURS, 4, 4), real(NEIGHBOURS, 2), truth(NEIGHBOURS)),
+    ),
     "agents.algebra.prediction.carried": of(
         lambda mean, spread, s: prediction.carried(TARGET, Prediction(mean, spread, None), s),
         *(real(3, 2), covariance(3, 3), share()),

@@ -79,7 +79,7 @@ EXEMPT = {
         agents.swarm.SwarmBrief.follower_stress agents.swarm.SwarmBrief.laplacian agents.swarm.SwarmBrief.process
     """,
     WRITTEN: """
-        netem.medium.journal.Writer.enter netem.medium.in_flight.Entry.dropped_by_verdict
+        netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.in_flight.Entry.dropped_by_verdict
         netem.medium.relay.Relayed.entry netem.medium.journal.Recorded.verdicts
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
