@@ -20,6 +20,8 @@ from world.formation.nominal import Formation, NotRigid
 KINDS = ("grid", "random")
 _GAIN = 10.0  # of the law in the scenario, per second
 _TICK = 0.05  # s: half of what the fastest mode takes, at this gain
+_FLAT = 1e-9  # of the swarm's size: less is a rounding of a line or a plane
+_MOST = 10_000  # nodes: ten times as many as were ever tried take minutes
 _SETTLED, _LONGEST = 4.0, 3600.0  # a run lasts so many times what it takes to 1/e, an hour at the most
 
 
@@ -51,6 +53,7 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
     least = nominal.shape[1] + 2
     if len(nominal) < least:
         raise ScenarioError(f"{len(nominal)} nodes: a stress in {least - 2} dimensions needs {least} at least")
+    _refuse_flat(nominal)
     try:
         formation, smallest = design(nominal, reach, 1.0 / (_GAIN * settle))
     except NotRigid as error:
@@ -73,6 +76,17 @@ def designed(nominal: Array, reach: float, settle: float) -> Designed:
         "agents": {"estimator": "none", "law": "static", "parameters": {"static": {"alpha": _GAIN}}},
     }
     return Designed(Scenario.model_validate(said), formation, 1.0 / (_GAIN * smallest))
+
+
+def _refuse_flat(nominal: Array) -> None:
+    places, first = np.unique(nominal, axis=0, return_index=True)
+    if len(places) < len(nominal):
+        twice = min(set(range(len(nominal))).difference(first.tolist()))
+        raise ScenarioError(f"node {twice + 1} stands where another does, at {shown(nominal[twice].tolist())}; move it")
+    spread = np.linalg.svd(nominal - nominal.mean(axis=0), compute_uv=False)
+    if spread[-1] <= _FLAT * spread[0]:
+        what = "in a line" if nominal.shape[1] == 2 else "in a plane"
+        raise ScenarioError(f"all nodes lie {what}: no stress has their affine maps alone; move some out of it")
 
 
 def nodes(kind: str, agents: int | None, dimension: int | None, seed: int) -> Array:
@@ -100,6 +114,8 @@ def nodes(kind: str, agents: int | None, dimension: int | None, seed: int) -> Ar
         return _read(Path(kind))
     if agents is None:
         raise ScenarioError(f"--agents: how many there are in the {kind}?")
+    if not 0 < agents <= _MOST:
+        raise ScenarioError(f"--agents {agents}: from 1 to {_MOST}")
     if kind == "grid":
         return layouts.grid(agents, dimension or 2)
     return layouts.strewn(agents, dimension or 2, seed)

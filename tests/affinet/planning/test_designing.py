@@ -73,6 +73,25 @@ def test_too_few_nodes_for_a_stress_are_refused():
         designing.designed(layouts.grid(4, 3), 3.0, 12.0)
 
 
+@pytest.mark.parametrize(
+    ("nominal", "words"),
+    [
+        ([[0, 0], [1, 0], [0, 1], [1, 1], [1, 0]], r"node 5 stands where another does, at \[1.0, 0.0\]; move it"),
+        ([[0, 0], [1, 1], [2, 2], [3, 3]], "all nodes lie in a line"),
+        ([[0, 0, 1], [1, 1, 1], [2, 0, 1], [3, 3, 1], [0, 3, 1]], "all nodes lie in a plane"),
+    ],
+)
+def test_nodes_that_no_range_would_help_are_refused(nominal, words):
+    with pytest.raises(ScenarioError, match=words):
+        designing.designed(np.array(nominal, dtype=float), 3.0, 10.0)
+
+
+@pytest.mark.parametrize("agents", [0, 10_001])
+def test_nodes_of_a_kind_are_no_more_than_can_be_designed(agents):
+    with pytest.raises(ScenarioError, match=f"--agents {agents}: from 1 to 10000"):
+        designing.nodes("grid", agents, None, 1)
+
+
 def test_nodes_of_a_kind_are_so_many_in_so_many_dimensions():
     assert designing.nodes("grid", 30, None, 1).shape == (30, 2)
     assert designing.nodes("random", 30, 3, 1).shape == (30, 3)
