@@ -60,6 +60,7 @@ $(READY): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv
 	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
 	$(UV) sync --locked --quiet --compile-bytecode
+	$(BIN)/python -m compileall -q affinet agents analysis netem world
 	$(BIN)/python packaging/compiled.py
 	touch $@
 

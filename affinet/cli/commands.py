@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from affinet.cli import options, show, terminal
-from affinet.planning import designing
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
@@ -211,6 +210,8 @@ def _study(parsed: argparse.Namespace) -> int:
 
 
 def _design(parsed: argparse.Namespace) -> int:
+    from affinet.planning import designing  # its sparse matrices take a while to import
+
     nominal = designing.nodes(parsed.nodes, parsed.agents, parsed.dimension, parsed.seed)
     made = designing.designed(nominal, parsed.range, parsed.settle)
     file = directories.for_design(parsed.out or Path(parsed.nodes).stem)

@@ -6,9 +6,9 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
-from affinet.planning.designing import KINDS
 from affinet.scenario import files, loading
 from affinet.scenario.units import LARGEST, SMALLEST
+from world.formation.layouts import KINDS
 
 
 def parser() -> argparse.ArgumentParser:

@@ -15,9 +15,9 @@ from affinet.scenario.words import shown
 from analysis.models.arrays import Array
 from world.formation import layouts
 from world.formation.design import design
+from world.formation.layouts import KINDS
 from world.formation.nominal import Formation, NotRigid
 
-KINDS = ("grid", "random")
 _GAIN = 10.0  # of the law in the scenario, per second
 _TICK = 0.05  # s: half of what the fastest mode takes, at this gain
 _FLAT = 1e-9  # of the swarm's size: less is a rounding of a line or a plane

@@ -11,6 +11,8 @@ from analysis.models.arrays import Array
 from analysis.models.elementary import power
 from netem.core.draws import Purpose, uniform
 
+KINDS = ("grid", "random")
+
 # Of nodes strewn one to a unit of volume: far below where no more fit (Feder 1980: .55 of the plane, .38 of space).
 _CLOSEST = 0.7
 _DIGITS = 3

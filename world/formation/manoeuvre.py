@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import ndtr
 
 from analysis.models.affine import Manoeuvre
 from analysis.models.algebra import product
 from analysis.models.arrays import Array
 from analysis.models.elementary import arctan2, cos, exp, sin
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _COLLAPSE = np.array([[-1.375, -0.375], [0.0, 0.0]])
@@ -168,6 +171,11 @@ def turned(theta: Array, angle: Array) -> Array:
 
 
 def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
+    from scipy.interpolate import (
+        CubicHermiteSpline,
+        PchipInterpolator,
+    )  # takes half a second, and only keyframes need it
+
     slopes = PchipInterpolator(times, values).derivative()(times)
     slopes[0], slopes[-1] = 0.0, 0.0  # from rest, and to rest
     return CubicHermiteSpline(times, values, slopes)
