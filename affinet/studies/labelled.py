@@ -54,7 +54,7 @@ def is_number(label: str) -> bool:
 def taken() -> set[str]:
     """Names in every file, which no axis can have."""
     quantities = {f"{what}{_named(name)}" for name in NAMES for what in ("", "mean_", "std_")}
-    return {"run", _TIME, _MOMENT, "dt", "ticks"} | quantities
+    return {"run", _TIME, _MOMENT, "tick_length", "tick_count"} | quantities
 
 
 def write(out: Path, study: Study, results: Sequence[Result], about: Mapping[str, str]) -> None:
@@ -112,8 +112,8 @@ def _coordinates(study: Study, results: Sequence[Result]) -> dict[str, _Variable
         **axes,
         "run": _Variable(["run"], seeds, {"long_name": "seed"}),
         _TIME: time,
-        "dt": _of_case(study, results, dt, {"units": "s", "long_name": "length of a tick"}),
-        "ticks": _of_case(study, results, ticks, {"units": "1", "long_name": "ticks of a run"}),
+        "tick_length": _of_case(study, results, dt, {"units": "s", "long_name": "length of a tick"}),
+        "tick_count": _of_case(study, results, ticks, {"units": "1", "long_name": "ticks of a run"}),
     }
 
 

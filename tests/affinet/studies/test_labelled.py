@@ -159,7 +159,7 @@ def test_nobody_but_who_reports_it_knows_the_unit_of_a_report(tmp_path):
     variables = saved(tmp_path, *made({}, [()], lambda *given: numbered(*given) | {"report:my_age": np.ones((2, 3))}))
     assert "units" not in variables["report:my_age"].attributes
     assert variables["report:my_age"].attributes["long_name"] == "my age, mean over time"
-    assert variables["time"].attributes["units"] == variables["dt"].attributes["units"] == "s"
+    assert variables["time"].attributes["units"] == variables["tick_length"].attributes["units"] == "s"
 
 
 def test_the_file_says_of_what_study_it_is(small):
@@ -199,10 +199,10 @@ def test_cases_with_other_moments_have_times_of_their_own(tmp_path):
     np.testing.assert_array_equal(variables["time"].values, [[0.0, 1.0, np.nan], [np.nan] * 3, [0.0, 0.5, 1.0]])
     means = [[5.0, 6.0, np.nan], [np.nan] * 3, [105.0, 106.0, 107.0]]
     np.testing.assert_array_equal(variables["mean_tracking_error"].values, means)
-    np.testing.assert_array_equal(variables["ticks"].values, [2.0, np.nan, 3.0])
-    assert variables["dt"].values == 0.5  # of all
-    assert variables["mean_tracking_error"].attributes["coordinates"].split() == ["time", "dt", "ticks"]
-    assert variables["tracking_error"].attributes["coordinates"].split() == ["dt", "ticks"]
+    np.testing.assert_array_equal(variables["tick_count"].values, [2.0, np.nan, 3.0])
+    assert variables["tick_length"].values == 0.5  # of all
+    assert variables["mean_tracking_error"].attributes["coordinates"].split() == ["time", "tick_length", "tick_count"]
+    assert variables["tracking_error"].attributes["coordinates"].split() == ["tick_length", "tick_count"]
 
 
 # ---- labels and names
@@ -246,7 +246,9 @@ def test_names_that_netcdf_has_are_read_as_they_were_given(name, tmp_path):
     assert variables[name].values.tolist() == ["a"]
 
 
-@pytest.mark.parametrize("name", ["run", "time", "moment", "dt", "ticks", "tracking_error", "std_nees", "report:age"])
+@pytest.mark.parametrize(
+    "name", ["run", "time", "moment", "tick_length", "tick_count", "tracking_error", "std_nees", "report:age"]
+)
 def test_an_axis_is_called_like_nothing_else_in_the_file(name, tmp_path):
     with pytest.raises(
         ScenarioError, match=r"axes\.1\.name: '.*' is a name in the data already: give the axis another"
@@ -332,8 +334,8 @@ def test_xarray_opens_it_by_its_labels(small):
         curve = results.mean_tracking_error.sel(law="varying").sel(time=0.31, method="nearest")
         np.testing.assert_array_equal(curve.values, variables["mean_tracking_error"].values[:, 1, :, 6])
         assert results.mean_tracking_error.attrs["units"] == "m²"
-        assert set(results.coords) == {"graph", "law", "mean burst (s)", "run", "time", "dt", "ticks"}
-        assert results.dt.item() == 0.05
+        assert set(results.coords) == {"graph", "law", "mean burst (s)", "run", "time", "tick_length", "tick_count"}
+        assert results.tick_length.item() == 0.05
         assert results.time.dtype == np.float64
 
 
@@ -351,4 +353,4 @@ def test_xarray_finds_the_times_of_each_case(tmp_path):
         np.testing.assert_allclose(static.time.dropna("moment"), np.arange(10) * 0.05)
         np.testing.assert_allclose(varying.time, np.arange(20) * 0.025)
         assert static.notnull().sum() == 10
-        assert (static.dt.item(), varying.dt.item(), varying.ticks.item()) == (0.05, 0.025, 20)
+        assert (static.tick_length.item(), varying.tick_length.item(), varying.tick_count.item()) == (0.05, 0.025, 20)
