@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from analysis.models.arrays import Array
+from netem.processes.whole import whole
 
 
 def save(path: Path, state: Any) -> None:
     """Write a state, whole or not at all: the process may be killed while it writes."""
-    unfinished = path.with_suffix(".unfinished.npz")
-    np.savez(unfinished, *_leaves(state), allow_pickle=False)
-    unfinished.replace(path)
+    with whole(path) as unfinished:
+        np.savez(unfinished, *_leaves(state), allow_pickle=False)
 
 
 def load(path: Path, like: Any) -> Any:

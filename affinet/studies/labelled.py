@@ -19,15 +19,14 @@ from numpy.typing import NDArray
 from affinet.studies.batch import REPORT
 from affinet.studies.quantities import NAMES, over_time, said, stands_for
 from analysis.models.arrays import Array
+from netem.processes.whole import whole
 
 if TYPE_CHECKING:
     from affinet.studies.study import Result, Study
 
 FILE = "results.nc"
-_TIME, _MOMENT = (
-    "time",
-    "moment",
-)  # dimensions of moments: where all cases share them, and their number where they do not
+# The dimension of moments: where all cases share them, and where they do not.
+_TIME, _MOMENT = "time", "moment"
 _NAME = re.compile(r"[^\x00-/:-@\[-^`{-\x7f][^\x00-\x1f/\x7f]*(?<! )")
 _COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
@@ -72,20 +71,15 @@ def write(out: Path, study: Study, results: Sequence[Result], about: Mapping[str
     coordinates = _coordinates(study, results)
     variables = coordinates | dict(_quantities(study, results, coordinates))
     words = {"title": study.title, "source": study.source, "scenario": study.scenario, "since": study.since}
-    written = out / f"{FILE}.part"
-    try:
-        with h5netcdf.File(written, "w") as file:
-            file.attrs.update(words | dict(about))
-            file.dimensions = {
-                name: length
-                for one in variables.values()
-                for name, length in zip(one.dimensions, one.values.shape, strict=True)
-            }
-            for name, one in variables.items():
-                _write(file, name, one)
-        written.replace(out / FILE)
-    finally:
-        written.unlink(missing_ok=True)
+    with whole(out / FILE) as unfinished, h5netcdf.File(unfinished, "w") as file:
+        file.attrs.update(words | dict(about))
+        file.dimensions = {
+            name: length
+            for one in variables.values()
+            for name, length in zip(one.dimensions, one.values.shape, strict=True)
+        }
+        for name, one in variables.items():
+            _write(file, name, one)
 
 
 def _write(file: Any, name: str, one: _Variable) -> None:

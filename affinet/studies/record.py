@@ -18,6 +18,7 @@ from affinet.studies.study import Claim, Labels, Result, Study
 from analysis.claims import intervals
 from analysis.claims.checks import ClaimVerdict
 from analysis.claims.intervals import Decision, Interval
+from netem.processes.whole import whole
 
 FILE = "claims.json"
 _SEAL = "seal"
@@ -121,12 +122,8 @@ def recorded(
 def write(out: Path, record: StudyRecord) -> None:
     """Write it into a directory, whole or not at all."""
     kept = record.model_dump(mode="json")
-    written = out / f"{FILE}.part"
-    try:
-        written.write_text(json.dumps(kept | {_SEAL: _digest(kept)}, indent=1, allow_nan=False) + "\n")
-        written.replace(out / FILE)
-    finally:
-        written.unlink(missing_ok=True)
+    with whole(out / FILE) as unfinished:
+        unfinished.write_text(json.dumps(kept | {_SEAL: _digest(kept)}, indent=1, allow_nan=False) + "\n")
 
 
 def read(file: Path) -> StudyRecord:

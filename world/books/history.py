@@ -21,6 +21,7 @@ from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
 from netem.medium.verdict import Verdict, VerdictCodes
 from netem.processes import system_errors
+from netem.processes.whole import whole
 from world.physics.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
@@ -241,13 +242,8 @@ class History:
         OSError
             When they cannot be written.
         """
-        unfinished = path.with_suffix(".unfinished.npz")
-        with system_errors.about(path):
-            try:
-                np.savez(unfinished, allow_pickle=False, **self.arrays())
-                unfinished.replace(path)
-            finally:
-                unfinished.unlink(missing_ok=True)
+        with system_errors.about(path), whole(path) as unfinished:
+            np.savez(unfinished, allow_pickle=False, **self.arrays())
 
 
 class Damaged(ValueError):

@@ -171,10 +171,8 @@ def turned(theta: Array, angle: Array) -> Array:
 
 
 def _smooth(times: Sequence[float], values: Array) -> CubicHermiteSpline:
-    from scipy.interpolate import (
-        CubicHermiteSpline,
-        PchipInterpolator,
-    )  # takes half a second, and only keyframes need it
+    # Takes half a second to import, and only keyframes need it.
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
     slopes = PchipInterpolator(times, values).derivative()(times)
     slopes[0], slopes[-1] = 0.0, 0.0  # from rest, and to rest
