@@ -60,6 +60,7 @@ class Purpose(IntEnum):
     FALSE_POSITIVE = 26
     CLUTTER = 27
     LAYOUT = 28
+    TIMER = 29
 
 
 @Part

@@ -12,13 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.kernels.kernel import Plain, kernel
-from analysis.models.arrays import Integers, Mask
+from analysis.models.arrays import Array, Integers, Mask
 from netem.impairments.corrupt import Marks
 from netem.medium.under_way import CELL, DUE, FIELDS, NUMBER, SENT, in_order, newest_in, parted, set_out
 from netem.medium.verdict import Verdict, VerdictCodes, passed
 
 # Columns of `Entry.odd` and `Entry.dropped`.
 _COPY_DUE, _WHY = 4, 4
+# The fields of `Verdicts` that are arrays come before this one.
+_WAITS = 4
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED = int(Verdict.DELIVERED), int(Verdict.DELAYED)
@@ -28,6 +30,22 @@ _NOTHING_ODD = np.empty((0, 5), dtype=np.int64)
 _NO_RELEASED = np.empty((0, 4), dtype=np.int64)
 _A_ROW = np.empty(4, dtype=np.int64)
 _NOTHING = (np.empty((0, 4), dtype=np.int64), 0, _NO_DROPPED, _NO_RELEASED)
+
+
+class Waits(NamedTuple):
+    """How long messages that are no measurements wait in the air, where that is not counted in ticks.
+
+    Parameters
+    ----------
+    seconds, copy_seconds
+        Of a message, and of its copy, shape (C, L) or (1, L).
+    ordered
+        Which of them wait for those sent before them, shape (C, L).
+    """
+
+    seconds: Array
+    copy_seconds: Array
+    ordered: Mask
 
 
 class Verdicts(NamedTuple):
@@ -43,12 +61,15 @@ class Verdicts(NamedTuple):
         How it is corrupted.
     copy_due
         When its copy arrives, -1 where there is none.
+    waits
+        What `due` and `copy_due` come of, where that is known.
     """
 
     kind: VerdictCodes
     due: Integers
     mark: Marks
     copy_due: Integers
+    waits: Waits | None = None
 
 
 class MediumState(NamedTuple):
@@ -177,7 +198,7 @@ def deliver(
     plain, newest, late, marked = _plainly(tick, verdicts.kind, verdicts.mark, verdicts.copy_due)
     if not (late or marked or state.in_flight):
         return state, Delivery(newest, verdicts.mark, plain, *_NOTHING)
-    apart = set_out(tick, *verdicts, state.offered, np.empty((FIELDS, late + marked), dtype=np.int64))
+    apart = set_out(tick, *verdicts[:_WAITS], state.offered, np.empty((FIELDS, late + marked), dtype=np.int64))
     under_way = np.concatenate([state.under_way, apart[:, :late]], axis=1)
     columns, _, waiting, arriving, held = parted(tick, under_way, doom, holds)
     arrived, lost = columns[:, waiting : waiting + arriving], columns[:, waiting + arriving :]
@@ -213,7 +234,7 @@ def newest_of(plain: Integers, apart: Integers) -> Integers:
 
 def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
-    odd, number = _odd(tick, *verdicts)
+    odd, number = _odd(tick, *verdicts[:_WAITS])
     if not number:
         return _NOTHING_ODD
     channel, link = np.nonzero(odd)

@@ -22,7 +22,7 @@ from netem.impairments.corrupt import Mark, Marks
 from netem.impairments.profile import Profile
 from netem.impairments.reach import squared_distances
 from netem.medium.by_tick import ImpairmentsByTick, TickImpairments
-from netem.medium.in_flight import MediumState, Verdicts
+from netem.medium.in_flight import MediumState, Verdicts, Waits
 from netem.medium.own_losses import OwnLosses
 from netem.medium.verdict import PASSED, Verdict, VerdictCodes, also_held, passed, stronger, strongest
 
@@ -134,14 +134,16 @@ class LinkModel:
             passing = offered & (stronger(imposed, held) == PASSED)
             debt, overflow, queued_s = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passing)
             held, extra_s = also_held(held, overflow, _OVERFLOW), queued_s if extra_s is None else extra_s + queued_s
-        wait = self._wait(state, tick, impairments, extra_s)
+        wait_s = impairments.delay_s if extra_s is None else impairments.delay_s + extra_s
+        wait = self._wait(state, tick, impairments, None if extra_s is None else wait_s)
         kind, due = _decided(tick, self._measured, offered, imposed, held, wait)
         mark, copy_due = self._unmarked, self._single
         if self._corrupts:
             mark = _marked(self._measured, kind, impairments.mark, state.spoke)
+        copy_s = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
         if self._doubles:
-            copy_due = self._copies(tick, impairments, kind, due, extra_s)
-        return Memory(debt, chains), Verdicts(kind, due, mark, copy_due)
+            copy_due = self._copies(tick, kind, due, copy_s)
+        return Memory(debt, chains), Verdicts(kind, due, mark, copy_due, Waits(wait_s, copy_s, self._ordered))
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
@@ -198,19 +200,19 @@ class LinkModel:
             states.append(np.where(moves, following, state))
         return tuple(states), lost, extra
 
-    def _wait(self, state: MediumState, tick: int, impairments: TickImpairments, extra_s: Array | None) -> Integers:
-        """Ticks that messages wait in the air if they are no measurements, shape (C, L) or (1, L)."""
+    def _wait(self, state: MediumState, tick: int, impairments: TickImpairments, seconds: Array | None) -> Integers:
+        """Ticks that messages wait in the air if they are no measurements, shape (C, L) or (1, L).
+
+        `seconds` are those that they wait, where it is not what time alone decides.
+        """
         wait = impairments.delay_ticks
-        if extra_s is not None:
-            wait = delay.ticks(impairments.delay_s + extra_s, self.profile.dt, self.profile.least_delay)
+        if seconds is not None:
+            wait = delay.ticks(seconds, self.profile.dt, self.profile.least_delay)
         if self.keeps_order:
             wait = np.where(self._ordered, np.maximum(wait, state.last_due - tick), wait)
         return wait
 
-    def _copies(
-        self, tick: int, impairments: TickImpairments, kind: VerdictCodes, due: Integers, extra_s: Array | None
-    ) -> Integers:
-        seconds = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
+    def _copies(self, tick: int, kind: VerdictCodes, due: Integers, seconds: Array) -> Integers:
         wait = delay.ticks(seconds, self.profile.dt, self.profile.least_delay)
         copy_due: Integers = _copied(tick, self._measured, kind, impairments.copied, wait, due, self._ordered)
         return copy_due

@@ -20,7 +20,7 @@ from netem.core.draws import DrawnAhead, Purpose, Seed
 from netem.core.links import Links
 from netem.faults.timeline import Conditions, Timeline
 from netem.impairments.profile import Profile
-from netem.medium.in_flight import Delivery, MediumState, Verdicts, deliver
+from netem.medium.in_flight import Delivery, MediumState, Verdicts, Waits, deliver
 from netem.medium.link_model import LinkModel, Memory
 from netem.medium.verdict import Verdict, VerdictCodes, also_held, doom, standing
 
@@ -229,4 +229,9 @@ def _merged(ruled: Mask, one: Verdicts, other: Verdicts) -> Verdicts:
         due=np.where(ruled, one.due, other.due),
         mark=np.where(ruled, one.mark, other.mark),
         copy_due=np.where(ruled, one.copy_due, other.copy_due),
+        waits=one.waits and other.waits and _merged_waits(ruled, one.waits, other.waits),
     )
+
+
+def _merged_waits(ruled: Mask, one: Waits, other: Waits) -> Waits:
+    return Waits(*(np.where(ruled, mine, others) for mine, others in zip(one, other, strict=True)))

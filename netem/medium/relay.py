@@ -83,8 +83,8 @@ class Relayed(NamedTuple):
         )
 
 
-class Relay(Generic[Said]):
-    """Relays tick after tick: decide, keep what is said, hand it out, finish.
+class FaultedRelay:
+    """What every relay does with the faults of its run: it takes orders, fires triggers, and has liars lie.
 
     Parameters
     ----------
@@ -94,14 +94,72 @@ class Relay(Generic[Said]):
 
     def __init__(self, medium: Medium) -> None:
         self._medium = medium
-        self._state = self._decided = medium.begin()
-        self._said: dict[int, Said] = {}
         self._told: tuple[Fault, ...] = ()
 
     @property
     def timeline(self) -> Timeline:
         """What is scripted and injected, as far as it is known by now."""
         return self._medium.timeline
+
+    def fire(self, triggers: Iterable[int], tick: int) -> None:
+        """From this tick on, what waited for these triggers holds."""
+        self._medium.timeline = self.timeline.fired(triggers, tick)
+
+    def obey(self, order: Order, tick: int) -> Answer:
+        """Change what is injected, from this tick on."""
+        self._medium.timeline, answer = control.obey(order, tick, self.timeline)
+        return answer
+
+    def lies(self, tick: int, channel: str, agent: int) -> bool:
+        """Whether this agent says on this channel what is not so."""
+        return any(agent in liar.agents for liar in self._liars(tick, channel))
+
+    def as_told(self, tick: int, channel: str, agents: Integers, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """The named fields (m, ...) that these agents (m,) broadcast, with the lies of those who lie."""
+        told = dict(fields)
+        for liar in self._liars(tick, channel):
+            lies, false = np.isin(agents, liar.agents), lie.told(told, liar)
+            told = {name: chosen(lies, false[name], true) for name, true in told.items()}
+        return told
+
+    def as_it_arrives(
+        self, content: Integers, channel: Integers, link: Integers, mark: Marks, fields: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """The named fields (m, ...) of messages as they arrive, by their marks.
+
+        Parameters
+        ----------
+        content, channel, link, mark
+            Of each message: the tick it speaks of, its rows, and how it is corrupted, shape (m,).
+        fields
+            As they were told.
+        """
+        draw = self._medium.bit_draws(content, channel, link)
+        return corrupted_fields(fields, mark, self._medium.bias(content, link), draw)
+
+    def _newly_injected(self) -> tuple[Fault, ...] | None:
+        """All faults injected so far, when one was injected or healed since this was asked last."""
+        injected = self.timeline.injected
+        changed, self._told = injected != self._told, injected
+        return injected if changed else None
+
+    def _liars(self, tick: int, channel: str) -> tuple[Fault, ...]:
+        return self.timeline.at(tick).liars if channel == lie.CHANNEL else ()
+
+
+class Relay(FaultedRelay, Generic[Said]):
+    """Relays tick after tick: decide, keep what is said, hand it out, finish.
+
+    Parameters
+    ----------
+    medium
+        What decides.
+    """
+
+    def __init__(self, medium: Medium) -> None:
+        super().__init__(medium)
+        self._state = self._decided = medium.begin()
+        self._said: dict[int, Said] = {}
 
     @property
     def in_flight(self) -> int:
@@ -112,15 +170,6 @@ class Relay(Generic[Said]):
     def ahead(self) -> bool:
         """Whether a tick can be decided before it is known where the agents are."""
         return self._medium.ahead
-
-    def fire(self, triggers: Iterable[int], tick: int) -> None:
-        """From this tick on, what waited for these triggers holds."""
-        self._medium.timeline = self.timeline.fired(triggers, tick)
-
-    def obey(self, order: Order, tick: int) -> Answer:
-        """Change what is injected, from this tick on."""
-        self._medium.timeline, answer = control.obey(order, tick, self.timeline)
-        return answer
 
     def decide(self, tick: int, position: Array | None) -> Relayed:
         """What becomes of a tick in which all who are awake speak to all their neighbours.
@@ -138,21 +187,7 @@ class Relay(Generic[Said]):
         """What becomes of a tick in which a message is offered where `offered` says so, shape (C, L)."""
         state, verdicts = self._medium.judge(self._state, tick, offered, position)
         self._decided, delivery = self._medium.deliver(state, tick, verdicts)
-        injected = self.timeline.injected
-        changed, self._told = injected != self._told, injected
-        return Relayed(tick, self.timeline.at(tick), verdicts, delivery, injected if changed else None)
-
-    def lies(self, tick: int, channel: str, agent: int) -> bool:
-        """Whether this agent says on this channel what is not so."""
-        return any(agent in liar.agents for liar in self._liars(tick, channel))
-
-    def as_told(self, tick: int, channel: str, agents: Integers, fields: Mapping[str, Any]) -> dict[str, Any]:
-        """The named fields (m, ...) that these agents (m,) broadcast, with the lies of those who lie."""
-        told = dict(fields)
-        for liar in self._liars(tick, channel):
-            lies, false = np.isin(agents, liar.agents), lie.told(told, liar)
-            told = {name: chosen(lies, false[name], true) for name, true in told.items()}
-        return told
+        return Relayed(tick, self.timeline.at(tick), verdicts, delivery, self._newly_injected())
 
     def keep(self, tick: int, said: Said) -> None:
         """Keep what was said in a tick, as it was told."""
@@ -162,29 +197,11 @@ class Relay(Generic[Said]):
         """What was said in a tick of which somebody may still hear."""
         return self._said[tick]
 
-    def as_it_arrives(
-        self, content: Integers, channel: Integers, link: Integers, mark: Marks, fields: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """The named fields (m, ...) of messages as they arrive, by their marks.
-
-        Parameters
-        ----------
-        content, channel, link, mark
-            Of each message: the tick it speaks of, its rows, and how it is corrupted, shape (m,).
-        fields
-            As they were told.
-        """
-        draw = self._medium.bit_draws(content, channel, link)
-        return corrupted_fields(fields, mark, self._medium.bias(content, link), draw)
-
     def finish(self, tick: int) -> None:
         """The tick that was decided last is over; what nobody will hear any more is forgotten."""
         self._state = self._decided
         oldest = self._state.oldest_sent(tick) - 1  # a stale message says what was said the tick before it was sent
         self._said = {sent: said for sent, said in self._said.items() if sent >= oldest}
-
-    def _liars(self, tick: int, channel: str) -> tuple[Fault, ...]:
-        return self.timeline.at(tick).liars if channel == lie.CHANNEL else ()
 
 
 def changed_on_the_way(mark: Marks | int) -> Any:
