@@ -19,8 +19,6 @@ from netem.medium.verdict import Verdict, VerdictCodes, passed
 
 # Columns of `Entry.odd` and `Entry.dropped`.
 _COPY_DUE, _WHY = 4, 4
-# The fields of `Verdicts` that are arrays come before this one.
-_WAITS = 4
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED = int(Verdict.DELIVERED), int(Verdict.DELAYED)
@@ -61,15 +59,12 @@ class Verdicts(NamedTuple):
         How it is corrupted.
     copy_due
         When its copy arrives, -1 where there is none.
-    waits
-        What `due` and `copy_due` come of, where that is known.
     """
 
     kind: VerdictCodes
     due: Integers
     mark: Marks
     copy_due: Integers
-    waits: Waits | None = None
 
 
 class MediumState(NamedTuple):
@@ -88,6 +83,8 @@ class MediumState(NamedTuple):
         When the last message that passed arrives, shape (C, L).
     memories
         What each profile remembers.
+    waits
+        How long what was offered in the last tick waits; None where its verdicts were recorded.
     """
 
     under_way: Integers
@@ -95,6 +92,7 @@ class MediumState(NamedTuple):
     spoke: Mask
     last_due: Integers
     memories: tuple[Any, ...]
+    waits: Waits | None = None
 
     @classmethod
     def empty(cls, shape: tuple[int, int], memories: tuple[Any, ...]) -> MediumState:
@@ -198,7 +196,7 @@ def deliver(
     plain, newest, late, marked = _plainly(tick, verdicts.kind, verdicts.mark, verdicts.copy_due)
     if not (late or marked or state.in_flight):
         return state, Delivery(newest, verdicts.mark, plain, *_NOTHING)
-    apart = set_out(tick, *verdicts[:_WAITS], state.offered, np.empty((FIELDS, late + marked), dtype=np.int64))
+    apart = set_out(tick, *verdicts, state.offered, np.empty((FIELDS, late + marked), dtype=np.int64))
     under_way = np.concatenate([state.under_way, apart[:, :late]], axis=1)
     columns, _, waiting, arriving, held = parted(tick, under_way, doom, holds)
     arrived, lost = columns[:, waiting : waiting + arriving], columns[:, waiting + arriving :]
@@ -234,7 +232,7 @@ def newest_of(plain: Integers, apart: Integers) -> Integers:
 
 def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
     """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
-    odd, number = _odd(tick, *verdicts[:_WAITS])
+    odd, number = _odd(tick, *verdicts)
     if not number:
         return _NOTHING_ODD
     channel, link = np.nonzero(odd)

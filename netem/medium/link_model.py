@@ -110,8 +110,8 @@ class LinkModel:
         position: Array | None,
         imposed: VerdictCodes,
         delay_s: Array | None,
-    ) -> tuple[Memory, Verdicts]:
-        """The verdict on every message offered in a tick, as `Medium.judge` gives it.
+    ) -> tuple[Memory, Verdicts, Waits]:
+        """The verdict on every message offered in a tick, as `Medium.judge` gives it, and how long each waits.
 
         Parameters
         ----------
@@ -142,8 +142,8 @@ class LinkModel:
             mark = _marked(self._measured, kind, impairments.mark, state.spoke)
         copy_s = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
         if self._doubles:
-            copy_due = self._copies(tick, kind, due, copy_s)
-        return Memory(debt, chains), Verdicts(kind, due, mark, copy_due, Waits(wait_s, copy_s, self._ordered))
+            copy_due = self._copies(tick, impairments.copied, kind, due, copy_s)
+        return Memory(debt, chains), Verdicts(kind, due, mark, copy_due), Waits(wait_s, copy_s, self._ordered)
 
     def bit_draws(self, content: Integers, channel: Integers, link: Integers) -> Array:
         """Which number and which bit of corrupted messages flip: uniform, shape (m, 2), for rows of messages (m,)."""
@@ -212,9 +212,9 @@ class LinkModel:
             wait = np.where(self._ordered, np.maximum(wait, state.last_due - tick), wait)
         return wait
 
-    def _copies(self, tick: int, kind: VerdictCodes, due: Integers, seconds: Array) -> Integers:
+    def _copies(self, tick: int, copied: Mask, kind: VerdictCodes, due: Integers, seconds: Array) -> Integers:
         wait = delay.ticks(seconds, self.profile.dt, self.profile.least_delay)
-        copy_due: Integers = _copied(tick, self._measured, kind, impairments.copied, wait, due, self._ordered)
+        copy_due: Integers = _copied(tick, self._measured, kind, copied, wait, due, self._ordered)
         return copy_due
 
 

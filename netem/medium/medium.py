@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, Waits, deliver
 from netem.medium.link_model import LinkModel, Memory
 from netem.medium.verdict import Verdict, VerdictCodes, also_held, doom, standing
+
+Of = TypeVar("Of", Verdicts, Waits)
 
 JOURNAL = "journal.arrows"  # in a run directory
 
@@ -141,14 +143,14 @@ class Medium:
             return state._replace(offered=state.offered + offered), self._recorded.verdicts(tick, offered)
         now = self.timeline.at(tick)
         under = self._under(now)
-        memories, verdicts = self._by_profile(state, tick, offered, position, now, under)
+        memories, verdicts, waits = self._by_profile(state, tick, offered, position, now, under)
         if under.stalls is not None:
             np.copyto(verdicts.kind, _DELAYED, where=under.stalls & (verdicts.kind == _DELIVERED))
         last_due = state.last_due
         if self._keeps_order:
             passed = (verdicts.kind == _DELIVERED) | (verdicts.kind == _DELAYED)
             last_due = np.where(passed, np.maximum(verdicts.due, verdicts.copy_due), last_due)
-        return MediumState(state.under_way, state.offered + offered, offered, last_due, memories), verdicts
+        return MediumState(state.under_way, state.offered + offered, offered, last_due, memories, waits), verdicts
 
     def deliver(self, state: MediumState, tick: int, verdicts: Verdicts) -> tuple[MediumState, Delivery]:
         """What arrives in this tick: the messages just passed, and those under way that are due."""
@@ -173,22 +175,22 @@ class Medium:
 
     def _by_profile(
         self, state: MediumState, tick: int, offered: Mask, position: Array | None, now: Conditions, under: _Under
-    ) -> tuple[tuple[Memory, ...], Verdicts]:
+    ) -> tuple[tuple[Memory, ...], Verdicts, Waits]:
         imposed, delay_s = self._imposed(tick, now, under), now.delay_s if under.delays else None
         own, *others = self._link_models
         if not under.degrades:
-            memory, verdicts = own.judge(state, state.memories[0], tick, offered, position, imposed, delay_s)
+            memory, verdicts, waits = own.judge(state, state.memories[0], tick, offered, position, imposed, delay_s)
             rested = (model.rest(memory) for model, memory in zip(others, state.memories[1:], strict=True))
-            return (memory, *rested), verdicts
+            return (memory, *rested), verdicts, waits
         judged = [
             model.judge(state, memory, tick, offered & (now.profile == number), position, imposed, delay_s)
             for number, (model, memory) in enumerate(zip(self._link_models, state.memories, strict=True))
         ]
-        whole = judged[0][1]
-        for number, (_, verdicts) in enumerate(judged[1:], start=1):
+        _, whole, waits = judged[0]
+        for number, (_, verdicts, of_these) in enumerate(judged[1:], start=1):
             ruled = now.profile == number
-            whole = _merged(ruled, verdicts, whole)
-        return tuple(memory for memory, _ in judged), whole
+            whole, waits = _merged(ruled, verdicts, whole), _merged(ruled, of_these, waits)
+        return tuple(memory for memory, _, _ in judged), whole, waits
 
     def _imposed(self, tick: int, now: Conditions, under: _Under) -> VerdictCodes:
         """What the timeline makes of messages: a reason, or PASSED, shape (C, L) or (L,)."""
@@ -223,15 +225,6 @@ class Medium:
         )
 
 
-def _merged(ruled: Mask, one: Verdicts, other: Verdicts) -> Verdicts:
-    return Verdicts(
-        kind=np.where(ruled, one.kind, other.kind),
-        due=np.where(ruled, one.due, other.due),
-        mark=np.where(ruled, one.mark, other.mark),
-        copy_due=np.where(ruled, one.copy_due, other.copy_due),
-        waits=one.waits and other.waits and _merged_waits(ruled, one.waits, other.waits),
-    )
-
-
-def _merged_waits(ruled: Mask, one: Waits, other: Waits) -> Waits:
-    return Waits(*(np.where(ruled, mine, others) for mine, others in zip(one, other, strict=True)))
+def _merged(ruled: Mask, one: Of, other: Of) -> Of:
+    fields: Any = zip(one, other, strict=True)
+    return type(one)(*(np.where(ruled, mine, others) for mine, others in fields))

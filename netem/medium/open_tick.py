@@ -37,12 +37,11 @@ class OpenTick:
         All faults injected so far, in plain form, when one was injected or healed.
     """
 
-    def __init__(self, tick: int, conditions: Conditions, verdicts: Verdicts, dt: float) -> None:
+    def __init__(self, tick: int, conditions: Conditions, verdicts: Verdicts, waits: Waits) -> None:
         shape = verdicts.kind.shape
         self.tick, self.idle = tick, conditions.idle.tolist()
         self.decided, self.marks = verdicts.kind.tolist(), verdicts.mark.tolist()
         self.doubled = (verdicts.copy_due >= 0).tolist()
-        waits = _in_seconds(verdicts, tick, dt) if verdicts.waits is None else verdicts.waits
         self.wait_s, self.copy_wait_s, self.ordered = (np.broadcast_to(of, shape).tolist() for of in waits)
         self.kind = np.zeros(shape, dtype=np.uint8)
         self.kind[0] = verdicts.kind[0]
@@ -73,9 +72,3 @@ class OpenTick:
 
 def _rows(listed: Sequence[tuple[int, ...]], columns: int) -> Integers:
     return np.array(listed, dtype=np.int64).reshape(-1, columns)
-
-
-def _in_seconds(verdicts: Verdicts, tick: int, dt: float) -> Waits:
-    """The waits of verdicts that were recorded, in ticks."""
-    due, copy_due = ((ticks - tick) * dt for ticks in (verdicts.due, verdicts.copy_due))
-    return Waits(due, copy_due, np.zeros_like(verdicts.kind, dtype=bool))

@@ -75,7 +75,7 @@ class Parcels(Generic[Said]):
         is_held
             Whether messages on a link wait.
         """
-        arriving = []
+        arriving: list[Parcel[Said]] = []
         while self._heap and self._heap[0].due_s <= now_s:
             parcel = heapq.heappop(self._heap)
             (self._held if is_held(parcel.link) else arriving).append(parcel)

@@ -18,7 +18,7 @@ from netem.core.links import Links
 from netem.core.plain import to_plain
 from netem.faults.timeline import Conditions
 from netem.impairments.corrupt import Mark
-from netem.medium.in_flight import Entry
+from netem.medium.in_flight import Entry, Verdicts, Waits
 from netem.medium.medium import Medium
 from netem.medium.open_tick import OpenTick, Voice
 from netem.medium.parcels import Parcel, Parcels
@@ -100,7 +100,8 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         """A tick begins, in which the agents are at a position, shape (N, D), in metres: judge what they will say in it."""
         conditions = self.timeline.at(tick)
         self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick), position)
-        now = self._open[tick] = OpenTick(tick, conditions, verdicts, self._dt)
+        waits = self._state.waits or _of_recorded(verdicts, tick, self._dt)
+        now = self._open[tick] = OpenTick(tick, conditions, verdicts, waits)
         awake = (np.flatnonzero(~conditions.idle) + 1).tolist()
         now.unsaid = {(agent, channel) for agent in awake for channel in self._speaking}
         injected = self._newly_injected()
@@ -216,3 +217,8 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         self._offered = self._offered + (over.kind != _SILENT)
         self.in_flight += int((over.kind == _DELAYED).sum()) + entry.copies - entry.late - len(entry.dropped)
         return entry
+
+
+def _of_recorded(verdicts: Verdicts, tick: int, dt: float) -> Waits:
+    due, copy_due = (np.asarray(ticks - tick, np.float64) * dt for ticks in (verdicts.due, verdicts.copy_due))
+    return Waits(due, copy_due, np.zeros(verdicts.kind.shape, dtype=bool))
