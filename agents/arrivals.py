@@ -94,20 +94,20 @@ class Arrivals:
             self._sighting(inboxes),
         )
 
-    def heard(self, tick: int, inboxes: Mapping[int, messages.ExchangeInbox]) -> dict[str, Heard]:
-        """What neighbours said, by channel.
+    def heard(self, tick: int, arrived: Mapping[int, Sequence[messages.Broadcast]]) -> dict[str, Heard]:
+        """What neighbours said, by channel, of what arrived at each agent, sorted by tick.
 
         Raises
         ------
         WireError
             When an array is of another form.
         """
-        # Messages come sorted by tick, so what stands in a slot in the end is the newest.
+        # What stands in a slot in the end is the newest.
         slots = self._shape[0] * self._shape[1]
         said: dict[str, list[messages.Broadcast | None]] = {name: [None] * slots for name in self._forms}
-        for agent, inbox in inboxes.items():
+        for agent, broadcasts in arrived.items():
             slot = self._slot[agent]
-            for message in inbox.messages:
+            for message in broadcasts:
                 if message.channel in said:
                     said[message.channel][slot[message.src]] = message
         return {name: self._heard_on(tick, name, newest) for name, newest in said.items()}
@@ -116,7 +116,8 @@ class Arrivals:
         payloads = [None if message is None else message.payload for message in said]
         fields = channel_rows(self._forms[channel], payloads, self._said_by[channel])
         fresh = np.array([message is not None for message in said], dtype=bool)
-        age = np.array([0 if message is None else tick - message.k for message in said], dtype=np.int64)
+        # In real time a neighbour may be in a later tick than oneself.
+        age = np.array([0 if message is None else max(tick - message.k, 0) for message in said], dtype=np.int64)
         return Heard(
             {name: rows.reshape(*self._shape, *rows.shape[1:]) for name, rows in fields.items()},
             fresh.reshape(self._shape),

@@ -6,11 +6,11 @@ from typing import Any
 
 from netem.core import channels
 from netem.wire import messages
-from netem.wire.carrier import Session, Voice
+from netem.wire.carrier import Arrived, Session, Voice
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
 
-_WAITING = 64  # messages that may wait
+_WAITING = 4096  # messages that may wait
 
 
 class Mailbox:
@@ -26,6 +26,8 @@ class Mailbox:
         The channels on which it broadcasts arrays; measurements are broadcast too.
     hears_centre
         Whether a centre tells it its edges.
+    joins_late
+        Whether it may miss what the medium tells it at first: in real time nobody waits for it to listen.
     """
 
     def __init__(
@@ -37,9 +39,10 @@ class Mailbox:
         spoken: list[str],
         *,
         hears_centre: bool,
+        joins_late: bool = False,
     ) -> None:
         keys = Keys(run)
-        self.agent, self.neighbours = agent, neighbours
+        self.agent, self.neighbours, self._joins_late = agent, neighbours, joins_late
         self.begin()
         self._inbox = session.hears(keys.inbox(agent), _WAITING)
         self._told = session.hears(keys.told(agent), _WAITING) if hears_centre else None
@@ -50,7 +53,8 @@ class Mailbox:
         """Nothing was said or heard: the agent is new."""
         self.heard = 0
         self._numbers = Numbering()
-        self._inboxes, self._tellings = Sequences("the medium's"), Sequences("the centre's")
+        self._inboxes = Sequences("the medium's", from_any=self._joins_late)
+        self._tellings = Sequences("the centre's")
 
     @property
     def voices(self) -> list[Voice]:
@@ -67,7 +71,20 @@ class Mailbox:
         UninstructedLoss
             When one before it is missing.
         """
-        inbox = messages.unpack_inbox(self._inbox.next().data)
+        return self._read(self._inbox.next())
+
+    def waiting_inboxes(self) -> list[messages.Inbox]:
+        """All that the medium has delivered by now.
+
+        Raises
+        ------
+        WireError, UninstructedLoss
+            As of `next_inbox`.
+        """
+        return [self._read(arrived) for arrived in self._inbox.waiting()]
+
+    def _read(self, arrived: Arrived) -> messages.Inbox:
+        inbox = messages.unpack_inbox(arrived.data)
         self._inboxes.check("inbox", inbox.seq)
         if isinstance(inbox, messages.ExchangeInbox):
             self.heard += len(inbox.messages)
@@ -88,10 +105,10 @@ class Mailbox:
         self._tellings.check("told", told.seq)
         return told
 
-    def broadcast(self, tick: int, channel: str, payload: dict[str, Any]) -> None:
-        """Tell the neighbours."""
+    def broadcast(self, tick: int, channel: str, payload: dict[str, Any], at: float | None) -> None:
+        """Tell the neighbours, and in real time when this is said, in simulated seconds."""
         seq = self._numbers.next(channel)
-        said = messages.Broadcast(k=tick, src=self.agent, channel=channel, seq=seq, payload=payload)
+        said = messages.Broadcast(k=tick, src=self.agent, channel=channel, seq=seq, payload=payload, at=at)
         self._broadcasts[channel].say(messages.pack(said))
 
     def act(self, tick: int, **said: Any) -> None:

@@ -1,243 +1,16 @@
-"""Agents as a process (`python -m agents`): one, or several that a host carries as one batch.
-
-They hear the medium, let `Agent` decide, and speak, each on keys of its own.
-"""
+"""Agents as a process (`python -m agents`): one, or several that a host carries as one batch."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
-import numpy as np
-
-from agents import checkpoint
-from agents.agent import Agent, AgentAction, AgentState
-from agents.arrivals import Arrivals, Sensed, forms_of
-from agents.batch import beside_others, come_back, put_back
-from agents.brief import Brief, together
-from agents.mailbox import Mailbox
-from netem.core import channels
-from netem.loading.choice import Choice
+from agents.node import AgentBrief, AgentsNode, HostBrief
+from agents.real_time import RealTimeAgentsNode
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
-from netem.processes.user_code import UserCodeError
-from netem.wire import messages
-from netem.wire.arrays import TRUTH, packed
-from netem.wire.carrier import Ear, Session, await_heard
-from netem.wire.keys import Keys
-from netem.wire.sequence import Sequences
-from netem.wire.session import CENTRE, HUB, Login, client
-
-
-@dataclass(frozen=True)
-class AgentBrief:
-    """All an agent is told.
-
-    Parameters
-    ----------
-    run, login
-        Where its process connects, and as whom.
-    agent, neighbours
-        Its number, and the numbers of the agents in its neighbour slots.
-    estimator, law, leaders, leader_gain, limit, reports, brief
-        What `Agent` is made of.
-    hears_centre
-        Whether a centre tells it its edges.
-    checkpoint, remembers
-        The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
-    """
-
-    run: str
-    login: Login
-    agent: int
-    neighbours: tuple[int, ...]
-    estimator: Choice
-    law: Choice
-    leaders: Literal["pilot", "distances"]
-    leader_gain: float
-    limit: float | None
-    reports: Mapping[str, tuple[int, ...]]
-    brief: Brief
-    hears_centre: bool
-    checkpoint: str | None
-    remembers: bool
-
-
-@dataclass(frozen=True)
-class HostBrief:
-    """All a process is told that carries several agents.
-
-    Parameters
-    ----------
-    host
-        Which of the run's it is, from 1.
-    agents
-        What each of them is told.
-    """
-
-    host: int
-    agents: tuple[AgentBrief, ...]
-
-
-class AgentsNode:
-    """Agents of one process on the network, computed as one batch."""
-
-    def __init__(
-        self, session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None = None
-    ) -> None:
-        """Nothing is said yet.
-
-        Parameters
-        ----------
-        session, supervisor
-            Where, and watched by whom.
-        briefs
-            What each of the agents is told.
-        host
-            Which of the run's hosts this is; None of an agent that has its process to itself.
-        """
-        first, brief = briefs[0], together([one.brief for one in briefs])
-        self._supervisor = supervisor
-        self._agents = Agent(
-            brief,
-            first.estimator.build(),
-            first.law.build(),
-            first.leaders,
-            first.leader_gain,
-            first.limit,
-            first.reports,
-        )
-        self._numbers = np.array([one.agent for one in briefs])
-        self._state = self._begun(first)
-        self._forms = forms_of(self._agents.channels())
-        neighbours, (width, dimension) = {one.agent: one.neighbours for one in briefs}, brief.relative.shape[-2:]
-        self._arrivals = Arrivals(neighbours, width, dimension, self._forms)
-        self._mailboxes = {
-            one.agent: Mailbox(
-                session, one.run, one.agent, one.neighbours, sorted(self._forms), hears_centre=one.hears_centre
-            )
-            for one in briefs
-        }
-        self._hears_centre = first.hears_centre
-        self._roster = None if host is None else Roster(session.hears(Keys(first.run).roster(host), 4))
-
-    def _begun(self, first: AgentBrief) -> AgentState:
-        fresh = self._agents.init(self._numbers.shape)
-        self._checkpoint = None if first.checkpoint is None else Path(first.checkpoint)
-        if self._checkpoint and first.remembers:
-            return self._agents.revived(checkpoint.load(self._checkpoint, like=fresh))
-        if self._checkpoint:  # it may die before it has acted, and what a predecessor wrote is not its own
-            checkpoint.save(self._checkpoint, fresh)
-        return fresh
-
-    def await_everybody(self) -> None:
-        """Wait until the medium and the world listen."""
-        await_heard(voice for mailbox in self._mailboxes.values() for voice in mailbox.voices)
-
-    def run(self) -> None:
-        """Sense, broadcast, hear and act until the medium says that the run is over."""
-        tick = 0
-        while True:
-            self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
-            if not (awake := self._taking_part()):
-                continue
-            inboxes = {agent: inbox for agent in awake if isinstance(inbox := self._next(agent), messages.SenseInbox)}
-            if len(inboxes) < len(awake):
-                return
-            tick = inboxes[awake[0]].k
-            self._supervisor.works(tick)
-            try:
-                self._live(tick, inboxes)
-            except UserCodeError as error:
-                error.tick = tick
-                raise
-
-    def _taking_part(self) -> Sequence[int]:
-        if self._roster is None:
-            return [*self._mailboxes]
-        called = self._roster.next()
-        if called.restarted:
-            self._state = come_back(self._agents, self._numbers, self._state, called.restarted, called.remembering)
-            for agent in called.restarted:
-                self._mailboxes[agent].begin()
-        return called.awake
-
-    def _next(self, agent: int) -> messages.Inbox:
-        return self._mailboxes[agent].next_inbox()
-
-    def _live(self, tick: int, inboxes: Mapping[int, messages.SenseInbox]) -> None:
-        before, living = self._state, self._state
-        if some_idle := len(inboxes) < len(self._mailboxes):
-            idle = ~np.isin(self._numbers, [*inboxes])
-            living = beside_others(before, idle, tick)
-        sensed = self._arrivals.sensed(inboxes)
-        state = self._speak(tick, living, sensed, inboxes)
-        self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
-        state, action = self._act(tick, state, sensed, [*inboxes])
-        self._state = put_back(idle, before, state) if some_idle else state
-        if self._checkpoint:
-            checkpoint.save(self._checkpoint, self._state)
-        self._tell(tick, action, [*inboxes])
-
-    def _speak(
-        self, tick: int, state: AgentState, sensed: Sensed, inboxes: Mapping[int, messages.SenseInbox]
-    ) -> AgentState:
-        state, said = self._agents.sense(state, tick, sensed.measured, sensed.seen, sensed.motion)
-        for row, (agent, mailbox) in enumerate(self._mailboxes.items()):
-            if (inbox := inboxes.get(agent)) is None:
-                continue
-            for channel, fields in said.items():
-                forms = self._forms[channel]
-                payload = {name: packed(fields[name][row], form.dtype) for name, form in forms.items()}
-                mailbox.broadcast(tick, channel, payload)
-            observed = {"neighbours": inbox.neighbours, "measured": inbox.measured}
-            mailbox.broadcast(tick, channels.MEASUREMENT, observed)
-        return state
-
-    def _act(
-        self, tick: int, state: AgentState, sensed: Sensed, awake: Collection[int]
-    ) -> tuple[AgentState, AgentAction]:
-        arrived = {agent: inbox for agent in awake if isinstance(inbox := self._next(agent), messages.ExchangeInbox)}
-        self._supervisor.works(tick)
-        heard = self._arrivals.heard(tick, arrived)
-        if self._hears_centre:
-            self._supervisor.waits(tick, "what it tells", lambda: (CENTRE,))
-            told = {agent: self._mailboxes[agent].next_told() for agent in awake}
-            self._supervisor.works(tick)
-            heard[channels.CENTRE] = self._arrivals.told(tick, told, self._agents.brief.present)
-        return self._agents.act(state, sensed.clock, heard, sensed.position, sensed.motion, sensed.sighting)
-
-    def _tell(self, tick: int, action: AgentAction, awake: Collection[int]) -> None:
-        estimate, input_ = action.estimate, action.input
-        for row, (agent, mailbox) in enumerate(self._mailboxes.items()):
-            if agent not in awake:
-                continue
-            edges = slice(len(mailbox.neighbours))
-            mailbox.act(
-                tick,
-                input=packed(input_[row]),
-                estimate=packed(estimate.relative[row, edges]),
-                known=packed(estimate.known[row, edges], TRUTH),
-                covariance=packed(estimate.spread[row, edges]),
-                psi=float(estimate.psi[row]),
-                feasible=None if estimate.feasible is None else bool(estimate.feasible[row]),
-                reports={name: packed(said[row]) for name, said in estimate.reports.items()},
-            )
-
-
-class Roster:
-    """Who of a host's agents takes part in each tick, as the medium calls it."""
-
-    def __init__(self, ear: Ear) -> None:
-        self._ear, self._calls = ear, Sequences("the medium's")
-
-    def next(self) -> messages.Roster:
-        """Wait for the next tick."""
-        called = messages.unpack(messages.Roster, self._ear.next().data)
-        self._calls.check("roster", called.seq)
-        return called
+from netem.wire.carrier import Session
+from netem.wire.session import client
 
 
 def main() -> NoReturn:
@@ -253,13 +26,19 @@ def host() -> NoReturn:
 def _fly(supervisor: Supervisor) -> None:
     brief = supervisor.brief(AgentBrief)
     with supervisor.confessing(), Session(client(brief.login)) as session:
-        _until_the_end(supervisor, AgentsNode(session, supervisor, [brief]))
+        _until_the_end(supervisor, node_of(session, supervisor, [brief], None))
 
 
 def _carry(supervisor: Supervisor) -> None:
     brief = supervisor.brief(HostBrief)
     with supervisor.confessing(), Session(client(brief.agents[0].login)) as session:
-        _until_the_end(supervisor, AgentsNode(session, supervisor, brief.agents, brief.host))
+        _until_the_end(supervisor, node_of(session, supervisor, brief.agents, brief.host))
+
+
+def node_of(session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None) -> AgentsNode:
+    """The agents of a process: in lockstep, or in real time."""
+    of_time = AgentsNode if briefs[0].timer is None else RealTimeAgentsNode
+    return of_time(session, supervisor, briefs, host)
 
 
 def _until_the_end(supervisor: Supervisor, node: AgentsNode) -> None:

@@ -34,6 +34,8 @@ class Timer:
         By which its clock gains, in seconds per second.
     listens
         How long it listens after it has spoken, in seconds.
+    factor
+        Simulated seconds in a second.
     seed, agent
         What the jitter is drawn by.
     """
@@ -43,6 +45,7 @@ class Timer:
     jitter: float
     drift: float
     listens: float
+    factor: float
     seed: int
     agent: int
 

@@ -91,15 +91,34 @@ class Acts:
         UninstructedLoss
             When one before it is missing.
         """
-        agent = self._speaking[key]
-        try:
-            act = messages.unpack(messages.Act, data)
-        except WireError as error:
-            raise WireError(f"agent {agent}: {error}") from error
+        agent, act = self._unpacked(key, data)
         if act.src != agent or act.k != tick or agent not in awaited:
             raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
         self._streams.check(self._stream[agent], act.seq)
         return act
+
+    def read_when_it_comes(self, key: str, data: bytes, tick: int) -> messages.Act:
+        """The act that came on a key in this tick, in which or in an earlier one it was decided.
+
+        Raises
+        ------
+        WireError
+            When it is none, or one of a tick that is yet to come.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        agent, act = self._unpacked(key, data)
+        if act.src != agent or not 0 <= act.k <= tick:
+            raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
+        self._streams.check(self._stream[agent], act.seq)
+        return act
+
+    def _unpacked(self, key: str, data: bytes) -> tuple[int, messages.Act]:
+        agent = self._speaking[key]
+        try:
+            return agent, messages.unpack(messages.Act, data)
+        except WireError as error:
+            raise WireError(f"agent {agent}: {error}") from error
 
     def together(self, acts: Mapping[int, messages.Act]) -> Done:
         """What the acts of a tick say, by number of the agent, as arrays of all.

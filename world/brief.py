@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from netem.core.pace import Pace
 from netem.faults.fault import Fault
 from netem.faults.trigger import Trigger
 from netem.wire.session import Login
@@ -56,6 +57,8 @@ class WorldBrief:
         What the agents' estimators report beyond edges, by name, and the shape of each for one agent.
     books
         How it writes that down.
+    pace
+        How time goes in a run in real time; None in lockstep.
     """
 
     run: str
@@ -67,3 +70,4 @@ class WorldBrief:
     triggers: tuple[Trigger, ...]
     reports: Mapping[str, tuple[int, ...]]
     books: RecordOptions
+    pace: Pace | None

@@ -27,7 +27,7 @@ _COLUMNS = {"odd": 5, "apart": 4, "dropped": 5, "released": 4}  # of what a jour
 
 
 class ProcessesActed(NamedTuple):
-    """What came back from all agents, and what the medium says it made of their messages.
+    """What came back from all agents.
 
     Parameters
     ----------
@@ -35,13 +35,10 @@ class ProcessesActed(NamedTuple):
         What those who are awake said, by number.
     done
         The arrays in it, of all.
-    entry
-        What became of the messages.
     """
 
     acts: Mapping[int, messages.Act]
     done: Done
-    entry: Entry
 
     @property
     def input(self) -> Array:
@@ -58,6 +55,11 @@ class ZenohCarrier:
         Where, watched by whom, and of which world.
     meanwhile
         What to do in a tick while the agents work on it.
+
+    Attributes
+    ----------
+    entries
+        What became of the messages of ticks; whoever has written it down takes it out.
     """
 
     def __init__(
@@ -73,7 +75,9 @@ class ZenohCarrier:
         self._numbers = Numbering()
         self._heard = dict.fromkeys(range(1, world.links.agents + 1), 0)
         self._fired: Sequence[int] = ()
+        self._began: float | None = None
         self._awaited: set[int] = set()
+        self.entries: dict[int, Entry] = {}
         self.uninstructed = 0
 
     def await_everybody(self) -> None:
@@ -97,7 +101,8 @@ class ZenohCarrier:
         if journal.injected is not None:
             self.timeline = self.timeline.facing([from_plain(Fault, fault) for fault in journal.injected])
         self._account(journal, acts)
-        return ProcessesActed(acts, self._reader.together(acts), self._entry(journal))
+        self.entries[tick] = entry_of(journal, len(self._world.links))
+        return ProcessesActed(acts, self._reader.together(acts))
 
     def end(self) -> None:
         """The run is over: tell the medium."""
@@ -114,10 +119,13 @@ class ZenohCarrier:
         ):
             if agents:
                 self._supervisor.tell(event, agents=agents, remembering=timeline.remembering(tick), k=tick)
-                self._supervisor.await_order(event)
+                self._await_moved(event)
         for agent in timeline.restarted(tick):
             self._reader.restart(agent)
             self._heard[agent] = 0
+
+    def _await_moved(self, event: str) -> None:
+        self._supervisor.await_order(event)
 
     def _publish(self, tick: int, scene: Scene, measured: Array) -> None:
         fired, self._fired = list(self._fired), ()
@@ -151,6 +159,7 @@ class ZenohCarrier:
             motion=None if motion is None else packed(motion),
             sightings=sightings,
             fired=list(fired),
+            began=self._began,
         )
         self._sense.say(messages.pack(sense))
 
@@ -194,13 +203,21 @@ class ZenohCarrier:
             self.uninstructed += handed - heard
             self._heard[agent] = act.heard
 
-    def _entry(self, journal: messages.Journal) -> Entry:
-        return Entry(
-            verdicts=numbers(journal.verdicts, "the medium: Journal: verdicts", (-1, len(self._world.links)), CODE),
-            late=journal.late,
-            injected=journal.injected,
-            **{
-                name: numbers(getattr(journal, name), f"the medium: Journal: {name}", (-1, columns), WHOLE)
-                for name, columns in _COLUMNS.items()
-            },
-        )
+
+def entry_of(journal: messages.Journal, links: int) -> Entry:
+    """What became of the messages of a tick, as the medium tells it, over so many links.
+
+    Raises
+    ------
+    WireError
+        When one of its arrays is of another form.
+    """
+    return Entry(
+        verdicts=numbers(journal.verdicts, "the medium: Journal: verdicts", (-1, links), CODE),
+        late=journal.late,
+        injected=journal.injected,
+        **{
+            name: numbers(getattr(journal, name), f"the medium: Journal: {name}", (-1, columns), WHOLE)
+            for name, columns in _COLUMNS.items()
+        },
+    )

@@ -20,7 +20,7 @@ from world.books.history import UNTOLD, History, Moment, gather
 from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier
 from world.flight import FlownTick
-from world.physics.world import Scene
+from world.real_time import RealTimeCarrier
 
 if TYPE_CHECKING:
     from world.recording.logbook import RunWriter
@@ -39,9 +39,9 @@ class WorldNode:
 
     def __init__(self, session: Session, supervisor: Supervisor, brief: WorldBrief, logbook: RunWriter) -> None:
         self._world, self._supervisor, self._logbook = brief.world, supervisor, logbook
-        self._carrier = ZenohCarrier(session, supervisor, brief, self._meanwhile)
+        self._carrier, self._clock = _of_time(session, supervisor, brief, self._meanwhile)
         self._batch = brief.books.batch
-        self._flown: list[tuple[Moment, Scene]] = []  # with where each tick led
+        self._flown: dict[int, FlownTick[ProcessesActed]] = {}
         self.history = History(brief.world, len(brief.channels), brief.reports)
 
     @property
@@ -53,13 +53,12 @@ class WorldNode:
         """Wait until the medium listens."""
         self._carrier.await_everybody()
 
-    def run(self, clock: Clock) -> None:
+    def run(self) -> None:
         """Fly all ticks, and write them down: also those before whatever ends the run early."""
         with system_errors.afterwards(self._write_down):
-            for instant in flight.fly(self._world, clock, self._carrier):
-                # Both at once: a signal may come between any two lines.
-                self._flown.append((self._moment(instant), instant.following))
-        self._carrier.end()
+            for instant in flight.fly(self._world, self._clock, self._carrier):
+                self._flown[instant.tick] = instant
+            self._carrier.end()
 
     def _meanwhile(self, tick: int) -> None:
         if tick % self._batch == 0:
@@ -79,18 +78,32 @@ class WorldNode:
             psi=[np.nan if act is None else act.psi for act in everybody],
             feasible=[UNTOLD if act is None or act.feasible is None else int(act.feasible) for act in everybody],
             reports=acted.done.reports,
-            entry=acted.entry,
+            entry=self._carrier.entries[instant.tick],
         )
 
     def _write_down(self) -> None:
-        if not self._flown:
+        first, entries = self.history.ticks, self._carrier.entries
+        following = first
+        while following in self._flown and following in entries:
+            following += 1
+        if following == first:
             return
-        flown, self._flown = self._flown, []
         timeline = self._carrier.timeline
-        moments = gather(timeline, self.history.ticks, [moment for moment, _ in flown])
-        self.history.extend(moments, flown[-1][1].position)
+        moments = gather(timeline, first, [self._moment(self._flown[tick]) for tick in range(first, following)])
+        self.history.extend(moments, self._flown[following - 1].following.position)
         self._logbook.write(moments, timeline)
         self._supervisor.tell("tick", k=self.history.ticks, error=float(moments.error[-1]))
+        for tick in range(first, following):  # at the end: a signal may come between any two lines
+            del self._flown[tick], entries[tick]
+
+
+def _of_time(
+    session: Session, supervisor: Supervisor, brief: WorldBrief, meanwhile: Callable[[int], None]
+) -> tuple[ZenohCarrier, Clock]:
+    if brief.pace is None:
+        return ZenohCarrier(session, supervisor, brief, meanwhile), Lockstep(brief.world.ticks)
+    carrier = RealTimeCarrier(session, supervisor, brief, meanwhile)
+    return carrier, carrier.clock
 
 
 def main() -> None:
@@ -116,5 +129,5 @@ def main() -> None:
             # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
             last.append(partial(node.history.save, out / ARRAYS))
             with supervisor.confessing():
-                node.run(Lockstep(brief.world.ticks))
+                node.run()
         supervisor.tell("done", uninstructed=node.uninstructed)

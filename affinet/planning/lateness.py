@@ -51,7 +51,9 @@ def of(given: Scenario, formation: Formation, links: Links, script: Script) -> L
     delayed = _delayed(script, links, given)
     held = _held(script, links, given, under_way + delayed.ticks)
     scripted = tuple(cause for cause in (delayed, held) if cause.ticks)
-    ticks = under_way + delayed.ticks + held.ticks
+    # In real time agents wake apart: of what is said late in a tick some hear in the next, or the one after.
+    apart = 2.0 if given.time.mode == "real" else 0.0
+    ticks = under_way + delayed.ticks + held.ticks + apart
     return Lateness((*air, *scripted), int(min(ticks, given.time.ticks)))
 
 

@@ -23,6 +23,7 @@ from affinet.planning import (
     recordings,
     registry,
     script,
+    timers,
     tryout,
 )
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swarm_of, world_of
@@ -123,6 +124,11 @@ def _make(given: Scenario) -> Plan:
         findings += algorithms.findings(estimator.build(), law.build(), swarm)
         centre = centre_of(estimator.build(), swarm)
     _refuse_fatal(findings)
+    if centre is not None and given.time.mode == "real":
+        raise ScenarioError(
+            f"time.mode: the centralized filter of {given.agents.estimator} waits for everybody in every tick; "
+            "fly it in 'lockstep'"
+        )
     brief = brief_of(first, L, swarm.lateness)
     for name, algorithm in ((given.agents.estimator, estimator), (given.agents.law, law)):
         wants = capabilities.wants(algorithm.build())
@@ -160,6 +166,8 @@ def _make(given: Scenario) -> Plan:
         swarm=swarm,
         reports=reports,
         findings=tuple(dict.fromkeys(found)),  # both classes of channels may have the same to say
+        timers=timers.of(given, formation),
+        pace=timers.pace(given),
     )
     with registry.refusing("agents", Unsuited):
         tryout.alone(plan.alone, plan.positioned, plan.told_mission, centre)

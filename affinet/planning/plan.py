@@ -14,9 +14,11 @@ from agents.brief import Brief
 from agents.centre.checked import CheckedCentre, centre_of
 from agents.loading import capabilities
 from agents.swarm import SwarmBrief
+from agents.timer import Timer
 from agents.wants import Wants
 from analysis.models.arrays import Mask
 from analysis.models.finding import Finding
+from netem.core.pace import Pace
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
@@ -57,6 +59,10 @@ class Plan:
         What the estimator reports beyond edges, by name, and the shape of each for one agent.
     findings
         What was checked.
+    timers
+        When each agent wakes, in a run in real time; none in lockstep.
+    pace
+        How time goes in a run in real time; None in lockstep.
     journal
         That of an earlier run, when its verdicts are to be this run's.
     injected
@@ -75,6 +81,8 @@ class Plan:
     swarm: SwarmBrief
     reports: Mapping[str, tuple[int, ...]]
     findings: tuple[Finding, ...]
+    timers: tuple[Timer, ...] = ()
+    pace: Pace | None = None
     journal: Path | None = None
     injected: tuple[Fault, ...] = ()
 

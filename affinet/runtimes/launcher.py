@@ -21,12 +21,12 @@ from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
-from agents.process import AgentBrief, HostBrief
+from agents.node import AgentBrief, HostBrief
 from analysis.metrics.errors import tracking_error
+from netem.brief import MediumBrief
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import JOURNAL
-from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
 from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, host_name, socket_folder
@@ -201,7 +201,9 @@ class Launcher:
                     group.kill(self._agents[number])
             case "restart":
                 remembering = event["remembering"]
-                group.await_ready([self._start_agent(group, number, number in remembering) for number in moved])
+                started = [self._start_agent(group, number, number in remembering) for number in moved]
+                if self._plan.pace is None:  # in real time nobody waits for them
+                    group.await_ready(started)
             case "pause":
                 for number in moved:
                     self._agents[number].pause()
@@ -240,6 +242,7 @@ class Launcher:
             triggers=self._plan.triggers,
             reports=self._plan.reports,
             books=self._plan.books(self._viewer),
+            pace=self._plan.pace,
         )
 
     def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
@@ -260,6 +263,7 @@ class Launcher:
             hosts=self._hosts,
             journal=str(self._out / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
+            pace=self._plan.pace,
         )
 
     def _centre_brief(self, login: Login) -> CentreBrief:
@@ -283,6 +287,7 @@ class Launcher:
             hears_centre=plan.centre is not None,
             checkpoint=checkpoint,
             remembers=remembers,
+            timer=plan.timers[row] if plan.timers else None,
         )
 
 

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
+from affinet.scenario.real_time import RealTimeSection
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.target import TargetSection
@@ -120,14 +121,16 @@ class ManoeuvreSection(Section):
 class TimeSection(Section):
     """Ticks of dt seconds for duration seconds. `next-tick` delivers no message before the next tick.
 
-    Over processes a run has stalled when nothing has moved for `patience` seconds.
+    Over processes a run has stalled when nothing has moved for `patience` seconds. In `real` time a tick begins when its time
+    has come, whoever has answered by then.
     """
 
     dt: Tick
     duration: Positive
     patience: Annotated[float, Field(ge=2.0, le=3600.0)] = 3.0
-    mode: Literal["lockstep"] = "lockstep"
+    mode: Literal["lockstep", "real"] = "lockstep"
     exchange: Literal["same-tick", "next-tick"] = "same-tick"
+    real: RealTimeSection = RealTimeSection()
 
     @property
     def ticks(self) -> int:

@@ -218,6 +218,13 @@ class Timeline:
             reading += agents * int(np.floor(fault.rate * (tick - fault.start) + _ROUNDING))
         return np.maximum(reading, 0) if wrong else reading
 
+    def gains(self, tick: int) -> Array:
+        """By how much each agent's clock gains in this tick, in seconds per second, shape (N,)."""
+        gains = np.zeros(self.links.agents)
+        for fault, _, agents in self.at(tick).under(Verb.CLOCK):
+            gains += agents * fault.rate
+        return gains
+
     def held(self, fault: int) -> Mask:
         """Links on which fault number `fault` acts, shape (L,)."""
         return self._link_masks[fault] | self.links.touching(self._agent_masks[fault])

@@ -51,18 +51,40 @@ class Broadcasts:
         UninstructedLoss
             When one before it is missing.
         """
+        said, whose = self._unpacked(key, data)
+        if said.k != tick:
+            raise WireError(f"{whose} in tick {tick}: it speaks of tick {said.k} (see docs/protocol.md)")
+        self._streams.check(f"{said.src} {said.channel}", said.seq)
+        if (said.src, said.channel) not in awaited:
+            raise WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
+        return said
+
+    def read_when_it_comes(self, key: str, data: bytes, tick: int) -> messages.Broadcast:
+        """The broadcast that came on a key in this tick, of which or of an earlier one it speaks.
+
+        Raises
+        ------
+        WireError
+            When it is none, or speaks of what is yet to come, or does not say when it was said.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        said, whose = self._unpacked(key, data)
+        if not 0 <= said.k <= tick or said.at is None:
+            raise WireError(f"{whose} in tick {tick}: it speaks of tick {said.k}, at {said.at} (see docs/protocol.md)")
+        self._streams.check(f"{said.src} {said.channel}", said.seq)
+        return said
+
+    def _unpacked(self, key: str, data: bytes) -> tuple[messages.Broadcast, str]:
         _, agent, _, channel = key.rsplit("/", 3)
         whose = f"agent {agent} on {channel!r}"
         try:
             said = messages.unpack_relayed(data)
         except WireError as error:
             raise WireError(f"{whose}: {error}") from error
-        if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
+        if self._speaking.get(key) != (said.src, said.channel):
             raise WireError(
-                f"{whose} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
+                f"{whose}: it speaks as agent {said.src}, on {shown(said.channel)}; "
                 f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
             )
-        self._streams.check(f"{said.src} {said.channel}", said.seq)
-        if (said.src, said.channel) not in awaited:
-            raise WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
-        return said
+        return said, whose

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import queue
 from collections.abc import Iterable, Mapping
 from types import TracebackType
 from typing import Any
@@ -42,6 +43,31 @@ class Ear:
     def next(self) -> Arrived:
         """Wait for the next message, in the order of their arrival."""
         return Arrived(self._subscriber.recv())
+
+    def waiting(self) -> list[Arrived]:
+        """All that has arrived and was not asked for yet, in that order."""
+        arrived = []
+        while (sample := self._subscriber.try_recv()) is not None:
+            arrived.append(Arrived(sample))
+        return arrived
+
+
+class Ears:
+    """Hears several keys at once, for whoever has a time to keep."""
+
+    def __init__(self) -> None:
+        self._samples: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+
+    def take(self, sample: zenoh.Sample) -> None:
+        """Something has arrived."""
+        self._samples.put(sample)
+
+    def next(self, patience_s: float | None) -> Arrived | None:
+        """The next message on any of them, if one comes within so many seconds; None waits for ever."""
+        try:
+            return Arrived(self._samples.get(timeout=patience_s))
+        except queue.Empty:
+            return None
 
 
 class Voice:
@@ -136,6 +162,13 @@ class Session:
     def hears(self, key: str, room: int) -> Ear:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
+
+    def hears_all(self, keys: Iterable[str]) -> Ears:
+        """Hear several keys at once."""
+        ears = Ears()
+        for key in keys:
+            self._session.declare_subscriber(key, zenoh.handlers.Callback(ears.take, indirect=False))
+        return ears
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""

@@ -20,8 +20,8 @@ from netem.wire.arrays import Packed, WireError
 T = TypeVar("T")
 
 
-class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Named fields, each of its type: what is anything else is no message."""
+class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Named fields, each of its type: what is anything else is no message. Those with a default are of runs in real time."""
 
 
 class Sighted(_Message, frozen=True, kw_only=True):
@@ -42,7 +42,8 @@ class Sense(_Message, frozen=True, kw_only=True):
     `measured` is y of every directed link in the order of the links, shape (L, D), `position` the true positions, shape
     (N, D), both in metres; `motion` the true velocities and higher derivatives, shape (N, m - 1, D), where the bodies are
     integrators of an order m above 1; `sightings` what each agent's detector says of a target, as in `SenseInbox`, if there
-    is one; `fired` are the numbers of the triggers that fire in this tick.
+    is one; `fired` are the numbers of the triggers that fire in this tick. In real time `began` is when the run did, in seconds
+    of the monotonic clock.
     """
 
     k: int
@@ -54,6 +55,7 @@ class Sense(_Message, frozen=True, kw_only=True):
     motion: bytes | None
     sightings: list[Sighted] | None
     fired: list[int]
+    began: float | None = None
 
 
 class Roster(_Message, frozen=True, kw_only=True):
@@ -74,7 +76,8 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
     positioning, get it; `motion` its own velocity and higher derivatives, shape (m - 1, D), in metres per second, per second
     squared ..., if it integrates its input m > 1 times to a position; `sighting` what its detector says of a target, if there
-    is one.
+    is one. In real time `began` is when the run did, in seconds of the monotonic clock, and `gains` by how much the agent's
+    clock gains just now, in seconds per second, beside what its timer says.
     """
 
     k: int
@@ -86,16 +89,22 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     position: bytes | None
     motion: bytes | None
     sighting: Sighted | None
+    began: float | None = None
+    gains: float = 0.0
 
 
 class Broadcast(_Message, frozen=True, kw_only=True):
-    """Agent to its neighbours, through the medium: named fields of numbers and nested lists."""
+    """Agent to its neighbours, through the medium: named fields of numbers and nested lists.
+
+    In real time `at` is when it is said, in simulated seconds since the run began, by the monotonic clock.
+    """
 
     k: int
     src: int
     channel: str
     seq: int
     payload: dict[str, Any]
+    at: float | None = None
 
 
 class ExchangeInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="exchange"):
@@ -115,6 +124,17 @@ class EndInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="end"
     seq: int
 
 
+class Punctuality(_Message, frozen=True, kw_only=True):
+    """How a process keeps its time, in a run in real time.
+
+    `late` are seconds by which what it does in a tick began later than it should have, the worst of them; `missed` how many
+    deadlines it has missed since it said so last.
+    """
+
+    late: float
+    missed: int
+
+
 class Act(_Message, frozen=True, kw_only=True):
     """Agent to world: its control input, and what it believes.
 
@@ -123,7 +143,7 @@ class Act(_Message, frozen=True, kw_only=True):
     (m,); `covariance` the upper triangles of their covariances, row by row, shape (m, D (D + 1) / 2), in square metres, 0 where
     not known; `psi` its convergence indicator, NaN where undefined; `feasible` whether the neighbours it sees determine a local
     map, if its estimator fits one; `reports` what else its estimator says, named numbers and nested lists of numbers; `heard`
-    how many broadcasts it has received so far.
+    how many broadcasts it has received so far. In real time it tells its `punctuality`.
     """
 
     k: int
@@ -137,6 +157,7 @@ class Act(_Message, frozen=True, kw_only=True):
     feasible: bool | None
     reports: dict[str, Any]
     heard: int
+    punctuality: Punctuality | None = None
 
 
 class Told(_Message, frozen=True, kw_only=True):
@@ -161,7 +182,7 @@ class Journal(_Message, frozen=True, kw_only=True):
     messages that passed late, twice or corrupted, rows of `in_flight.out_of_the_ordinary`; `apart`, `late`, `dropped` and
     `released` say how messages under way arrived or were dropped, as in `in_flight.Delivery`; `handed` how many broadcasts
     were put into each agent's inbox, shape (N,); `injected` all faults injected so far, in plain form, when one was injected
-    or healed.
+    or healed. In real time it tells its `punctuality`.
     """
 
     k: int
@@ -175,6 +196,7 @@ class Journal(_Message, frozen=True, kw_only=True):
     released: bytes
     handed: list[int]
     injected: list[Any] | None
+    punctuality: Punctuality | None = None
 
 
 class _Relayed(msgspec.Struct, frozen=True, kw_only=True, tag_field="phase", tag="exchange"):

@@ -21,16 +21,28 @@ class Numbering:
         self._next[stream] = number + 1
         return number
 
+    def join(self, stream: str, number: int) -> None:
+        """Begin at this number, where the stream has none yet."""
+        self._next.setdefault(stream, number)
+
     def restart(self, stream: str) -> None:
         """Begin again at 0: the other end is a new process."""
         self._next[stream] = 0
 
 
 class Sequences:
-    """Checks that each stream from one kind of sender arrives whole and in order."""
+    """Checks that each stream from one kind of sender arrives whole and in order.
 
-    def __init__(self, sender: str) -> None:
-        self._sender = sender
+    Parameters
+    ----------
+    sender
+        Whose streams they are.
+    from_any
+        Whether the first message of a stream may have any number: it began before anybody heard it.
+    """
+
+    def __init__(self, sender: str, *, from_any: bool = False) -> None:
+        self._sender, self._from_any = sender, from_any
         self._expected = Numbering()
 
     def check(self, stream: str, number: int) -> None:
@@ -41,6 +53,8 @@ class Sequences:
         UninstructedLoss
             When it is not the next one of its stream.
         """
+        if self._from_any:
+            self._expected.join(stream, number)
         expected = self._expected.next(stream)
         if number != expected:
             raise UninstructedLoss(

@@ -5,7 +5,7 @@ import sys
 
 import zenoh
 
-from agents.process import AgentBrief, AgentsNode
+from agents.node import AgentBrief, AgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.keys import Keys

@@ -4,7 +4,7 @@ import os
 import sys
 import time
 
-from agents.process import AgentBrief, AgentsNode
+from agents.node import AgentBrief, AgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.session import client
@@ -18,7 +18,7 @@ class Wayward(AgentsNode):
         self.wrong = wrong
         (self.mailbox,) = self._mailboxes.values()
 
-    def _tell(self, tick, action, awake):
+    def _tell(self, tick, action, awake, punctuality=None):
         if self.wrong == "thinks":
             time.sleep(0.1)
         if tick == TICK:
@@ -29,7 +29,7 @@ class Wayward(AgentsNode):
                     self.mailbox._numbers.next("act")
                 case "prints":
                     os.write(self._supervisor._events, b'{"event":"kill","agents":[1]}\n')
-        super()._tell(tick, action, awake)
+        super()._tell(tick, action, awake, punctuality)
 
 
 def main() -> None:

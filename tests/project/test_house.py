@@ -13,7 +13,7 @@ from paths import ROOT
 
 from affinet.runtimes import told
 from agents.brief import Brief
-from agents.process import AgentBrief
+from agents.node import AgentBrief
 from netem.wire import messages
 from netem.wire.session import Login
 

@@ -15,17 +15,17 @@ from msgspec.structs import replace as changed
 from numpy.typing import NDArray
 
 from agents.brief import Brief
-from agents.process import AgentBrief, HostBrief
+from agents.node import AgentBrief, HostBrief
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
+from netem.brief import MediumBrief
 from netem.core.links import Links
 from netem.core.plain import PlainError, from_plain, to_plain
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
 from netem.impairments.delay import DelayLaw
 from netem.loading.choice import Choice
-from netem.process import MediumBrief
 from netem.wire import messages
 from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, WireError, channel_rows, numbers, packed
 from netem.wire.session import Login

@@ -1,0 +1,51 @@
+"""What a scenario says of a run in real time: how fast it goes, and when agents act by their own clocks."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from affinet.scenario.events import Whom
+from affinet.scenario.profiles import Section
+from affinet.scenario.units import Positive, Rate
+
+Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+Swing = Annotated[float, Field(ge=0.0, lt=0.5, allow_inf_nan=False)]
+WakeRate = Annotated[float, Field(gt=0.0, le=1.0, allow_inf_nan=False)]
+
+
+class TimerSetting(Section):
+    """When some agents act: how often in a tick, and when in it, in ticks of their own clocks.
+
+    Those gain `drift` seconds per second. They wake at `phase`, too early or too late by up to `jitter`, speak, listen for
+    `listens`, and act. Without `agents` it is everybody.
+    """
+
+    agents: Whom = Field(default=["all"])
+    rate: WakeRate = 1.0
+    phase: Share = 0.2
+    jitter: Swing = 0.0
+    drift: Rate = 0.0
+    listens: Share = 0.4
+
+
+class RealTimeSection(Section):
+    """Simulated seconds in a second, and by how many seconds a process may be late before the run fails.
+
+    Of several timers that name an agent the last one holds.
+    """
+
+    factor: Positive = 1.0
+    late: Positive = 1.0
+    timers: list[TimerSetting] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _whole(self) -> RealTimeSection:
+        for timer in self.timers:
+            if timer.phase + timer.jitter + timer.listens > 1.0 / timer.rate:
+                raise ValueError(
+                    f"an agent that wakes at {timer.phase:g} (jitter {timer.jitter:g}) and listens for {timer.listens:g} "
+                    f"of a tick acts after it should have waked again; shorten them to {1.0 / timer.rate:g} together"
+                )
+        return self

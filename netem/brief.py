@@ -1,0 +1,62 @@
+"""What the medium process is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from analysis.models.arrays import Mask
+from netem.core.links import Links
+from netem.core.pace import Pace
+from netem.faults.fault import Fault
+from netem.faults.trigger import Trigger
+from netem.impairments.profile import Profile
+from netem.wire.arrays import Form
+from netem.wire.session import Login
+
+
+@dataclass(frozen=True)
+class MediumBrief:
+    """All the medium process is told.
+
+    Parameters
+    ----------
+    run
+        The run's name, part of every key.
+    login, dictionary_file
+        Where to listen, and the file with everybody's password.
+    seed, links, channels, profiles, faults, triggers
+        What the medium is made of.
+    injected
+        Faults that an earlier run was given while it flew.
+    recorded
+        The journal of an earlier run that is to be judge of this one.
+    forms
+        What the fields of each channel hold that agents look into.
+    positioned
+        Agents that have positioning, shape (N,).
+    hosts
+        For each process that carries several agents, which.
+    journal, batch
+        The file to write down every verdict in, and how many ticks at once.
+    pace
+        How time goes in a run in real time; None in lockstep.
+    """
+
+    run: str
+    login: Login
+    dictionary_file: str
+    seed: int
+    links: Links
+    channels: tuple[str, ...]
+    profiles: tuple[Profile, ...]
+    faults: tuple[Fault, ...]
+    triggers: tuple[Trigger, ...]
+    injected: tuple[Fault, ...]
+    recorded: str | None
+    forms: Mapping[str, Mapping[str, Form]]
+    positioned: Mask
+    hosts: Mapping[int, tuple[int, ...]]
+    journal: str
+    batch: int
+    pace: Pace | None
