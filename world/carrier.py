@@ -20,6 +20,7 @@ from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering
 from netem.wire.session import HUB, WORLD
 from world.acts import Acts, Done
+from world.books.kept import Kept
 from world.brief import WorldBrief
 from world.physics.world import Scene
 
@@ -60,6 +61,8 @@ class ZenohCarrier:
     ----------
     entries
         What became of the messages of ticks; whoever has written it down takes it out.
+    kept
+        How everybody kept their time, in a run in real time; likewise.
     """
 
     def __init__(
@@ -78,6 +81,7 @@ class ZenohCarrier:
         self._began: float | None = None
         self._awaited: set[int] = set()
         self.entries: dict[int, Entry] = {}
+        self.kept: list[Kept] = []
         self.uninstructed = 0
 
     def await_everybody(self) -> None:

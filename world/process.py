@@ -88,6 +88,8 @@ class WorldNode:
             following += 1
         if following == first:
             return
+        kept, self._carrier.kept = self._carrier.kept, []
+        self._logbook.write_kept(kept)
         timeline = self._carrier.timeline
         moments = gather(timeline, first, [self._moment(self._flown[tick]) for tick in range(first, following)])
         self.history.extend(moments, self._flown[following - 1].following.position)
@@ -120,7 +122,7 @@ def main() -> None:
         last: list[Callable[[], None]] = []
         with (
             system_errors.afterwards(lambda: [step() for step in last]),
-            RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books) as logbook,
+            RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,
         ):
             node = WorldNode(session, supervisor, brief, logbook)
             node.await_everybody()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from netem.processes.wall_time import RealTime, WallTime, be_prompt
 from netem.wire import messages
 from netem.wire.carrier import Session
 from netem.wire.session import HUB, WORLD
+from world.books.kept import Kept
 from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier, entry_of
 from world.physics.world import Scene
@@ -23,25 +23,6 @@ from world.physics.world import Scene
 
 class TooLate(RuntimeError):
     """A process was later than a run in real time allows."""
-
-
-class Kept(NamedTuple):
-    """How a process kept its time in a tick.
-
-    Parameters
-    ----------
-    tick, process
-        When, and which.
-    late
-        By how many seconds it was late, at the worst.
-    missed
-        How many deadlines it missed.
-    """
-
-    tick: int
-    process: str
-    late: float
-    missed: int
 
 
 class RealTimeCarrier(ZenohCarrier):
@@ -52,10 +33,6 @@ class RealTimeCarrier(ZenohCarrier):
     session, supervisor, brief, meanwhile
         As of a `ZenohCarrier`.
 
-    Attributes
-    ----------
-    kept
-        How everybody kept their time; whoever has written it down takes it out.
     """
 
     def __init__(
@@ -67,7 +44,6 @@ class RealTimeCarrier(ZenohCarrier):
         self._newest: dict[int, messages.Act] = {}
         self._spoke: dict[int, int] = {}
         self._journaled = 0
-        self.kept: list[Kept] = []
 
     @property
     def clock(self) -> Iterator[int]:

@@ -17,8 +17,10 @@ from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
+from affinet.verdicts.timing import DelayError, Lateness, Timing
 from analysis.models.finding import Finding
 from netem.faults.control import Answer
+from netem.wire.session import HUB, WORLD
 
 if TYPE_CHECKING:
     from affinet.planning.designing import Designed
@@ -221,6 +223,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
         *(("fault", str(bite)) for bite in outcome.faults),
+        *([] if outcome.timing is None else _timing(outcome.timing)),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
     ]
@@ -230,6 +233,25 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console.print(table)
     for reason in outcome.reasons:
         console.print(_plain(reason), soft_wrap=True)
+
+
+def _timing(timing: Timing) -> list[tuple[str, str]]:
+    """How processes of a run in real time kept their time: the worst of the agents stands for them all."""
+    agents = {name: of for name, of in timing.lateness.items() if name not in (WORLD, HUB)}
+    worst = sorted(agents, key=lambda name: (agents[name].p99_ms, name))[-1:]
+    shown = [name for name in (WORLD, HUB, *worst) if name in timing.lateness]
+    missed = [f"{name} {of.missed}" for name, of in timing.lateness.items() if of.missed]
+    rows = [
+        ("late", "; ".join(f"{name} {_milliseconds(timing.lateness[name])}" for name in shown)),
+        ("deadlines missed", ", ".join(missed) or "none"),
+    ]
+    if timing.delays is not None:
+        rows.append(("delays longer by", _milliseconds(timing.delays)))
+    return rows
+
+
+def _milliseconds(of: Lateness | DelayError) -> str:
+    return f"p50 {of.p50_ms:.2f}, p99 {of.p99_ms:.2f}, max {of.max_ms:.2f} ms"
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:

@@ -15,7 +15,7 @@ from affinet.runtimes.interruption import Interrupted, Interruption, interruptib
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.rerun_command import NotMended, NoViewer, mend
 from affinet.scenario.words import among, shown
-from affinet.verdicts import outcome
+from affinet.verdicts import outcome, timing
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
 from analysis.models.arrays import Array
@@ -151,6 +151,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
+        timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),
     )
 
 

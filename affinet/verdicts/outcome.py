@@ -17,6 +17,7 @@ from affinet.scenario import inputs, loading
 from affinet.verdicts import measures
 from affinet.verdicts.bites import Bite, bites
 from affinet.verdicts.measures import Figures
+from affinet.verdicts.timing import Timing
 from netem.faults.timeline import Timeline
 from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.medium import JOURNAL
@@ -26,7 +27,7 @@ from world.books import history
 from world.books.history import Arrays, digest
 
 SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
+_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "timing.arrows", "run.rrd")
 
 RunVerdict = Literal["pass", "fail", "vacuous"]
 
@@ -37,7 +38,8 @@ class Outcome:
 
     `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
     where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
-    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early.
+    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early;
+    `timing` says how processes kept their time in a run in real time.
     """
 
     verdict: RunVerdict
@@ -54,15 +56,18 @@ class Outcome:
     faults: tuple[Bite, ...]
     timeline: Timeline
     processes: tuple[dict[str, Any], ...]
+    timing: Timing | None
     out: str
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; a figure that does not exist is null."""
-        plain = {name: value for name, value in vars(self).items() if name not in ("simulated_s", "timeline")}
+        plain = {name: value for name, value in vars(self).items() if name not in ("simulated_s", "timeline", "timing")}
         if plain.pop("errors"):
             del plain["tracking_error"]
         plain |= self.errors
         plain["faults"] = [bite.to_json() for bite in self.faults]
+        if self.timing is not None:
+            plain["timing"] = self.timing.to_json()
         plain["wall_s"] = round(self.wall_s, 3)
         plain["ticks_per_s"] = round(self.ticks_per_s, 1)
         plain["real_time_factor"] = round(self.real_time_factor, 3)
@@ -107,6 +112,7 @@ def judge(
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
+    timing: Timing | None = None,
 ) -> Outcome:
     """The outcome of a run.
 
@@ -129,6 +135,8 @@ def judge(
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
+    timing
+        How they kept their time, in a run in real time.
     """
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
     booked = accounts or NOTHING
@@ -156,6 +164,7 @@ def judge(
         faults=tuple(faults),
         timeline=timeline,
         processes=tuple(processes),
+        timing=timing,
         out=str(out),
     )
 

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from affinet.planning import making
 from affinet.scenario.sections import ScenarioError
-from affinet.verdicts import outcome
+from affinet.verdicts import outcome, timing
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import RunVerdict
 from netem.core.plain import PlainError, from_plain
@@ -108,6 +108,7 @@ def evidence(out: Path) -> Evidence:
         wall_s=summary.wall_s,
         processes=[asdict(process) for process in summary.processes],
         out=out,
+        timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),
     )
     if summary.verdict != "fail" and judged.messages != asdict(
         summary.messages

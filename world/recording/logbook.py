@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from netem.core.arrow import NAMES, Stream, named
+from netem.core.pace import Pace
 from netem.faults.timeline import Timeline
 from netem.processes import system_errors
 from world.books.history import Moments, Reports
+from world.books.kept import Kept
 from world.books.realised import GraphWatch, columns
+from world.books.timing import TimingWriter
 from world.brief import RecordOptions
 from world.physics.world import World
 
@@ -44,8 +47,8 @@ class RunWriter:
         The run directory, and a name that no other run has.
     world, channels, reports
         What is flown, and what estimators report of it.
-    books
-        How to write it down.
+    books, pace
+        How to write it down, and how time goes in a run in real time.
 
     Raises
     ------
@@ -54,13 +57,21 @@ class RunWriter:
     """
 
     def __init__(
-        self, out: Path, run: str, world: World, channels: Sequence[str], reports: Reports, books: RecordOptions
+        self,
+        out: Path,
+        run: str,
+        world: World,
+        channels: Sequence[str],
+        reports: Reports,
+        books: RecordOptions,
+        pace: Pace | None = None,
     ) -> None:
         self._every = books.every
         self._channels = list(channels)
         self._out = out
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
         self._watch = GraphWatch(world.formation, world.links, world.dt, books.window)
+        self._timing = None if pace is None else TimingWriter(out)
         self._recorder: Recorder | None = None
         if books.record:
             from world.recording.recorder import Recorder  # Rerun takes a second to import: for those who record
@@ -73,6 +84,7 @@ class RunWriter:
                 reports=reports,
                 every=books.every,
                 viewer=books.viewer,
+                in_real_time=pace is not None,
             )
 
     def __enter__(self) -> RunWriter:
@@ -85,7 +97,7 @@ class RunWriter:
             with system_errors.about(self._out / GRAPH):
                 self._graph.close()
 
-        closing = [close_graph, *([self._recorder.close] if self._recorder else [])]
+        closing = [close_graph, *(open_file.close for open_file in (self._timing, self._recorder) if open_file)]
         with system_errors.afterwards(*closing):
             if error is not None:
                 raise error
@@ -98,3 +110,10 @@ class RunWriter:
             self._graph.write({**table, "channel": named(table["channel"], self._channels)})
         if self._recorder:
             self._recorder.record(moments, timeline, realised)
+
+    def write_kept(self, kept: Sequence[Kept]) -> None:
+        """Write down how processes kept their time."""
+        if self._timing:
+            self._timing.write(kept)
+            if self._recorder:
+                self._recorder.record_kept(kept)

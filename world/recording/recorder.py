@@ -25,6 +25,7 @@ from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
 from world.books.edges import of_swarms
 from world.books.history import Moments, Reports
+from world.books.kept import Kept
 from world.books.realised import Realised
 from world.formation.nominal import Formation
 from world.physics.world import World
@@ -78,6 +79,8 @@ class Recorder:
         Ticks from one recorded moment to the next; messages are counted over all of them.
     viewer
         URL of a viewer that is listening already.
+    in_real_time
+        Whether processes have a time to keep.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class Recorder:
         reports: Reports,
         every: int,
         viewer: str | None = None,
+        in_real_time: bool = False,
     ) -> None:
         self._world = world
         self._formation = world.formation
@@ -113,7 +117,9 @@ class Recorder:
         shown = _shown(world, reports)
         sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
         with writing(path):
-            self._stream.set_sinks(*sinks, default_blueprint=_blueprint(world.formation, shown))
+            self._stream.set_sinks(
+                *sinks, default_blueprint=_blueprint(world.formation, shown, in_real_time=in_real_time)
+            )
         self._stream.send_recording_name(name)
         self._origin = origin(world)
         self._log_static()
@@ -141,6 +147,15 @@ class Recorder:
         self._log_realised(time, realised)
         for layer in self._layers:
             layer.log(time, moments, kept, timeline)
+
+    def record_kept(self, kept: Sequence[Kept]) -> None:
+        """Write how late processes were, in milliseconds, in the ticks that are recorded."""
+        shown = [one for one in kept if one.tick % self._every == 0]
+        for process in sorted({one.process for one in shown}):
+            of_process = [one for one in shown if one.process == process]
+            time = [rr.TimeColumn(TIMELINE, duration=[one.tick * self._dt for one in of_process])]
+            late = np.array([[1000.0 * one.late] for one in of_process])
+            self._scalars(f"timing/{process.replace(' ', '_')}", time, late)
 
     def close(self) -> None:
         """End the file.
@@ -312,7 +327,7 @@ def _shown(world: World, reports: Reports) -> list[type[Layer]]:
     return [layer for layer, wanted in kinds if wanted]
 
 
-def _blueprint(formation: Formation, shown: Collection[type[Layer]]) -> rrb.Blueprint:
+def _blueprint(formation: Formation, shown: Collection[type[Layer]], *, in_real_time: bool) -> rrb.Blueprint:
     reach = float(np.ptp(formation.nominal, axis=0).max())
     trail = rrb.VisibleTimeRange(
         TIMELINE,
@@ -350,6 +365,7 @@ def _blueprint(formation: Formation, shown: Collection[type[Layer]]) -> rrb.Blue
             rrb.TimeSeriesView(origin="graph/connectivity", name="connectivity"),
             rrb.TimeSeriesView(origin="graph/age", name="age of information"),
             rrb.TimeSeriesView(origin="graph/rigidity", name="rigidity"),
+            *([rrb.TimeSeriesView(origin="timing", name="how late processes are (ms)")] if in_real_time else []),
         ),
         rrb.TextLogView(origin="events", name="events"),
     )
