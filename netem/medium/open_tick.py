@@ -12,7 +12,7 @@ from netem.faults.timeline import Conditions
 from netem.medium.in_flight import Entry, Verdicts, Waits, out_of_the_ordinary
 from netem.medium.verdict import Verdict
 
-_SILENT = int(Verdict.SILENT)
+_SILENT, _UNSAID = np.uint8(Verdict.SILENT), np.uint8(Verdict.UNSAID)
 Voice = tuple[int, int]  # an agent, and the row of a channel
 
 
@@ -43,7 +43,7 @@ class OpenTick:
         self.decided, self.marks = verdicts.kind.tolist(), verdicts.mark.tolist()
         self.doubled = (verdicts.copy_due >= 0).tolist()
         self.wait_s, self.copy_wait_s, self.ordered = (np.broadcast_to(of, shape).tolist() for of in waits)
-        self.kind = np.zeros(shape, dtype=np.uint8)
+        self.kind = np.where(verdicts.kind == _SILENT, _SILENT, _UNSAID)
         self.kind[0] = verdicts.kind[0]
         self.due, self.copy_due = np.full(shape, tick), np.full(shape, -1)
         self.mark = np.zeros(shape, dtype=np.uint8)

@@ -2,7 +2,7 @@
 
 Verdicts are those of lockstep: the same draws for the same tick, link and channel. What differs is when a message is said and
 how long it is under way, which are seconds here. A tick is written down once everybody has said what was to be said in it, or
-after some ticks: of whom nothing came by then, nothing was offered.
+after some ticks: what has not been said by then is `UNSAID`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ Said = TypeVar("Said")
 
 _SILENT, _DELIVERED, _DELAYED = int(Verdict.SILENT), int(Verdict.DELIVERED), int(Verdict.DELAYED)
 _STALE = int(Mark.STALE)
+_ROUNDING = 1e-9  # ticks by which a time that is a whole number of them may fall short of it
 
 
 class Begun(NamedTuple):
@@ -198,7 +199,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         return due_s
 
     def _tick_of(self, due_s: float) -> int:
-        return int(due_s / self._dt)
+        return int(due_s / self._dt + _ROUNDING)
 
     def _arrive(self, parcel: Parcel[Said]) -> None:
         now, spoken = self._open[self._tick], parcel.origin

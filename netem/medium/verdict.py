@@ -41,6 +41,7 @@ class Verdict(IntEnum):
     LISTED = 13
     LOST = 14
     OVERFLOW = 15
+    UNSAID = 16  # in real time: whoever was to say it did not, or not in time
 
     @property
     def label(self) -> str:
@@ -69,6 +70,7 @@ STRONGEST_FIRST = (
         Verdict.DROPOUT,
     ),
     *(Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW),
+    Verdict.UNSAID,
 )
 REASONS = tuple(kind for kind in Verdict if kind >= Verdict.DEAD)
 BY_THE_AIR = (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW)

@@ -54,6 +54,7 @@ _LINK_COLOURS = {
     Verdict.LISTED: 0xFFCC80FF,
     Verdict.LOST: 0xFF9F1CFF,
     Verdict.OVERFLOW: 0x26C6DAFF,
+    Verdict.UNSAID: 0xF48FB1FF,
 }
 _FLUSH_S = 20.0
 Layer = Places | Pursued | PerceivedFormations
