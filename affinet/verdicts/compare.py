@@ -89,6 +89,45 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     )
 
 
+@dataclass(frozen=True)
+class Distance:
+    """How far apart two runs are that need not be the same, over the ticks that both have flown.
+
+    Parameters
+    ----------
+    ticks
+        How many.
+    mean, largest
+        Of the distances between an agent in one and in the other, in metres.
+    errors
+        The mean tracking errors, in square metres.
+    verdicts
+        Share of the verdicts that are the same.
+    """
+
+    ticks: int
+    mean: float
+    largest: float
+    errors: tuple[float, float]
+    verdicts: float
+
+    def __str__(self) -> str:
+        return (
+            f"over {self.ticks} ticks agents are {self.mean:.4g} m apart on average and {self.largest:.4g} m at most; tracking "
+            f"error {self.errors[0]:.4g} and {self.errors[1]:.4g} m2; {100 * self.verdicts:.4g} % of the verdicts are the same"
+        )
+
+
+def distance(one: Arrays, other: Arrays) -> Distance | None:
+    """How far apart two runs of the same agents and links are; None where one has no tick."""
+    if not (ticks := min(len(one["error"]), len(other["error"]))):
+        return None
+    apart = np.linalg.norm(one["position"][:ticks] - other["position"][:ticks], axis=-1)
+    same = one["verdicts"][:ticks] == other["verdicts"][:ticks]
+    errors = [float(np.nanmean(arrays["error"][:ticks])) for arrays in (one, other)]
+    return Distance(ticks, float(apart.mean()), float(apart.max()), (errors[0], errors[1]), float(same.mean()))
+
+
 def _first_tick(one: NDArray[Any], other: NDArray[Any]) -> int | None:
     common = min(len(one), len(other))
     unlike = _unlike(one[:common], other[:common])
