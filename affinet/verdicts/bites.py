@@ -123,6 +123,10 @@ def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
     verdicts = arrays["verdicts"][fault.start : fault.end]
     held = timeline.held(number)
     match fault.verb:
+        case Verb.CLOCK if plan.pace is not None:
+            return _agent_ticks(
+                span, fault, lambda tick: ~timeline.at(tick).idle
+            ), "ticks of agents that wake by the clock"
         case Verb.CLOCK:
             wrong = lambda tick: plan.told_mission & ~timeline.at(tick).idle & (timeline.clock(tick) != tick)  # noqa: E731
             return _agent_ticks(span, fault, wrong), "ticks of agents that fly by the clock"

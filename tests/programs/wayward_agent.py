@@ -2,9 +2,11 @@
 
 import os
 import sys
+import threading
 import time
 
 from agents.node import AgentBrief, AgentsNode
+from agents.real_time import RealTimeAgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.session import client
@@ -12,7 +14,7 @@ from netem.wire.session import client
 TICK = 4
 
 
-class Wayward(AgentsNode):
+class Wayward:
     def __init__(self, session, supervisor, brief, wrong):
         super().__init__(session, supervisor, [brief])
         self.wrong = wrong
@@ -27,9 +29,19 @@ class Wayward(AgentsNode):
                     self.mailbox.heard -= 1
                 case "skips":
                     self.mailbox._numbers.next("act")
+                case "hangs":
+                    threading.Event().wait()
                 case "prints":
                     os.write(self._supervisor._events, b'{"event":"kill","agents":[1]}\n')
         super()._tell(tick, action, awake, punctuality)
+
+
+class InLockstep(Wayward, AgentsNode):
+    pass
+
+
+class InRealTime(Wayward, RealTimeAgentsNode):
+    pass
 
 
 def main() -> None:
@@ -37,7 +49,7 @@ def main() -> None:
     brief = supervisor.brief(AgentBrief)
     wrong = sys.argv[1] if brief.agent == 2 or sys.argv[1] == "thinks" else ""
     with Session(client(brief.login)) as session:
-        node = Wayward(session, supervisor, brief, wrong)
+        node = (InLockstep if brief.timer is None else InRealTime)(session, supervisor, brief, wrong)
         node.await_everybody()
         supervisor.tell("ready")
         with supervisor.confessing():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from awaiting import await_true
 from flying import PROCESSES, TRIANGLE, digest_of, plan_of
 from scripted import timeline
 
@@ -106,7 +107,7 @@ def test_losses_are_those_of_lockstep_but_for_what_nobody_said(corridor):
     said = verdicts != Verdict.UNSAID
     assert said.mean() > 0.2
     np.testing.assert_array_equal(verdicts[said] == Verdict.LOST, wanted[said] == Verdict.LOST)
-    assert (verdicts == Verdict.LOST).sum() > 1000
+    assert (verdicts == Verdict.LOST).sum() > 300
     assert outcome.messages["uninstructed"] == 0
 
 
@@ -188,8 +189,7 @@ def test_what_is_injected_holds(out):
     under_way, done = threading.Event(), []
     thread = threading.Thread(target=lambda: done.append(fly(plan, "processes", out, lambda *_: under_way.set())))
     thread.start()
-    while not (out / "access.json").exists() and thread.is_alive() and not under_way.is_set():
-        under_way.wait(0.05)
+    await_true(lambda: (out / "control.json").exists() or under_way.is_set(), "it does not fly")
     access = Access.to(out)
     answer = access.ask(InjectRequest("cut", links=("1-2",), lasts_s=0.3).order(plan.scenario))
     thread.join()
