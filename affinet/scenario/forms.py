@@ -27,6 +27,8 @@ EXAMPLES: Mapping[str, Any] = {
     "time": {"dt": 0.01, "duration": 60.0},
     "time.dt": 0.01,
     "time.duration": 60.0,
+    "time.real.timers": [{"agents": [4], "phase": 0.5}],
+    "time.real.timers.agents": [4, "leaders"],
     "sensing": {"sigma": 0.1},
     "sensing.covariance": [[0.01, 0.0], [0.0, 0.01]],
     "dynamics.covariance": [[0.01, 0.0], [0.0, 0.01]],

@@ -69,6 +69,7 @@ _FAULTS: list[dict[str, Any]] = [
     {"verb": "cut", "links": ["3->1"], "when": {"tracking_error_below": 0.001, "lasting": 0.05}, "at": 0.05},
     {"verb": "cut", "links": ["1->3"], "when": {"tracking_error_above": 100.0, "lasting": 0.05}},
 ]
+_TIMER = {"agents": [1], "rate": 1.0, "phase": 0.2, "jitter": 0.1, "drift": 0.1, "listens": 0.4}
 _FLOWN: dict[str, Any] = {
     "formation": {
         "nodes": [[2.0, 0.0], [1.0, 1.0], [1.0, -1.0], [0.0, 1.0], [0.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]],
@@ -83,7 +84,7 @@ _FLOWN: dict[str, Any] = {
             {"time": 0.2, "theta": SQUARE, "offset": [1.0, 0.0], "angle": 0.2},
         ]
     },
-    "time": SHORT,
+    "time": {**SHORT, "real": {"factor": 1.0, "late": 1.0, "timers": [_TIMER]}},
     "sensing": {"samples": 2, "sigma": 0.1},
     "agents": {"estimator": "ga-rkf", "law": "varying-velocity", "leader_gain": 1.0, "limit": 5.0, "per_process": 2},
 }
