@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from agents.agent import AgentAction
 from agents.batch import beside_others, put_back
 from agents.loading import capabilities
 from agents.node import AgentBrief, AgentsNode
@@ -17,6 +19,14 @@ from netem.wire import messages
 from netem.wire.arrays import WireError
 from netem.wire.carrier import Session
 from netem.wire.session import HUB
+
+
+class Moment(NamedTuple):
+    """When agents wake, when they act, and when they wake again, in simulated seconds."""
+
+    wakes: float
+    acts: float
+    following: float
 
 
 class RealTimeAgentsNode(AgentsNode):
@@ -33,6 +43,7 @@ class RealTimeAgentsNode(AgentsNode):
         self._only_of_now = any(capabilities.wants(algorithm).synchronous for algorithm in algorithms)
         self._senses: dict[int, messages.SenseInbox] = {}
         self._pending: dict[int, list[messages.Broadcast]] = {agent: [] for agent in self._mailboxes}
+        self._wall: WallTime
         self._is_over = False
         self._lived = -1
         self._missed = 0
@@ -40,35 +51,41 @@ class RealTimeAgentsNode(AgentsNode):
     def run(self) -> None:
         """Wake, sense, speak, listen and act until the medium says that the run is over."""
         be_prompt()
-        wall = self._await_the_first()
-        clock, gains, number = OwnClock.right(self._timer.drift), 0.0, 0
+        self._wall = self._await_the_first()
+        clock, number = OwnClock.right(self._timer.drift), 0
         while not self._is_over:
-            number = self._timer.after(clock.says(wall.now()), number)
-            moment = clock.when(self._timer.moment(number))
+            following = self._timer.after(clock.says(self._wall.now()), number)
+            self._missed += following - number
+            number = following
+            moment = self._moment(clock, number)
             self._supervisor.waits(max(self._lived, 0), "its inbox", lambda: (HUB,))
-            wall.wait_until(moment)
+            self._wall.wait_until(moment.wakes)
             self._listen()
-            inboxes = self._unlived()
-            if inboxes and not self._is_over:
-                following = clock.when(self._timer.moment(number + 1))
-                self._wake(wall, moment, following, moment + self._timer.listens / clock.speed, inboxes)
-            now_gains = max((inbox.gains for inbox in inboxes.values()), key=abs, default=gains)
-            if now_gains != gains:
-                gains = now_gains
-                right = OwnClock.right(self._timer.drift)
-                clock = clock.running(wall.now(), right.speed + gains) if gains else right
-            after = self._timer.after(clock.says(wall.now()), number + 1)
-            self._missed += after - number - 1
-            number = after
+            if (inboxes := self._unlived()) and not self._is_over:
+                self._live_by(moment, inboxes)
+            before, clock = clock, self._set(clock)
+            # Whose clock is set wakes by what it says now, and has missed nothing by that.
+            number = number + 1 if clock is before else self._timer.after(clock.says(self._wall.now()), 0)
+
+    def _moment(self, clock: OwnClock, number: int) -> Moment:
+        wakes = clock.when(self._timer.moment(number))
+        following = clock.when(self._timer.moment(number + 1))
+        return Moment(wakes, wakes + self._timer.listens / clock.speed, following)
+
+    def _set(self, clock: OwnClock) -> OwnClock:
+        """The clock as it runs from now on."""
+        gains = max((inbox.gains for inbox in self._senses.values()), key=abs, default=0.0)
+        right = OwnClock.right(self._timer.drift)
+        if clock.speed == right.speed + gains:
+            return clock
+        return clock.running(self._wall.now(), right.speed + gains) if gains else right
 
     def _await_the_first(self) -> WallTime:
         self._supervisor.waits(0, "its inbox", lambda: (HUB,))
-        if self._roster is not None:
-            self._come_back(self._roster.next())
+        while not (awake := self._taking_part()):
+            continue
         while not self._senses and not self._is_over:
-            for agent, mailbox in self._mailboxes.items():
-                self._take(agent, mailbox.next_inbox())
-                break
+            self._take(awake[0], self._mailboxes[awake[0]].next_inbox())
         began = next(iter(self._senses.values())).began if self._senses else 0.0
         if began is None:
             raise WireError("the medium: SenseInbox: began: a run in real time begins at a time (see docs/protocol.md)")
@@ -101,47 +118,37 @@ class RealTimeAgentsNode(AgentsNode):
             if agent in self._senses and self._senses[agent].k == newest
         }
 
-    def _wake(
-        self,
-        wall: WallTime,
-        moment: float,
-        following: float,
-        acts: float,
-        inboxes: Mapping[int, messages.SenseInbox],
-    ) -> None:
-        late, (tick, *_) = wall.now() - moment, [inbox.k for inbox in inboxes.values()]
+    def _live_by(self, moment: Moment, inboxes: Mapping[int, messages.SenseInbox]) -> None:
+        late, tick = self._wall.now() - moment.wakes, next(iter(inboxes.values())).k
         self._lived = tick
         self._supervisor.works(tick)
         try:
-            self._live_through(tick, wall, acts, following, late, inboxes)
+            action, late_to_act = self._live_till(moment.acts, tick, inboxes)
         except UserCodeError as error:
             error.tick = tick
             raise
+        missed, self._missed = self._missed + (self._wall.now() > moment.following), 0
+        late = max(late, late_to_act) / self._timer.factor
+        self._tell(tick, action, [*inboxes], messages.Punctuality(late=late, missed=missed))
 
-    def _live_through(
-        self,
-        tick: int,
-        wall: WallTime,
-        acts: float,
-        following: float,
-        late: float,
-        inboxes: Mapping[int, messages.SenseInbox],
-    ) -> None:
+    def _live_till(
+        self, acts: float, tick: int, inboxes: Mapping[int, messages.SenseInbox]
+    ) -> tuple[AgentAction, float]:
+        """What they do in a tick, and by how much they were late to decide it, in simulated seconds."""
         before, living = self._state, self._state
         if some_idle := len(inboxes) < len(self._mailboxes):
             idle = ~np.isin(self._numbers, [*inboxes])
             living = beside_others(before, idle, tick)
         sensed = self._arrivals.sensed(inboxes)
-        state = self._speak(tick, living, sensed, inboxes, wall.now())
-        wall.wait_until(acts)
-        late = max(late, wall.now() - acts)
+        state = self._speak(tick, living, sensed, inboxes, self._wall.now())
+        self._wall.wait_until(acts)
+        late = self._wall.now() - acts
         self._listen()
         heard = self._arrivals.heard(tick, self._heard_by(tick, inboxes))
         state, action = self._agents.act(state, sensed.clock, heard, sensed.position, sensed.motion, sensed.sighting)
         self._state = put_back(idle, before, state) if some_idle else state
         self._keep()
-        missed, self._missed = self._missed + (wall.now() > following), 0
-        self._tell(tick, action, [*inboxes], messages.Punctuality(late=late / self._timer.factor, missed=missed))
+        return action, late
 
     def _heard_by(self, tick: int, awake: Collection[int]) -> dict[int, list[messages.Broadcast]]:
         heard = {}
