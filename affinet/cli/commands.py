@@ -161,7 +161,7 @@ def _replay(parsed: argparse.Namespace) -> int:
     from netem.medium.journal import JournalError  # pyarrow takes a while to import
 
     plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=files.working_directory())
-    flown = parsed.directory / history.FILE
+    flown = parsed.directory / history.ARRAYS
     before = history.load(flown) if flown.exists() and not overrides else None
     for finding in plan.findings:
         if finding.check == "inputs":
@@ -172,7 +172,7 @@ def _replay(parsed: argparse.Namespace) -> int:
         raise ScenarioError(f"{parsed.directory}: {error}") from error
     if overrides:
         return status  # it was to be another run
-    again = parsed.out / history.FILE
+    again = parsed.out / history.ARRAYS
     if before is None or not again.exists():
         gone = flown if before is None else again
         print(f"{gone}: not there, so no bit was compared; repeat the run with `affinet run`", file=sys.stderr)  # noqa: T201
@@ -194,7 +194,7 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
             if done.digest is None or done.user_code:
                 print(f"{runtime}: {'; '.join(done.reasons)}", file=sys.stderr)  # noqa: T201
                 return USER_CODE if done.user_code else FAIL
-            flown.append(history.load(Path(folder) / str(number) / history.FILE))
+            flown.append(history.load(Path(folder) / str(number) / history.ARRAYS))
     for runtime, arrays in zip(runs[1:], flown[1:], strict=True):
         if difference := compare.first_difference(flown[0], arrays, plan.world.links, plan.channels):
             print(f"inprocess, then {runtime}: {difference}")  # noqa: T201

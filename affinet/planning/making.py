@@ -99,7 +99,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
     if judged_by is not None:
         recordings.refuse_to_judge(loading.resolved(out), given)
     try:
-        plan = make(given, injected=journal.injected(journal.read(file)), journal=judged_by)
+        plan = make(given, injected=journal.told(file).injected, journal=judged_by)
         if judged_by is not None:
             journal.check(journal.read(judged_by), plan.channels, plan.world.ticks)
     except journal.JournalError as error:

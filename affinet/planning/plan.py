@@ -93,7 +93,7 @@ class Plan:
     def books(self, viewer: str | None) -> RecordOptions:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
-        return RecordOptions(record.every, self.window, record.enabled, viewer)
+        return RecordOptions(record.every, max(1, int(1.0 / self.world.dt)), self.window, record.enabled, viewer)
 
     @property
     def window(self) -> int:

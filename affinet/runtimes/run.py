@@ -19,11 +19,13 @@ from affinet.verdicts import outcome
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
 from analysis.models.arrays import Array
+from netem.core.parts import parts
 from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import said
 from netem.processes.user_code import UserCodeError
 from netem.wire import keys
 from world.books import history
+from world.books.archive import Archive
 from world.books.history import History, Moments
 from world.recording.file import wrong_with
 
@@ -113,7 +115,7 @@ def rehearse(plan: Plan) -> Evidence:
 
 def evidence(plan: Plan, done: Outcome) -> Evidence | None:
     """A run with the arrays in its directory; None where it left none."""
-    path = Path(done.out) / history.FILE
+    path = Path(done.out) / history.ARRAYS
     return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
@@ -123,23 +125,23 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
     flight = launcher.flight
     launcher.fly()
-    path, recording, book = out / history.FILE, out / "run.rrd", out / JOURNAL
+    path, recording, book = out / history.ARRAYS, parts(out / "run.rrd"), out / JOURNAL
     failure, timeline, accounts = flight.failure, plan.timeline, None
     try:
         if book.exists():
-            table = journal.read(book)
-            timeline, accounts = timeline.facing(journal.injected(table)), journal.accounts(table)
+            told = journal.told(book)
+            timeline, accounts = timeline.facing(told.injected), told.accounts
         for trigger, tick in flight.fired.items():
             timeline = timeline.fired([trigger], tick)
     except journal.JournalError as error:
         failure = "; ".join([*filter(None, [failure]), str(error)])
-    if failure and not path.exists() and recording.exists():
+    if failure and recording and wrong_with(recording[-1]):
         try:
-            mend(recording)  # the world was killed, or never got far: it could not close its recording
+            mend(recording[-1])  # the world was killed, or never got far: it could not close its recording
         except (NotMended, NoViewer, OSError) as error:
             failure += f"; {said(error) if isinstance(error, OSError) else error}"
     if not failure and plan.scenario.record.enabled:
-        failure = wrong_with(recording)
+        failure = wrong_with(recording[-1] if recording else out / "run.rrd")
     return outcome.judge(
         plan,
         timeline,
@@ -159,11 +161,12 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     from world.recording.logbook import RunWriter
 
     swarm, books = InProcessSwarm(plan), plan.books(viewer)
-    flown = History(plan.world, len(plan.channels), plan.reports)
+    path, flown = out / history.ARRAYS, Archive(out / history.ARRAYS, plan.world, len(plan.channels), plan.reports)
     booked: journal.Writer | None = None
     started, failure, broken = time.perf_counter(), None, None
     try:
         with (
+            flown,
             journal.Writer(out / JOURNAL, plan.world.links, plan.channels, books.batch) as booked,
             RunWriter(out, keys.fresh(), plan.world, plan.channels, plan.reports, books) as logbook,
         ):
@@ -182,15 +185,10 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     except OSError as error:
         failure = f"the run could not be written down: {said(error)}"
     wall_s = time.perf_counter() - started
-    try:
-        if flown.ticks:
-            flown.save(out / history.FILE)
-    except OSError as error:
-        failure = failure or f"the run could not be written down: {said(error)}"
     return outcome.judge(
         plan,
         swarm.timeline,
-        flown.arrays() if flown.ticks else None,
+        history.load(path) if path.exists() else None,
         accounts=booked.accounts if booked else None,
         uninstructed=0,
         failure=failure,

@@ -26,7 +26,7 @@ from world.books import history
 from world.books.history import Arrays, digest
 
 SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "run.rrd")
+_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.ARRAYS, JOURNAL, "graph.arrows", "run.rrd")
 
 RunVerdict = Literal["pass", "fail", "vacuous"]
 
