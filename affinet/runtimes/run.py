@@ -145,7 +145,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     return outcome.judge(
         plan,
         timeline,
-        history.load(path) if path.exists() else None,
+        history.load(path, mapped=True) if path.exists() else None,
         accounts=accounts,
         uninstructed=flight.uninstructed,
         failure=failure,
@@ -188,7 +188,7 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     return outcome.judge(
         plan,
         swarm.timeline,
-        history.load(path) if path.exists() else None,
+        history.load(path, mapped=True) if path.exists() else None,
         accounts=booked.accounts if booked else None,
         uninstructed=0,
         failure=failure,

@@ -195,7 +195,11 @@ class Timeline:
 
     def starting(self, tick: int) -> list[Fault]:
         """Faults whose first tick this is."""
-        return [self.faults[number] for number in self._starts.get(tick, ())]
+        return [self.faults[number] for number in self.starting_numbers(tick)]
+
+    def starting_numbers(self, tick: int) -> Sequence[int]:
+        """Numbers of the faults whose first tick this is."""
+        return self._starts.get(tick, ())
 
     def ending(self, tick: int) -> list[Fault]:
         """Faults that hold no longer from this tick on."""

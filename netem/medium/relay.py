@@ -7,6 +7,7 @@ arrays of all agents in one process, as bytes over the wire.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import copy
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -141,6 +142,12 @@ class Relay(Generic[Said]):
         injected = self.timeline.injected
         changed, self._told = injected != self._told, injected
         return Relayed(tick, self.timeline.at(tick), verdicts, delivery, injected if changed else None)
+
+    def under(self, timeline: Timeline) -> Relay[Said]:
+        """A relay that goes on from here under another timeline, tick by tick beside this one."""
+        other = copy(self)
+        other._medium = self._medium.under(timeline)
+        return other
 
     def lies(self, tick: int, channel: str, agent: int) -> bool:
         """Whether this agent says on this channel what is not so."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from netem.processes import system_errors
 
 ENDING = ".npy"
-_IN_MEMORY = 2**24  # bytes up to which an array is read; a larger one is mapped, and so read where it is looked at
+_IN_MEMORY = 2**24  # bytes up to which an array is read, unless it is wanted mapped; a mapped one takes a descriptor
 
 
 class GrowingArray:
@@ -75,8 +75,8 @@ class GrowingArray:
         return header.getvalue()
 
 
-def read(path: Path) -> NDArray[Any]:
-    """An array of a file: one that is large is mapped, and cannot be written to.
+def read(path: Path, *, mapped: bool = False) -> NDArray[Any]:
+    """An array of a file: one that is large, or is wanted so, is mapped: read where it is looked at, and never written to.
 
     Raises
     ------
@@ -94,10 +94,10 @@ def read(path: Path) -> NDArray[Any]:
             raise ValueError("it holds no plain rows of numbers")
         if os.fstat(file.fileno()).st_size < begins + count * dtype.itemsize:
             raise ValueError(f"it breaks off before its {shape[:1]} rows end")
-        if count * dtype.itemsize <= _IN_MEMORY:
+        size = count * dtype.itemsize
+        if size <= _IN_MEMORY and not mapped:
             return np.fromfile(file, dtype, count).reshape(shape)
-        mapped = mmap.mmap(file.fileno(), begins + count * dtype.itemsize, access=mmap.ACCESS_READ)
-    return np.ndarray(shape, dtype, mapped, begins)
+        return np.ndarray(shape, dtype, mmap.mmap(file.fileno(), begins + size, access=mmap.ACCESS_READ), begins)
 
 
 def let_go(arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -270,7 +270,7 @@ class Damaged(ValueError):
         return f"{self.file}: not what a run wrote there: {self.why}; fly the run again, or restore the file"
 
 
-def load(folder: Path, only: Collection[str] | None = None) -> Arrays:
+def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = False) -> Arrays:
     """The arrays of a run by name, as far as they were written; those that are large are mapped, and cannot be written to.
 
     Parameters
@@ -279,6 +279,8 @@ def load(folder: Path, only: Collection[str] | None = None) -> Arrays:
         Which has them.
     only
         Names of those that are wanted, by default all.
+    mapped
+        Whether those that are small are mapped too.
 
     Raises
     ------
@@ -287,7 +289,8 @@ def load(folder: Path, only: Collection[str] | None = None) -> Arrays:
     Damaged
         When they are not whole, or not those of a run any more.
     """
-    arrays = {unquote(file.stem): _of(file) for file in sorted(folder.iterdir()) if file.suffix == growing.ENDING}
+    files = [file for file in sorted(folder.iterdir()) if file.suffix == growing.ENDING]
+    arrays = {unquote(file.stem): _of(file, mapped=mapped) for file in files}
     try:
         whole = _up_to_the_last_tick(arrays)
         _refuse_other_forms(whole)
@@ -297,9 +300,9 @@ def load(folder: Path, only: Collection[str] | None = None) -> Arrays:
     return whole if only is None else {name: whole[name] for name in only}
 
 
-def _of(file: Path) -> NDArray[Any]:
+def _of(file: Path, *, mapped: bool) -> NDArray[Any]:
     try:
-        return growing.read(file)
+        return growing.read(file, mapped=mapped)
     except (ValueError, TypeError, EOFError, MemoryError, OverflowError, SyntaxError) as error:
         raise Damaged(file, str(error)) from error
 
