@@ -133,7 +133,7 @@ def _make(given: Scenario) -> Plan:
         reports = tryout.silent_tick(agents, centre)
     spoken = agents.channels()
     names = (channels.SENSE, *sorted([channels.MEASUREMENT, *spoken]))
-    findings.append(limits.run(first, len(names), reports, given.time, memory))
+    findings.append(limits.run(first, given.time, memory))
     _refuse_fatal(findings)
     world = world_of(given, formation)
     bits = network.message_bits(names, spoken, world.links, brief.dimension)

@@ -9,7 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, cast, get_args
 
-from affinet.planning.plan import Plan
+import psutil
+
+from affinet.planning import limits
+from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
@@ -92,8 +95,14 @@ def rehearse(plan: Plan) -> Evidence:
     ------
     UserCodeError
         When estimator or law do something wrong.
+    PlanError
+        When it is too long for the memory.
     """
-    swarm, flown = InProcessSwarm(plan), History(plan.world, len(plan.channels), plan.reports)
+    channels = len(plan.channels)
+    fits = limits.rehearsal(plan.world, channels, plan.reports, psutil.virtual_memory().total)
+    if fits.fatal:
+        raise PlanError([fits])
+    swarm, flown = InProcessSwarm(plan), History(plan.world, channels, plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
     wall_s, arrays = time.perf_counter() - started, flown.arrays()

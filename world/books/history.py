@@ -26,7 +26,7 @@ Reports = Mapping[str, tuple[int, ...]]  # what estimators report beyond edges, 
 
 ARRAYS = "arrays"  # in a run directory: a folder, with a file for each array
 
-_SPAN = 4096  # ticks that are looked at together, of arrays that may be larger than the memory
+_SPAN = 512  # ticks that are looked at together, of arrays that may be larger than the memory
 
 # Of each array by tick the kind of its numbers, and how many axes it has.
 _BY_TICK = {

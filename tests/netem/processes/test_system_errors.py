@@ -342,8 +342,6 @@ def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, m
             raise KeyError("first")
 
 
-
-
 def test_access_that_is_gone_does_not_hide_what_ended_the_run(tmp_path):
     def interrupted():
         with Access("run", Login("", "", "")).granted(tmp_path):
