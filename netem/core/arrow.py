@@ -120,13 +120,14 @@ def scan(path: Path, schema: Any, only: str | None = None) -> Iterator[tuple[Any
         When there is none, or it has other columns.
     """
     names = schema.names if only is None else [only]
-    options = pa.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
-    for number, file in enumerate(parts(path) or [path]):
-        if number and not file.stat().st_size:  # killed where it began
-            return
+    options = pa.ipc.IpcReadOptions(included_fields=None if only is None else [schema.get_field_index(only)])
+    files = parts(path) or [path]
+    for file in files:
         try:
             stream = pa.ipc.open_stream(pa.memory_map(str(file)), options=options)
         except (OSError, pa.ArrowInvalid) as error:
+            if file == files[-1] != path:  # who wrote it was killed where it began
+                return
             raise TableError(f"{file}: no such table: {error}") from error
         if stream.schema.names != names:
             raise TableError(f"{file}: its columns are {stream.schema.names}, not {names}")
