@@ -119,6 +119,8 @@ class Recorder:
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
+        if self._path.exists() and self._path.stat().st_size >= LARGEST:
+            self._begin()
         for tick in moments.ticks.tolist():
             self._log_events(tick, timeline)
         kept = slice(None, None, self._every)
@@ -138,8 +140,6 @@ class Recorder:
         self._log_realised(time, realised)
         for layer in self._layers:
             layer.log(time, moments, kept, timeline)
-        if self._path.exists() and self._path.stat().st_size >= LARGEST:
-            self._begin()
 
     def close(self) -> None:
         """End the file.
