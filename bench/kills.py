@@ -3,6 +3,8 @@
     python bench/kills.py [--kills 100] [--seed 1] [--only launcher,nursery,world,netem,agent] [--moments 0 6]
 
 The victim and the moment are drawn: from the victim's start to three seconds of flight, so that many die before the first tick.
+Of arrays, journal, graph and recording all is there but the last second of the run, however it was killed; `everybody` in
+`--only` is all processes at once, who then leave what they had not written.
 The exit status is 1 when a row is not ok. A kill is drawn from its own seed: `--kills 1 --seed N` repeats it, as far as the
 machine is as fast. `ctrl-c` in `--only` interrupts the launcher in place of killing something.
 """
@@ -30,13 +32,16 @@ import psutil
 from rerun.chunk import RrdReader
 
 from affinet.runtimes.forked import NURSERY
+from netem.core import arrow
 from netem.medium import journal
 from netem.medium.medium import JOURNAL
 from netem.processes.supervised import called
-from world.recording.logbook import RECORDING
+from world.books import history
+from world.recording.logbook import GRAPH, GRAPH_SCHEMA, RECORDING
 
-_ROLES = ("launcher", NURSERY, "world", "netem", "agent")
+_ROLES = ("launcher", NURSERY, "world", "netem", "agent", "everybody")
 _LIMIT_S, _FLIGHT_S, _PATIENCE_S = 5.0, 3.0, 90.0
+_A_SECOND = 100  # ticks, of corridor
 
 
 @dataclass
@@ -153,14 +158,15 @@ def kill(scenario: str, seed: int, roles: tuple[str, ...], moments: Mapping[str,
     done = Kill(seed, role, draw.uniform(*moments[role]))
     name = called(1 + draw.randrange(7)) if done.role == "agent" else done.role
     with flying(scenario) as run:
-        ours = done.role in ("launcher", "ctrl-c")
+        ours = done.role in ("launcher", "ctrl-c", "everybody")
         victim = psutil.Process(run.launcher.pid) if ours else run.child(name)
         waiting = os.pidfd_open(victim.pid)
         if select.select([waiting], [], [], done.moment_s)[0]:
             done.wrong.append("it had ended before it was killed")
         os.close(waiting)
-        with suppress(psutil.NoSuchProcess):
-            victim.send_signal(signal.SIGINT if done.role == "ctrl-c" else signal.SIGKILL)
+        for process in run.processes() if done.role == "everybody" else [victim]:
+            with suppress(psutil.NoSuchProcess):
+                process.send_signal(signal.SIGINT if done.role == "ctrl-c" else signal.SIGKILL)
         done.gone_s, left = _gone(run)
         done.wrong += [f"left behind: {process}: {_name(process)}" for process in left]
         if done.gone_s > _LIMIT_S:
@@ -185,7 +191,7 @@ def _gone(run: Run) -> tuple[float, list[psutil.Process]]:
 
 def _wrong_end(run: Run, name: str, pid: int) -> list[str]:
     status = run.launcher.poll()
-    if name == "launcher":
+    if name in ("launcher", "everybody"):
         return [] if status == -signal.SIGKILL else [f"exit status {status}"]
     if name == "ctrl-c":  # Python itself dies of the signal while it still imports
         fine = status in (130, -signal.SIGINT)
@@ -204,18 +210,32 @@ def _wrong_end(run: Run, name: str, pid: int) -> list[str]:
 
 
 def _read(run: Run, done: Kill) -> None:
-    book, recording, summary = run.out / JOURNAL, run.out / RECORDING, run.out / "summary.json"
+    book, graph, recording = run.out / JOURNAL, run.out / GRAPH, run.out / RECORDING
+    arrays, summary = run.out / history.ARRAYS, run.out / "summary.json"
     flown = summary.exists() and json.loads(summary.read_text())["wall_s"] > 0.0
     try:
-        done.ticks = int(journal.read(book)["tick"].to_numpy().max(initial=-1)) + 1 if book.exists() else 0
+        done.ticks = _last(journal.read(book)) + 1 if _has_begun(book) else 0
+        kept = len(history.load(arrays)["error"]) if arrays.exists() else 0
+        looked_at = _last(arrow.read(graph, GRAPH_SCHEMA)) + 1 if _has_begun(graph) else 0
         done.recorded = recording.exists() and _moments(recording) >= 0
-    except (journal.JournalError, RuntimeError, ValueError, Warning) as error:
+    except (journal.JournalError, arrow.TableError, history.Damaged, RuntimeError, ValueError, Warning) as error:
         done.wrong.append(f"unreadable: {error}")
         return
     if not done.recorded and (flown or done.ticks):
         done.wrong.append("it flew, and there is no recording")
-    if done.recorded and bool(_moments(recording)) != bool(done.ticks):
+    if done.recorded and bool(_moments(recording)) != bool(done.ticks) and done.role != "everybody":
         done.wrong.append(f"{done.ticks} ticks in the journal, {_moments(recording)} moments in the recording")
+    for what, ticks in (("arrays", kept), ("graph", looked_at)):
+        if abs(ticks - done.ticks) > _A_SECOND:
+            done.wrong.append(f"{done.ticks} ticks in the journal, and {ticks} in the {what}")
+
+
+def _has_begun(table: Path) -> bool:
+    return table.exists() and table.stat().st_size > 0
+
+
+def _last(table: Any) -> int:
+    return int(table["tick"].to_numpy().max(initial=-1))
 
 
 def _moments(recording: Path) -> int:

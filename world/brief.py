@@ -11,7 +11,7 @@ from netem.faults.trigger import Trigger
 from netem.wire.session import Login
 from world.physics.world import World
 
-_LEAST_BATCH = 50
+_MOST_OF_A_BATCH = 50
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class RecordOptions:
     ----------
     every
         Ticks from one moment that is recorded, and whose graph is looked at, to the next.
+    second
+        Ticks of a second of the run, at least 1.
     window
         Ticks over which links count as working together.
     record
@@ -31,14 +33,15 @@ class RecordOptions:
     """
 
     every: int
+    second: int
     window: int
     record: bool
     viewer: str | None
 
     @property
     def batch(self) -> int:
-        """How many ticks are written down at once: a multiple of those from one recorded moment to the next."""
-        return _LEAST_BATCH + -_LEAST_BATCH % self.every
+        """How many ticks are written down at once: no more than a second of them, which who is killed has not written yet."""
+        return min(self.second, _MOST_OF_A_BATCH)
 
 
 @dataclass(frozen=True)

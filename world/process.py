@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +14,8 @@ from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.session import client
 from world import flight
-from world.books.history import FILE as ARRAYS
-from world.books.history import UNTOLD, History, Moment, gather
+from world.books.archive import Archive
+from world.books.history import ARRAYS, UNTOLD, Moment, gather
 from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier
 from world.flight import FlownTick
@@ -33,16 +32,17 @@ class WorldNode:
     ----------
     session, supervisor, brief
         Where, watched by whom, and which world.
-    logbook
+    archive, logbook
         Where it is written down.
     """
 
-    def __init__(self, session: Session, supervisor: Supervisor, brief: WorldBrief, logbook: RunWriter) -> None:
-        self._world, self._supervisor, self._logbook = brief.world, supervisor, logbook
+    def __init__(
+        self, session: Session, supervisor: Supervisor, brief: WorldBrief, archive: Archive, logbook: RunWriter
+    ) -> None:
+        self._world, self._supervisor, self._archive, self._logbook = brief.world, supervisor, archive, logbook
         self._carrier, self._clock = _of_time(session, supervisor, brief, self._meanwhile)
         self._batch = brief.books.batch
         self._flown: dict[int, FlownTick[ProcessesActed]] = {}
-        self.history = History(brief.world, len(brief.channels), brief.reports)
 
     @property
     def uninstructed(self) -> int:
@@ -82,7 +82,7 @@ class WorldNode:
         )
 
     def _write_down(self) -> None:
-        first, entries = self.history.ticks, self._carrier.entries
+        first, entries = self._archive.ticks, self._carrier.entries
         following = first
         while following in self._flown and following in entries:
             following += 1
@@ -92,9 +92,9 @@ class WorldNode:
         self._logbook.write_kept(kept)
         timeline = self._carrier.timeline
         moments = gather(timeline, first, [self._moment(self._flown[tick]) for tick in range(first, following)])
-        self.history.extend(moments, self._flown[following - 1].following.position)
+        self._archive.extend(moments, self._flown[following - 1].following.position)
         self._logbook.write(moments, timeline)
-        self._supervisor.tell("tick", k=self.history.ticks, error=float(moments.error[-1]))
+        self._supervisor.tell("tick", k=self._archive.ticks, error=float(moments.error[-1]))
         for tick in range(first, following):  # at the end: a signal may come between any two lines
             del self._flown[tick], entries[tick]
 
@@ -119,17 +119,14 @@ def main() -> None:
     do_without_pandas()
     out = Path(brief.out)
     with supervisor.confessing(), Session(client(brief.login)) as session:
-        last: list[Callable[[], None]] = []
         with (
-            system_errors.afterwards(lambda: [step() for step in last]),
+            Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
             RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,
         ):
-            node = WorldNode(session, supervisor, brief, logbook)
+            node = WorldNode(session, supervisor, brief, archive, logbook)
             node.await_everybody()
             supervisor.tell("ready")
             supervisor.await_order("go")
-            # Where there are arrays the recording is whole: somebody killed here leaves no arrays, and it will be mended.
-            last.append(partial(node.history.save, out / ARRAYS))
             with supervisor.confessing():
                 node.run()
         supervisor.tell("done", uninstructed=node.uninstructed)

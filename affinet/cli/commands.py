@@ -161,7 +161,7 @@ def _replay(parsed: argparse.Namespace) -> int:
     from netem.medium.journal import JournalError  # pyarrow takes a while to import
 
     plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=files.working_directory())
-    flown = parsed.directory / history.FILE
+    flown = parsed.directory / history.ARRAYS
     by_the_clock = "real" in (plan.scenario.time.mode, loading.resolved(parsed.directory).time.mode)
     before = history.load(flown) if flown.exists() and (by_the_clock or not overrides) else None
     for finding in plan.findings:
@@ -171,7 +171,7 @@ def _replay(parsed: argparse.Namespace) -> int:
         status = _fly(plan, "replay", parsed)
     except JournalError as error:
         raise ScenarioError(f"{parsed.directory}: {error}") from error
-    again = parsed.out / history.FILE
+    again = parsed.out / history.ARRAYS
     if by_the_clock and before is not None and again.exists():  # what comes of a clock comes once
         print(compare.distance(before, history.load(again)), file=sys.stderr)  # noqa: T201
         return status
@@ -198,7 +198,7 @@ def _check_determinism(parsed: argparse.Namespace) -> int:
             if done.digest is None or done.user_code:
                 print(f"{runtime}: {'; '.join(done.reasons)}", file=sys.stderr)  # noqa: T201
                 return USER_CODE if done.user_code else FAIL
-            flown.append(history.load(Path(folder) / str(number) / history.FILE))
+            flown.append(history.load(Path(folder) / str(number) / history.ARRAYS))
     for runtime, arrays in zip(runs[1:], flown[1:], strict=True):
         if difference := compare.first_difference(flown[0], arrays, plan.world.links, plan.channels):
             print(f"inprocess, then {runtime}: {difference}")  # noqa: T201

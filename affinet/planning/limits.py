@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
 from affinet.scenario.units import LARGEST, SMALLEST
 from analysis.models.finding import Finding
 from netem.core.links import Links
-from world.books.history import History
+from world.books.history import forms
 from world.formation.nominal import Formation
 from world.physics.world import World
 
-_COPIES = 2  # the arrays of a run, and what is made of them at its end
+_COPIES = 2  # of the maps, the launcher's and the world's; of arrays, they and what is made of them at the end
 _AT_WORK = 4  # arrays like the covariance of the disturbances, while it is put together
 _LEAST_OF_A_TICK = 1e-6  # a delay below this share of a tick would pass as none
 
@@ -39,31 +39,46 @@ def swarm(formation: Formation, links: Links, memory: int) -> Finding:
     )
 
 
-def run(first: World, channels: int, reports: Mapping[str, tuple[int, ...]], time: TimeSection, memory: int) -> Finding:
-    """Whether a run fits into a memory of so many bytes.
+def run(first: World, time: TimeSection, memory: int) -> Finding:
+    """Whether a run fits into a memory of so many bytes: what happens in it goes to disk, where it is to fly is in memory.
 
     Parameters
     ----------
     first
         The world of its first tick.
-    channels, reports
-        How many channels there are, and what the estimator reports, by name, with the shape for one agent.
     time
         Of the run.
     memory
         Of the machine, in bytes.
     """
-    history = History(replace(first, ticks=1), channels, reports)
-    history.ticks = 1
     maps = (first.manoeuvre.theta, first.manoeuvre.offset)
-    of_a_tick = [*history.arrays().values(), *(of_ticks[0] for of_ticks in maps)]
-    each = _COPIES * sum(array.nbytes for array in of_a_tick)
+    copies = _COPIES + int(first.formation.is_leader.sum())
+    return _ticks_fit(copies * sum(of_ticks[0].nbytes for of_ticks in maps), first, time.ticks, memory)
+
+
+def rehearsal(world: World, channels: int, reports: Mapping[str, tuple[int, ...]], memory: int) -> Finding:
+    """Whether all that happens in a run fits into a memory of so many bytes, where it is not written to disk.
+
+    Parameters
+    ----------
+    world
+        What is flown.
+    channels, reports
+        How many channels there are, and what the estimator reports, by name, with the shape for one agent.
+    memory
+        Of the machine, in bytes.
+    """
+    each = sum(array.dtype.itemsize * prod(array.shape[1:]) for array in forms(world, channels, reports).values())
+    return _ticks_fit(_COPIES * each, world, world.ticks, memory, "; or give a run directory (out)")
+
+
+def _ticks_fit(each: int, world: World, ticks: int, memory: int, or_else: str = "") -> Finding:
     most = int(memory / each)
     return _fits(
-        each * time.ticks,
+        each * ticks,
         memory,
-        f"{time.ticks} ticks of {first.formation.agents} agents",
-        f"at most {most} ticks fit, a time.duration of {most * time.dt:g} s",
+        f"{ticks} ticks of {world.formation.agents} agents",
+        f"at most {most} ticks fit, a time.duration of {most * world.dt:g} s{or_else}",
     )
 
 

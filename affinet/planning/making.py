@@ -100,7 +100,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
     if judged_by is not None:
         recordings.refuse_to_judge(loading.resolved(out), given)
     try:
-        plan = make(given, injected=journal.injected(journal.read(file)), journal=judged_by)
+        plan = make(given, injected=journal.told(file).injected, journal=judged_by)
         if judged_by is not None:
             journal.check(journal.read(judged_by), plan.channels, plan.world.ticks)
     except journal.JournalError as error:
@@ -139,7 +139,7 @@ def _make(given: Scenario) -> Plan:
         reports = tryout.silent_tick(agents, centre)
     spoken = agents.channels()
     names = (channels.SENSE, *sorted([channels.MEASUREMENT, *spoken]))
-    findings.append(limits.run(first, len(names), reports, given.time, memory))
+    findings.append(limits.run(first, given.time, memory))
     _refuse_fatal(findings)
     world = world_of(given, formation)
     bits = network.message_bits(names, spoken, world.links, brief.dimension)

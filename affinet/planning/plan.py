@@ -100,8 +100,9 @@ class Plan:
 
     def books(self, viewer: str | None) -> RecordOptions:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
-        record = self.scenario.record
-        return RecordOptions(record.every, self.window, record.enabled, viewer)
+        record, simulated = self.scenario.record, 1.0 if self.pace is None else min(1.0, self.pace.factor)
+        second = max(1, int(simulated / self.world.dt))
+        return RecordOptions(record.every, second, self.window, record.enabled, viewer)
 
     @property
     def window(self) -> int:

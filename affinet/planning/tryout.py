@@ -15,10 +15,9 @@ from agents.exchange import Heard
 from analysis.models.arrays import Mask
 from analysis.models.pursuit import Sighting
 from netem.core import channels
-from world.books.history import TAKEN
+from world.books.history import TAKEN, file_of
 
-_LONGEST_NAME = 100  # of a file in an archive
-_NOT_FOR_A_FILE = frozenset({"file", "allow_pickle"})  # parameters of what writes arrays.npz
+_LONGEST_NAME, _LONGEST_FILE = 100, 255
 
 
 def silent_tick(agents: Agent, centre: CheckedCentre | None) -> Mapping[str, tuple[int, ...]]:
@@ -36,15 +35,16 @@ def silent_tick(agents: Agent, centre: CheckedCentre | None) -> Mapping[str, tup
     batch = agents.brief.present.shape[:1]
     action = _tick(agents, batch, None if centre is None else _told(centre, agents.brief), positioned=True)
     reports = {name: said.shape[len(batch) :] for name, said in action.estimate.reports.items()}
-    if taken := sorted(reports.keys() & (TAKEN | _NOT_FOR_A_FILE)):
+    if taken := sorted(reports.keys() & TAKEN):
         said = f"the estimator reports {', '.join(taken)}, which every run has already: give it another name"
         raise ScenarioError(f"agents: {said}")
     place = (agents.brief.dimension,)
     if reports.get(channels.PLACE, place) != place:
         said = f"where an agent believes it is, (..., {place[0]}), not {reports[channels.PLACE]}: give it another name"
         raise ScenarioError(f"agents: the estimator reports {channels.PLACE!r}, which is {said}")
-    if long := [name for name in reports if len(name) > _LONGEST_NAME]:
-        raise ScenarioError(f"agents: a report has a name of {len(long[0])} letters: give it at most {_LONGEST_NAME}")
+    if long := [name for name in reports if len(name) > _LONGEST_NAME or len(file_of(name)) > _LONGEST_FILE]:
+        most = f"at most {_LONGEST_NAME}, a third of that where they are not plain"
+        raise ScenarioError(f"agents: a report has a name of {len(long[0])} letters: give it {most}")
     return reports
 
 

@@ -102,8 +102,6 @@ class Child:
         Whether what it runs is sure to come to an end, as no code of a user's own is.
     expected_to_die
         Whether its death is in the script, or the run is over.
-    killed
-        Whether the script had it killed.
     confessed
         Whether it said why it goes down.
     is_ready, is_done
@@ -122,7 +120,6 @@ class Child:
     log: Path
     trusted: bool
     expected_to_die: bool = False
-    killed: bool = False
     confessed: bool = False
     is_ready: bool = False
     is_done: bool = False

@@ -128,7 +128,7 @@ class Launcher:
                 self._fly(group, launched)
 
     def _note(self, group: ProcessGroup) -> None:
-        self.flight.processes = [child.report() for child in group.processes]
+        self.flight.processes = group.reports
 
     def _start(self, group: ProcessGroup) -> None:
         private = self._private

@@ -9,7 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, cast, get_args
 
-from affinet.planning.plan import Plan
+import psutil
+
+from affinet.planning import limits
+from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
@@ -19,11 +22,13 @@ from affinet.verdicts import outcome, timing
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
 from analysis.models.arrays import Array
+from netem.core.parts import parts
 from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import said
 from netem.processes.user_code import UserCodeError
 from netem.wire import keys
 from world.books import history
+from world.books.archive import Archive
 from world.books.history import History, Moments
 from world.recording.file import wrong_with
 
@@ -90,8 +95,14 @@ def rehearse(plan: Plan) -> Evidence:
     ------
     UserCodeError
         When estimator or law do something wrong.
+    PlanError
+        When it is too long for the memory.
     """
-    swarm, flown = InProcessSwarm(plan), History(plan.world, len(plan.channels), plan.reports)
+    channels = len(plan.channels)
+    fits = limits.rehearsal(plan.world, channels, plan.reports, psutil.virtual_memory().total)
+    if fits.fatal:
+        raise PlanError([fits])
+    swarm, flown = InProcessSwarm(plan), History(plan.world, channels, plan.reports)
     started = time.perf_counter()
     swarm.fly(flown.extend, plan.books(None).batch)
     wall_s, arrays = time.perf_counter() - started, flown.arrays()
@@ -113,7 +124,7 @@ def rehearse(plan: Plan) -> Evidence:
 
 def evidence(plan: Plan, done: Outcome) -> Evidence | None:
     """A run with the arrays in its directory; None where it left none."""
-    path = Path(done.out) / history.FILE
+    path = Path(done.out) / history.ARRAYS
     return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
@@ -123,27 +134,27 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
     launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
     flight = launcher.flight
     launcher.fly()
-    path, recording, book = out / history.FILE, out / "run.rrd", out / JOURNAL
+    path, recording, book = out / history.ARRAYS, parts(out / "run.rrd"), out / JOURNAL
     failure, timeline, accounts = flight.failure, plan.timeline, None
     try:
         if book.exists():
-            table = journal.read(book)
-            timeline, accounts = timeline.facing(journal.injected(table)), journal.accounts(table)
+            told = journal.told(book)
+            timeline, accounts = timeline.facing(told.injected), told.accounts
         for trigger, tick in flight.fired.items():
             timeline = timeline.fired([trigger], tick)
     except journal.JournalError as error:
         failure = "; ".join([*filter(None, [failure]), str(error)])
-    if failure and not path.exists() and recording.exists():
+    if failure and recording and wrong_with(recording[-1]):
         try:
-            mend(recording)  # the world was killed, or never got far: it could not close its recording
+            mend(recording[-1])  # the world was killed, or never got far: it could not close its recording
         except (NotMended, NoViewer, OSError) as error:
             failure += f"; {said(error) if isinstance(error, OSError) else error}"
     if not failure and plan.scenario.record.enabled:
-        failure = wrong_with(recording)
+        failure = wrong_with(recording[-1] if recording else out / "run.rrd")
     return outcome.judge(
         plan,
         timeline,
-        history.load(path) if path.exists() else None,
+        history.load(path, mapped=True) if path.exists() else None,
         accounts=accounts,
         uninstructed=flight.uninstructed,
         failure=failure,
@@ -160,11 +171,12 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     from world.recording.logbook import RunWriter
 
     swarm, books = InProcessSwarm(plan), plan.books(viewer)
-    flown = History(plan.world, len(plan.channels), plan.reports)
+    path, flown = out / history.ARRAYS, Archive(out / history.ARRAYS, plan.world, len(plan.channels), plan.reports)
     booked: journal.Writer | None = None
     started, failure, broken = time.perf_counter(), None, None
     try:
         with (
+            flown,
             journal.Writer(out / JOURNAL, plan.world.links, plan.channels, books.batch) as booked,
             RunWriter(out, keys.fresh(), plan.world, plan.channels, plan.reports, books) as logbook,
         ):
@@ -183,15 +195,10 @@ def _in_process(plan: Plan, out: Path, watch: Watch, viewer: str | None, interru
     except OSError as error:
         failure = f"the run could not be written down: {said(error)}"
     wall_s = time.perf_counter() - started
-    try:
-        if flown.ticks:
-            flown.save(out / history.FILE)
-    except OSError as error:
-        failure = failure or f"the run could not be written down: {said(error)}"
     return outcome.judge(
         plan,
         swarm.timeline,
-        flown.arrays() if flown.ticks else None,
+        history.load(path, mapped=True) if path.exists() else None,
         accounts=booked.accounts if booked else None,
         uninstructed=0,
         failure=failure,

@@ -54,6 +54,7 @@ class ProcessGroup:
         self._nursery: Nursery | None = None
         self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
+        self._killed: list[dict[str, Any]] = []
         self._host_of: dict[str, str] = {}
 
     def __enter__(self) -> ProcessGroup:
@@ -66,9 +67,10 @@ class ProcessGroup:
         self._selector.close()
 
     @property
-    def processes(self) -> list[Child]:
-        """All of the run, the nursery too."""
-        return [*self.children, *([] if self._nursery is None else [self._nursery.child])]
+    def reports(self) -> list[dict[str, Any]]:
+        """What the summary says of every process there was, the nursery too; last of those that were killed as scripted."""
+        there = [*self.children, *([] if self._nursery is None else [self._nursery.child])]
+        return [*(child.report() for child in there), *self._killed]
 
     def start_nursery(self) -> None:
         """Start the nursery, and wait until it can fork.
@@ -193,7 +195,7 @@ class ProcessGroup:
         if quiet_s < self._patience_s / 2 or self.now_s - self._looked_s < BEAT_S:
             return
         self._looked_s = self.now_s
-        alive = {child.name: child for child in self.children if not (child.killed or child.is_done)}
+        alive = {child.name: child for child in self.children if not child.is_done}
         beats = {name: self._lately(child) for name, child in alive.items()}
         culprits = [alive[name] for name in holding_up(beats, [child.name for child in awaited])]
         for child in culprits:
@@ -210,11 +212,13 @@ class ProcessGroup:
 
     def kill(self, child: Child) -> None:
         """Kill a child as the script says, wait until it is gone, and keep nothing of it but its report."""
-        child.expected_to_die = child.killed = True
+        child.expected_to_die = True
         child.measure()
         child.process.kill()
         child.process.wait()
         self._forget(child)
+        self.children.remove(child)
+        self._killed.append(child.report())
 
     def release(self) -> None:
         """The run is over: from now on everybody may leave."""
@@ -239,7 +243,7 @@ class ProcessGroup:
             if self.now_s - self._moved_s >= self._patience_s:
                 self._blame_those_who_stay(staying)
         for child in self.children:
-            if child.process.returncode and not child.killed:
+            if child.process.returncode:
                 raise RunFailed(child.obituary())
 
     def _await_end(self, child: Child) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 from affinet.scenario.sections import Scenario, ScenarioError
 from analysis.models.finding import Finding
+from netem.core.parts import parts
 from netem.loading import modules
 from netem.medium.medium import JOURNAL
 
@@ -94,7 +95,7 @@ def keep(given: Scenario, journal: Path | None, out: Path) -> Scenario:
     copies = _Copies(out / FOLDER)
     told = _placed(given.model_dump(mode="json", exclude_none=True), lambda path: f"{FOLDER}/{copies.of(Path(path))}")
     folders = {name: copies.of_modules(name, folder) for name, folder in given.own_modules.items()}
-    verdicts = None if journal is None else copies.of(journal)
+    verdicts = None if journal is None else copies.of_journal(journal)
     if copies.originals:
         book = Kept(copies.originals, folders, verdicts)
         (out / FOLDER / _BOOK).write_text(json.dumps(vars(book), indent=2) + "\n", encoding="utf-8")
@@ -162,11 +163,17 @@ class _Copies:
         if path not in self._files:
             copy = self._files[path] = self._name(path)
             if path.is_dir():
-                for part in (SCENARIO, JOURNAL):
-                    self._copy(path / part, f"{copy}/{part}")
+                self._copy(path / SCENARIO, f"{copy}/{SCENARIO}")
+                self._copy_parts(path / JOURNAL, copy)
             else:
                 self._copy(path, copy)
         return self._files[path]
+
+    def of_journal(self, path: Path) -> str:
+        """Where the copy of a journal lies in the folder, with its parts beside it."""
+        copy = self._files[path] = self._name(Path("journal"))
+        self._copy_parts(path, copy)
+        return f"{copy}/{path.name}"
 
     def of_modules(self, name: str, folder: Path) -> str:
         """Where the copies of all modules lie that came from a folder."""
@@ -181,6 +188,10 @@ class _Copies:
         taken = {_BOOK, *self._files.values(), *self._shelves.values()}
         names = (path.name, *(f"{path.stem}-{n}{path.suffix}" for n in range(2, len(taken) + 3)))
         return next(name for name in names if name and name not in taken)
+
+    def _copy_parts(self, path: Path, copy: str) -> None:
+        for file in parts(path) or [path]:
+            self._copy(file, f"{copy}/{file.name}")
 
     def _copy(self, file: Path, copy: str) -> None:
         if copy not in self.originals:

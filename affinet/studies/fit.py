@@ -33,7 +33,7 @@ def inputs(directory: Path, order: int) -> Model:
             f"{directory}: what its {bodies}s are given is not their velocity; the filters that predict inputs want that"
         )
     try:
-        flown = history.load(directory / history.FILE)["input"]
+        flown = history.load(directory / history.ARRAYS, only=["input"])["input"]
         return autoregressive.fit(flown[np.isfinite(flown).all(axis=(1, 2))], order)
     except history.Damaged as error:
         raise ScenarioError(str(error)) from error

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.verdicts import vacuous
-from analysis.models.arrays import Integers, Mask
+from analysis.models.arrays import Array, Integers, Mask
 from netem.faults import lie
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import Medium
 from netem.medium.relay import Relay
 from netem.medium.verdict import VERDICT_OF, Verdict, VerdictCodes
-from world.books.history import Arrays
+from world.books import growing
+from world.books.history import Arrays, by_span
+
+_WITH_OTHERS = (Verb.LOSE, Verb.DROPOUT, Verb.DELAY, Verb.DEGRADE)
 
 
 @dataclass(frozen=True)
@@ -71,50 +74,60 @@ def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
     arrays
         What happened.
     """
-    flown = _Rejudged(plan, timeline, arrays)
+    judged_again = [number for number, fault in enumerate(timeline.faults) if _by_the_models(plan, fault)]
+    otherwise = _otherwise(plan, timeline, arrays, judged_again) if judged_again else {}
     found = []
     for number, fault in enumerate(timeline.faults):
-        touched, what = _touched(flown, number)
+        touched, what = _touched(plan, timeline, arrays, number, otherwise)
         why = None if touched else vacuous.why(plan, timeline, arrays, number)
         found.append(Bite(fault, _at(fault, plan.world.dt), touched, what, why))
+        growing.let_go(arrays)
     return found
 
 
-@dataclass(frozen=True)
-class _Rejudged:
-    plan: Plan
-    timeline: Timeline
-    arrays: Arrays
+def _by_the_models(plan: Plan, fault: Fault) -> bool:
+    """Whether what became of a message does not say that this fault was why: it has to be judged without it, to compare."""
+    return plan.journal is None and fault.trigger is None and fault.verb in _WITH_OTHERS
 
-    @cached_property
-    def arrivals(self) -> Integers:
-        """When every message offered arrives, -1 where it is dropped at once, shape (T, C, L)."""
-        return self._judged_again(self.timeline, len(self.arrays["verdicts"]))
 
-    def arrivals_without(self, number: int) -> Integers:
-        """The same had one fault not been, up to its end."""
-        links, faults = self.timeline.links, self.timeline.faults
-        others = [other for place, other in enumerate(faults) if place != number]
-        ticks = len(self.arrays["verdicts"][: faults[number].end])
-        return self._judged_again(Timeline(links, others, self.timeline.triggers), ticks)
+def _otherwise(plan: Plan, timeline: Timeline, arrays: Arrays, numbers: Sequence[int]) -> dict[int, int]:
+    """How many messages fared otherwise, up to its end, than they would have without each of these faults.
 
-    def _judged_again(self, timeline: Timeline, ticks: int) -> Integers:
-        verdicts, position = self.arrays["verdicts"], self.arrays["position"]
-        relay = Relay[None](Medium(self.plan.scenario.seed, self.plan.channels, self.plan.profiles, timeline))
-        arrivals = np.empty((ticks, *verdicts.shape[1:]), dtype=np.int64)
-        for tick in range(ticks):
-            decided = relay.decide_on(tick, verdicts[tick] != Verdict.SILENT, position[tick]).verdicts
-            relay.finish(tick)
-            arrivals[tick] = np.where(decided.kind <= Verdict.DELAYED, decided.due, -1)
-        return arrivals
+    Where a fault begins, a relay parts that goes on without it, beside the one that has all: all are gone through once.
+    """
+    faults, changed = timeline.faults, dict.fromkeys(numbers, 0)
+    relay = Relay[None](Medium(plan.scenario.seed, plan.channels, plan.profiles, timeline))
+    without: dict[int, Relay[None]] = {}
+    last = max(faults[number].end or len(arrays["error"]) for number in numbers)
+    tick = 0
+    for span in by_span(arrays):
+        for verdicts, position in zip(span["verdicts"], span["position"], strict=False):
+            if tick == last:
+                return changed
+            without = {number: other for number, other in without.items() if faults[number].end != tick}
+            starting = changed.keys() & timeline.starting_numbers(tick)
+            without |= {number: relay.under(timeline.without(number)) for number in starting}
+            arriving = _arriving(relay, tick, verdicts, position)
+            for number, other in without.items():
+                changed[number] += int((_arriving(other, tick, verdicts, position) != arriving).sum())
+            tick += 1
+    return changed
+
+
+def _arriving(relay: Relay[None], tick: int, verdicts: VerdictCodes, position: Array) -> Integers:
+    """When every message offered in a tick arrives, -1 where it is dropped at once, shape (C, L)."""
+    decided = relay.decide_on(tick, verdicts != Verdict.SILENT, position).verdicts
+    relay.finish(tick)
+    return np.where(decided.kind <= Verdict.DELAYED, decided.due, -1)
 
 
 def _at(fault: Fault, dt: float) -> float | None:
     return None if fault.trigger is not None else fault.start * dt
 
 
-def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
-    plan, timeline, arrays = flown.plan, flown.timeline, flown.arrays
+def _touched(
+    plan: Plan, timeline: Timeline, arrays: Arrays, number: int, otherwise: Mapping[int, int]
+) -> tuple[int, str]:
     fault = timeline.faults[number]
     if fault.trigger is not None:
         return 0, "messages"
@@ -139,8 +152,8 @@ def _touched(flown: _Rejudged, number: int) -> tuple[int, str]:
             return int((_working(timeline, span, verdicts) & hits.astype(bool)).sum()), "measurements"
         case Verb.LIE:
             return _told(plan, fault, verdicts), "messages"
-        case Verb.LOSE | Verb.DROPOUT | Verb.DELAY | Verb.DEGRADE if plan.journal is None:
-            return _otherwise(flown, number), "messages"
+        case _ if number in otherwise:
+            return otherwise[number], "messages"
         case Verb.DEGRADE:
             return int((verdicts[:, :, held] > Verdict.DELIVERED).sum()), "messages"
     if fault.verb in VERDICT_OF:
@@ -160,13 +173,6 @@ def _working(timeline: Timeline, span: range, verdicts: VerdictCodes) -> Mask:
     frozen = [timeline.at(tick).frozen for tick in span]
     working: Mask = (verdicts[:, 0] == Verdict.DELIVERED) & ~np.reshape(frozen, verdicts[:, 0].shape).astype(bool)
     return working
-
-
-def _otherwise(flown: _Rejudged, number: int) -> int:
-    """How many messages fared otherwise than they would have without a fault."""
-    without = flown.arrivals_without(number)
-    changed = flown.arrivals[: len(without)] != without
-    return int(changed[flown.timeline.faults[number].start :].sum())
 
 
 def _told(plan: Plan, fault: Fault, verdicts: Any) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -86,16 +85,13 @@ class Evidence:
     @cached_property
     def embodied(self) -> Mask:
         """Agents that have a body in the air, shape (T, N)."""
-        return self._of_conditions(lambda now: ~now.vanished)
+        return self.timeline.each(range(self.ticks), lambda now: ~now.vanished)
 
     @cached_property
     def awake(self) -> Mask:
         """Agents whose processes live and run, shape (T, N)."""
-        return self._of_conditions(lambda now: ~now.idle)
+        return self.timeline.each(range(self.ticks), lambda now: ~now.idle)
 
     def tick(self, seconds: float) -> int:
         """The tick of a time."""
         return round(seconds / self.dt)
-
-    def _of_conditions(self, read: Any) -> Mask:
-        return np.array([read(self.timeline.at(tick)) for tick in range(self.ticks)], dtype=bool)

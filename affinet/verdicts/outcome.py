@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -18,16 +19,17 @@ from affinet.verdicts import measures
 from affinet.verdicts.bites import Bite, bites
 from affinet.verdicts.measures import Figures
 from affinet.verdicts.timing import Timing
+from analysis.models.arrays import Mask
 from netem.faults.timeline import Timeline
 from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.medium import JOURNAL
 from netem.medium.verdict import Verdict
 from netem.processes import system_errors
 from world.books import history
-from world.books.history import Arrays, digest
+from world.books.history import Arrays, by_span, digest
 
 SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.FILE, JOURNAL, "graph.arrows", "timing.arrows", "run.rrd")
+_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.ARRAYS, JOURNAL, "graph.arrows", "timing.arrows", "run.rrd")
 
 RunVerdict = Literal["pass", "fail", "vacuous"]
 
@@ -229,11 +231,11 @@ def _messages(booked: Accounts, uninstructed: int | None) -> dict[str, Any]:
 
 def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:
     wrong = []
-    if arrays is None or not np.isfinite(arrays["position"]).all():
+    if arrays is None or not _all(arrays, lambda span: np.isfinite(span["position"])):
         wrong.append("the swarm diverged: a position is not a number any more")
     elif np.isinf(arrays["error"]).any():
         wrong.append("the swarm diverged: its tracking error is too large for a number")
-    elif not np.isfinite(arrays["estimate"][arrays["known"]]).all():
+    elif not _all(arrays, lambda span: np.isfinite(span["estimate"][span["known"]])):
         wrong.append("an estimate is not a number any more")
     if uninstructed:
         wrong.append(f"{uninstructed} messages were lost that nobody ordered")
@@ -247,7 +249,9 @@ def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | 
 
 def accounts_of(arrays: Arrays, in_flight: int) -> Accounts:
     """The accounts of a run that is known by its arrays, after which so many messages are under way."""
-    ledger = Ledger.of(arrays["verdicts"], arrays["copies"], arrays["late"], arrays["dropped"])
+    ledger = NOTHING.ledger
+    for span in by_span(arrays):
+        ledger = ledger.plus(Ledger.of(span["verdicts"], span["copies"], span["late"], span["dropped"]))
     return Accounts(len(arrays["error"]), ledger, in_flight)
 
 
@@ -257,9 +261,14 @@ def _untracked(arrays: Arrays | None) -> list[str]:
     ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
     if nobody:
         return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
-    if (arrays["verdicts"][:, 1:] == Verdict.SILENT).all():
+    if _all(arrays, lambda span: span["verdicts"][:, 1:] == Verdict.SILENT):
         return ["nobody was awake in any tick: it proved nothing"]
     return []
+
+
+def _all(arrays: Arrays, holds: Callable[[Arrays], Mask]) -> bool:
+    """Whether something holds all the time."""
+    return all(bool(holds(span).all()) for span in by_span(arrays))
 
 
 def _tracking(arrays: Arrays | None) -> Figures:

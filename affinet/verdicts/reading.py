@@ -87,9 +87,9 @@ def evidence(out: Path) -> Evidence:
         When its summary, arrays or journal are not what the run wrote.
     """
     summary = _summary(out)
-    file = out / history.FILE
-    if not file.is_file():
-        raise ScenarioError(f"{out}: the run left no {history.FILE}: {'; '.join(summary.reasons)}")
+    file = out / history.ARRAYS
+    if not file.is_dir():
+        raise ScenarioError(f"{out}: the run left no {history.ARRAYS}: {'; '.join(summary.reasons)}")
     arrays, accounts = history.load(file), _accounts(out)
     plan = making.again(out, (), verdicts=False)
     history.refuse_those_of_another(file, arrays, plan.world, len(plan.channels), plan.reports)
@@ -159,11 +159,11 @@ def _refuse_constant(word: str) -> NoReturn:
 def _accounts(out: Path) -> Accounts | None:
     from netem.medium import journal as journals
 
-    table = journal(out)
+    file = out / JOURNAL
     try:
-        return journals.accounts(table)
+        return journals.told(file).accounts
     except journals.JournalError as error:
-        raise Damaged(out / JOURNAL, str(error)) from error
+        raise Damaged(file, str(error).removeprefix(f"{file}: ")) from error
 
 
 def _as_fired(timeline: Timeline, arrays: Arrays) -> Timeline:

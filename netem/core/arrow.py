@@ -1,4 +1,4 @@
-"""Tables streamed to disk as Arrow, a batch at a time; what a killed run has written can be read."""
+"""Tables streamed to disk as Arrow, a batch at a time, in parts; what a killed run has written can be read."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.models.arrays import Integers, Mask
+from netem.core.parts import LARGEST, part, parts
 from netem.core.plain import to_plain
 
 Names = Sequence[str] | NDArray[np.str_]
@@ -46,24 +47,25 @@ def do_without_pandas() -> None:
 
 
 class Stream:
-    """Writes a table.
+    """Writes a table, in parts each of which is a table by itself.
 
     Parameters
     ----------
     path
-        Of the file.
+        Of the first part.
     schema
         Of the table.
     """
 
     def __init__(self, path: Path, schema: Any) -> None:
-        self._schema = schema
-        self._sink = pa.OSFile(str(path), "wb")
-        options = pa.ipc.IpcWriteOptions(compression="zstd")
-        self._stream = pa.ipc.new_stream(self._sink, schema, options=options)
+        self._path, self._schema, self._parts = path, schema, 0
+        self._begin()
 
     def write(self, columns: Mapping[str, Any], note: Any = None) -> None:
         """More rows, as a column for each name of the schema; and a note about the table so far, of plain values."""
+        if self._sink.tell() >= LARGEST:
+            self.close()
+            self._begin()
         arrays = [
             column if isinstance(column, pa.Array) else pa.array(column, self._schema.field(name).type)
             for name, column in columns.items()
@@ -75,6 +77,12 @@ class Stream:
         """End the file."""
         self._stream.close()
         self._sink.close()
+
+    def _begin(self) -> None:
+        self._parts += 1
+        self._sink = pa.OSFile(str(part(self._path, self._parts)), "wb")
+        options = pa.ipc.IpcWriteOptions(compression="zstd")
+        self._stream = pa.ipc.new_stream(self._sink, self._schema, options=options)
 
 
 def named(index: Integers, names: Names, absent: Mask | None = None) -> Any:
@@ -93,35 +101,44 @@ def places(column: Any, names: Names) -> Integers:
 
 
 def read(path: Path, schema: Any) -> Any:
-    """The table as far as it was written.
+    """The table as far as it was written, with all parts that follow this one.
 
     Raises
     ------
     TableError
         When there is none, or it has other columns.
     """
-    try:
-        stream = pa.ipc.open_stream(pa.memory_map(str(path)))
-    except (OSError, pa.ArrowInvalid) as error:
-        raise TableError(f"{path}: no such table: {error}") from error
-    if stream.schema.names != schema.names:
-        raise TableError(f"{path}: its columns are {stream.schema.names}, not {schema.names}")
-    batches, note = [], None
-    for batch, beside in _batches(stream):
-        batches.append(batch)
-        note = beside or note
-    return pa.Table.from_batches(batches, schema=stream.schema).replace_schema_metadata(note)
+    return pa.Table.from_batches([batch for batch, _ in scan(path, schema)], schema=schema)
 
 
-def note(table: Any) -> Any:
-    """The last note in a table that was read, None where there is none."""
-    beside = (table.schema.metadata or {}).get(_NOTE)
-    return None if beside is None else json.loads(beside)
+def scan(path: Path, schema: Any, only: str | None = None) -> Iterator[tuple[Any, Any]]:
+    """The batches of a table as far as it was written, one at a time, each with its note if it has one; of all columns, or one.
+
+    Raises
+    ------
+    TableError
+        When there is none, or it has other columns.
+    """
+    names = schema.names if only is None else [only]
+    options = pa.ipc.IpcReadOptions(included_fields=None if only is None else [schema.get_field_index(only)])
+    files = parts(path) or [path]
+    for file in files:
+        try:
+            stream = pa.ipc.open_stream(pa.memory_map(str(file)), options=options)
+        except (OSError, pa.ArrowInvalid) as error:
+            if file == files[-1] != path:  # who wrote it was killed where it began
+                return
+            raise TableError(f"{file}: no such table: {error}") from error
+        if stream.schema.names != names:
+            raise TableError(f"{file}: its columns are {stream.schema.names}, not {names}")
+        yield from _batches(stream)
 
 
 def _batches(stream: Any) -> Iterator[tuple[Any, Any]]:
     while True:
         try:
-            yield stream.read_next_batch_with_custom_metadata()
+            batch, beside = stream.read_next_batch_with_custom_metadata()
         except (StopIteration, OSError, pa.ArrowInvalid):  # the end, or where a killed run stopped writing
             return
+        note = None if beside is None else beside.get(_NOTE)
+        yield batch, None if note is None else json.loads(note)

@@ -6,7 +6,7 @@ the conditions are the union of all faults then active, so the end of one cannot
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,6 +21,7 @@ from netem.faults import cut
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
 
+_KEPT = 64  # segments whose conditions are kept: who goes from tick to tick looks at two of them
 # What a clock gains is a whole number of ticks again and again, and floats fall a little short of that.
 _ROUNDING = 1e-9
 
@@ -143,16 +144,35 @@ class Timeline:
         self.scripted, self.injected = tuple(scripted), tuple(injected)
         self.faults = (*self.scripted, *self.injected)
         self.triggers = tuple(triggers)
-        self._link_masks = [self._links_held(fault) for fault in self.faults]
-        self._agent_masks = [self._agents_held(fault) for fault in self.faults]
+        # What comes back every so many seconds holds the same each time.
+        of_links = {(fault.pairs, fault.groups): self._links_held(fault) for fault in _alike_once(self.faults)}
+        of_agents = {fault.agents: self._agents_held(fault) for fault in _alike_once(self.faults)}
+        self._link_masks = [of_links[fault.pairs, fault.groups] for fault in self.faults]
+        self._agent_masks = [of_agents[fault.agents] for fault in self.faults]
+        self._segments: dict[int, Conditions] = {}
 
     def at(self, tick: int) -> Conditions:
         """The conditions of a tick; the same object for as long as nothing changes."""
-        return self._segments[bisect_right(self._boundaries, tick) - 1]
+        return self._segment(bisect_right(self._boundaries, tick) - 1)
 
     def present(self, ticks: Iterable[int]) -> Mask:
         """Agents that take part in each of these ticks, shape (T, N)."""
-        return np.array([~self.at(tick).absent for tick in ticks])
+        return self.each(ticks, lambda now: ~now.absent)
+
+    def each(self, ticks: Iterable[int], read: Callable[[Conditions], Mask]) -> Mask:
+        """What is read of the conditions of each of these ticks, of the agents, shape (T, N)."""
+        segments = np.searchsorted(self._boundaries, np.fromiter(ticks, dtype=np.int64), side="right") - 1
+        apart, row = np.unique(segments, return_inverse=True)
+        masks = [read(self._segment(segment)) for segment in apart.tolist()]
+        return np.reshape(masks, (len(apart), self.links.agents)).astype(bool)[row]
+
+    def without(self, number: int) -> Timeline:
+        """As long as one fault lasts, the timeline had it not been: of the others only those that hold meanwhile."""
+        fault = self.faults[number]
+        first = bisect_right(self._boundaries, fault.start) - 1
+        end = None if fault.end is None else bisect_left(self._boundaries, fault.end)
+        meanwhile = sorted({one for in_force in self._in_force[first:end] for one in in_force} - {number})
+        return Timeline(self.links, [self.faults[one] for one in meanwhile], self.triggers)
 
     @cached_property
     def pending(self) -> tuple[int, ...]:
@@ -175,7 +195,11 @@ class Timeline:
 
     def starting(self, tick: int) -> list[Fault]:
         """Faults whose first tick this is."""
-        return [self.faults[number] for number in self._starts.get(tick, ())]
+        return [self.faults[number] for number in self.starting_numbers(tick)]
+
+    def starting_numbers(self, tick: int) -> Sequence[int]:
+        """Numbers of the faults whose first tick this is."""
+        return self._starts.get(tick, ())
 
     def ending(self, tick: int) -> list[Fault]:
         """Faults that hold no longer from this tick on."""
@@ -258,9 +282,13 @@ class Timeline:
             segments.append(sorted(number for number in now if self.faults[number].active(tick)))
         return segments
 
-    @cached_property
-    def _segments(self) -> list[Conditions]:
-        return [self._conditions(numbers) for numbers in self._in_force]
+    def _segment(self, number: int) -> Conditions:
+        """What holds from a boundary to the next."""
+        if number not in self._segments:
+            if len(self._segments) == _KEPT:
+                del self._segments[next(iter(self._segments))]
+            self._segments[number] = self._conditions(self._in_force[number])
+        return self._segments[number]
 
     def _conditions(self, in_force: Sequence[int]) -> Conditions:
         size, agents = len(self.links), self.links.agents
@@ -329,6 +357,11 @@ class Timeline:
                 raise ValueError(f"agent {agent} does not exist: agents are 1 to {self.links.agents}")
             mask[agent - 1] = True
         return mask
+
+
+def _alike_once(faults: Iterable[Fault]) -> Iterable[Fault]:
+    """One of each kind of faults that hold the same."""
+    return {(fault.pairs, fault.groups, fault.agents): fault for fault in faults}.values()
 
 
 def _numbers(agents: Mask) -> list[int]:

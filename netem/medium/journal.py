@@ -158,32 +158,44 @@ def read(path: Path) -> Any:
         raise JournalError(str(error)) from error
 
 
-def accounts(table: Any) -> Accounts | None:
-    """The accounts of a run, as far as its journal was written; None where it holds no tick.
+class Told(NamedTuple):
+    """What a journal says beside its verdicts.
+
+    Parameters
+    ----------
+    accounts
+        Of the run, as far as its journal was written; None where it holds no tick.
+    injected
+        The faults that were injected into the run while it flew.
+    """
+
+    accounts: Accounts | None
+    injected: tuple[Fault, ...]
+
+
+def told(path: Path) -> Told:
+    """What a journal says beside its verdicts, of whose rows no more than one batch is held at a time.
 
     Raises
     ------
     JournalError
-        When they are none.
+        When it is no journal, or what it says is none of that.
     """
+    accounts, injected = None, None
+    try:
+        for batch, note in arrow.scan(path, SCHEMA, "event"):
+            accounts = note or accounts
+            events = batch["event"].drop_null()
+            injected = events[-1].as_py() if len(events) else injected
+    except arrow.TableError as error:
+        raise JournalError(str(error)) from error
+    except ValueError as error:
+        raise JournalError(f"its accounts cannot be read: {error}") from error
     with _refusing("accounts"):
-        plain = arrow.note(table)
-        return None if plain is None else from_plain(Accounts, plain)
-
-
-def injected(table: Any) -> tuple[Fault, ...]:
-    """The faults that were injected into a run while it flew.
-
-    Raises
-    ------
-    JournalError
-        When they are none.
-    """
-    events = table["event"].drop_null()
-    if not len(events):
-        return ()
+        booked = None if accounts is None else from_plain(Accounts, accounts)
     with _refusing("faults"):
-        return tuple(from_plain(Fault, fault) for fault in json.loads(events[-1].as_py()))
+        faults = () if injected is None else tuple(from_plain(Fault, fault) for fault in json.loads(injected))
+    return Told(booked, faults)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ Nothing here knows what a message says: the medium works on who offered what, ov
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -156,6 +157,12 @@ class Medium:
         """What arrives in this tick: the messages just passed, and those under way that are due."""
         under = self._under(self.timeline.at(tick))
         return deliver(state, tick, verdicts, under.doom, under.holds)
+
+    def under(self, timeline: Timeline) -> Medium:
+        """The same air under another timeline; both are cheap as long as they are asked for the same ticks in turn."""
+        other = copy(self)
+        other.timeline, other._conditions = timeline, None
+        return other
 
     @property
     def ahead(self) -> bool:

@@ -7,6 +7,7 @@ arrays of all agents in one process, as bytes over the wire.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import copy
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -188,6 +189,12 @@ class Relay(FaultedRelay, Generic[Said]):
         state, verdicts = self._medium.judge(self._state, tick, offered, position)
         self._decided, delivery = self._medium.deliver(state, tick, verdicts)
         return Relayed(tick, self.timeline.at(tick), verdicts, delivery, self._newly_injected())
+
+    def under(self, timeline: Timeline) -> Relay[Said]:
+        """A relay that goes on from here under another timeline, tick by tick beside this one."""
+        other = copy(self)
+        other._medium = self._medium.under(timeline)
+        return other
 
     def keep(self, tick: int, said: Said) -> None:
         """Keep what was said in a tick, as it was told."""

@@ -15,10 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flying import PROCESSES, digest_of
+from kept_arrays import rewrite
 from own_code import ESTIMATOR, broken, write
 
 import affinet
 from affinet.cli import commands
+from world.books.history import ARRAYS, load
 
 ROOT = Path(affinet.__file__).parents[1]
 SHORT = ("time.dt=0.05", "time.duration=1")
@@ -213,7 +215,7 @@ def flown(kept, tmp_path):
 
 NO_RUNS = {
     "no run": (lambda out: [file.unlink() for file in out.iterdir() if file.is_file()], "no run that has ended"),
-    "no arrays": (lambda out: (out / "arrays.npz").unlink(), "the run left no arrays.npz"),
+    "no arrays": (lambda out: shutil.rmtree(out / "arrays"), "the run left no arrays:"),
 }
 
 
@@ -315,8 +317,8 @@ OTHER_ARRAYS = {
 @pytest.mark.parametrize("damage", OTHER_ARRAYS)
 def test_arrays_that_the_run_did_not_leave_are_damaged(damage, flown):
     change, why = OTHER_ARRAYS[damage]
-    file = flown / "arrays.npz"
-    np.savez(file, **change(dict(np.load(file))))
+    file = flown / ARRAYS
+    rewrite(file, change(load(file)))
     assert damaged(flown).startswith(f"{file}: not what a run wrote there: {why}")
 
 

@@ -117,7 +117,7 @@ def check(number, tmp_path):
     reseeded = replace(plan, scenario=plan.scenario.model_copy(update={"seed": 99}))
     again = replace(reseeded, journal=tmp_path / "processes" / JOURNAL)
     flown(again, "inprocess", tmp_path / "again")
-    arrays, repeated = (history.load(tmp_path / run / "arrays.npz") for run in ("processes", "again"))
+    arrays, repeated = (history.load(tmp_path / run / history.ARRAYS) for run in ("processes", "again"))
     for name in ("verdicts", "newest", "copies", "late", "dropped"):
         assert np.array_equal(arrays[name], repeated[name]), name
     assert journal.read(tmp_path / "again" / JOURNAL).equals(books[0])

@@ -18,7 +18,7 @@ def fly(plan, out, **programs):
     flight = Launcher(plan, out, watch=lambda *_: None, programs=commands).fly()
     assert flight.failure is None, flight.failure
     assert flight.uninstructed == 0
-    return history.load(out / "arrays.npz")
+    return history.load(out / history.ARRAYS)
 
 
 def test_a_rogue_gets_nothing_through(out, tmp_path):

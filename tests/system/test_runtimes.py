@@ -207,10 +207,10 @@ def test_three_dimensions_agree_too(tmp_path, out):
 
 def test_a_run_leaves_its_scenario_arrays_recording_and_summary(out):
     outcome = processes(out, "corridor", "time.duration=1")
-    names = {"scenario.json", "arrays.npz", "journal.arrows", "graph.arrows", "run.rrd", "summary.json", "logs"}
+    names = {"scenario.json", "arrays", "journal.arrows", "graph.arrows", "run.rrd", "summary.json", "logs"}
     assert {path.name for path in out.iterdir()} == names
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["digest"] == outcome.digest == history.digest(history.load(out / "arrays.npz"))
+    assert summary["digest"] == outcome.digest == history.digest(history.load(out / history.ARRAYS))
     roles = [(process["role"], process["id"]) for process in summary["processes"]]
     agents = [("agent", number) for number in range(1, 8)]
     assert roles == [("world", None), ("netem", None), *agents, ("nursery", None)]

@@ -65,4 +65,4 @@ def test_agents_that_think_and_batches_that_take_longer_than_patience_pass(tmp_p
     flight = Launcher(plan, out, watch=lambda *_: None, programs=dict.fromkeys((1, 2, 3), thinking)).fly()
     assert flight.failure is None, flight.failure
     assert flight.wall_s > 60 * 0.1
-    assert len(history.load(out / history.FILE)["error"]) == 60
+    assert len(history.load(out / history.ARRAYS)["error"]) == 60

@@ -61,7 +61,7 @@ def flown(tmp_path_factory):
             plan = plan_of("corridor", *BASE, *over, timeline(*entries))
             out = tmp_path_factory.mktemp("verbs") / "run"
             outcome = fly(plan, "inprocess", out, lambda *_: None)
-            flights[key] = Flight(plan, outcome, history.load(out / history.FILE))
+            flights[key] = Flight(plan, outcome, history.load(out / history.ARRAYS))
         return flights[key]
 
     return fly_once

@@ -138,7 +138,7 @@ def test_under_its_verdicts_another_seed_meets_the_same_air_in_both_runtimes(tmp
     again = planning.again(tmp_path / "first", ("seed=99",), verdicts=True)
     one, many = (flown(again, runtime, tmp_path / runtime) for runtime in ("inprocess", "processes"))
     assert one.digest == many.digest != first.digest
-    arrays, repeated = (history.load(tmp_path / run / history.FILE) for run in ("first", "processes"))
+    arrays, repeated = (history.load(tmp_path / run / history.ARRAYS) for run in ("first", "processes"))
     for name in ("verdicts", "newest", "copies", "late", "dropped"):
         assert np.array_equal(arrays[name], repeated[name]), name
     assert [bite.touched for bite in first.faults] == [bite.touched for bite in many.faults]

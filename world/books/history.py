@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
-from zipfile import BadZipFile
+from urllib.parse import quote, unquote
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from analysis.metrics.errors import tracking_error
@@ -20,14 +18,15 @@ from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
 from netem.medium.verdict import Verdict, VerdictCodes
-from netem.processes import system_errors
-from netem.processes.whole import whole
+from world.books import growing
 from world.physics.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
 Reports = Mapping[str, tuple[int, ...]]  # what estimators report beyond edges, and the shape of each for one agent
 
-FILE = "arrays.npz"  # in a run directory
+ARRAYS = "arrays"  # in a run directory: a folder, with a file for each array
+
+_SPAN = 512  # ticks that are looked at together, of arrays that may be larger than the memory
 
 # Of each array by tick the kind of its numbers, and how many axes it has.
 _BY_TICK = {
@@ -174,28 +173,28 @@ def _newest(ticks: Integers, verdicts: VerdictCodes, entries: Sequence[Entry]) -
 
 
 class ErrorMonitor:
-    """Follows the tracking error tick by tick, where a fault waits for it."""
+    """Follows the tracking error tick by tick, where a fault waits for it: as far back as one does."""
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._errors = np.full(world.ticks, np.nan)
-        self._seen = 0
+        self._errors: Array = np.empty(0)
 
     @property
     def errors(self) -> Array:
-        """Of the ticks seen so far, shape (T,), in square metres."""
-        return self._errors[: self._seen]
+        """Of the last ticks, shape (T,), in square metres."""
+        return self._errors
 
     def see(self, tick: int, scene: Scene, timeline: Timeline) -> None:
         """Take in a tick, if anything waits for it."""
         if timeline.pending:
             goal = self._world.goal(tick, scene)
-            self._errors[tick] = tracking_error(scene.position, goal, ~timeline.at(tick).absent)
-            self._seen = tick + 1
+            now = tracking_error(scene.position, goal, ~timeline.at(tick).absent)
+            longest = max(timeline.triggers[number].ticks for number in timeline.pending)
+            self._errors = np.append(self._errors, now)[-longest:]
 
 
 class History:
-    """The moments of a run, gathered; arrays begin with the ticks."""
+    """The moments of a run, gathered in memory; arrays begin with the ticks."""
 
     def __init__(self, world: World, channels: int, reports: Mapping[str, tuple[int, ...]]) -> None:
         links, ticks = world.links, world.ticks
@@ -234,16 +233,22 @@ class History:
         said = {name: values[: self.ticks] for name, values in self.reports.items()}
         return by_tick | said | {"position": self.position[: self.ticks + 1]}
 
-    def save(self, path: Path) -> None:
-        """Write the arrays to a NumPy archive, whole or not at all: the process may be ended while it writes.
 
-        Raises
-        ------
-        OSError
-            When they cannot be written.
-        """
-        with system_errors.about(path), whole(path) as unfinished:
-            np.savez(unfinished, allow_pickle=False, **self.arrays())
+def forms(world: World, channels: int, reports: Reports) -> Arrays:
+    """The arrays of a run over this world before its first tick.
+
+    Parameters
+    ----------
+    world, channels, reports
+        What is flown, over how many channels, and what estimators report.
+    """
+    before = History(replace(world, ticks=0), channels, reports)
+    return before.arrays() | {"position": before.position[:0]}
+
+
+def file_of(name: str) -> str:
+    """The file of an array in the folder of a run's arrays."""
+    return quote(name, safe="") + growing.ENDING
 
 
 class Damaged(ValueError):
@@ -265,8 +270,17 @@ class Damaged(ValueError):
         return f"{self.file}: not what a run wrote there: {self.why}; fly the run again, or restore the file"
 
 
-def load(path: Path) -> Arrays:
-    """The arrays of a run, by name.
+def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = False) -> Arrays:
+    """The arrays of a run by name, as far as they were written; those that are large are mapped, and cannot be written to.
+
+    Parameters
+    ----------
+    folder
+        Which has them.
+    only
+        Names of those that are wanted, by default all.
+    mapped
+        Whether those that are small are mapped too.
 
     Raises
     ------
@@ -275,16 +289,32 @@ def load(path: Path) -> Arrays:
     Damaged
         When they are not whole, or not those of a run any more.
     """
+    files = [file for file in sorted(folder.iterdir()) if file.suffix == growing.ENDING]
+    arrays = {unquote(file.stem): _of(file, mapped=mapped) for file in files}
     try:
-        with path.open("rb") as file:
-            archive = np.load(file, allow_pickle=False)
-            if not isinstance(archive, NpzFile):
-                raise ValueError("it is one array, not an archive of them")
-            arrays = dict(archive)
-        _refuse_other_forms(arrays)
-    except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
-        raise Damaged(path, str(error)) from error
-    return arrays
+        whole = _up_to_the_last_tick(arrays)
+        _refuse_other_forms(whole)
+    except ValueError as error:
+        raise Damaged(folder, str(error)) from error
+    growing.let_go(whole)
+    return whole if only is None else {name: whole[name] for name in only}
+
+
+def _of(file: Path, *, mapped: bool) -> NDArray[Any]:
+    try:
+        return growing.read(file, mapped=mapped)
+    except (ValueError, TypeError, EOFError, MemoryError, OverflowError, SyntaxError) as error:
+        raise Damaged(file, str(error)) from error
+
+
+def _up_to_the_last_tick(arrays: Arrays) -> Arrays:
+    """The arrays up to the last tick that all of them have: who was killed while he wrote had not come to the others."""
+    if missing := [name for name in _BY_TICK if name not in arrays]:
+        raise ValueError(f"it has no {', '.join(missing)}")
+    if single := [name for name, array in arrays.items() if not array.ndim]:
+        raise ValueError(f"{single[0]} is a single number")
+    ticks = min(len(array) - (name == "position") for name, array in arrays.items())
+    return {name: array[: ticks + (name == "position")] for name, array in arrays.items()}
 
 
 def refuse_those_of_another(path: Path, arrays: Arrays, world: World, channels: int, reports: Reports) -> None:
@@ -304,7 +334,7 @@ def refuse_those_of_another(path: Path, arrays: Arrays, world: World, channels: 
     Damaged
         When they have other names, numbers, agents, links, channels or axes, or more ticks.
     """
-    due = History(replace(world, ticks=0), channels, reports).arrays()
+    due = forms(world, channels, reports)
     for name in sorted(due.keys() | arrays.keys()):
         said, wanted = form(arrays.get(name)), form(due.get(name))
         if said != wanted:
@@ -319,18 +349,23 @@ def form(array: NDArray[Any] | None) -> str:
 
 
 def _refuse_other_forms(arrays: Arrays) -> None:
-    if missing := [name for name in _BY_TICK if name not in arrays]:
-        raise ValueError(f"it has no {', '.join(missing)}")
-    ticks = len(arrays["error"]) if arrays["error"].ndim else 0
     for name, array in arrays.items():
         kind, axes = _BY_TICK.get(name, ("f", max(2, array.ndim)))
-        rows = ticks + (name == "position")
-        if (array.dtype.kind, array.ndim, array.shape[:1]) != (kind, axes, (rows,)):
-            raise ValueError(f"{name} is {array.dtype} of shape {array.shape}, in a run of {ticks} ticks")
+        if (array.dtype.kind, array.ndim) != (kind, axes):
+            raise ValueError(f"{name} is {array.dtype} of shape {array.shape}")
     if (largest := arrays["verdicts"].max(initial=0)) >= len(Verdict):
         raise ValueError(f"verdicts has a {largest}, which is no verdict")
     if (columns := arrays["dropped"].shape[1]) != len(Verdict):
         raise ValueError(f"dropped counts {columns} verdicts, and there are {len(Verdict)}")
+
+
+def by_span(arrays: Arrays) -> Iterator[Arrays]:
+    """The arrays of consecutive ticks, of so many at a time that they are small; the last has where the last tick led."""
+    ticks = len(arrays["error"])
+    for first in range(0, max(ticks, 1), _SPAN):
+        end = first + _SPAN if first + _SPAN < ticks else None
+        yield {name: array[first:end] for name, array in arrays.items()}
+        growing.let_go(arrays)
 
 
 def digest(arrays: Arrays) -> str:
@@ -342,7 +377,9 @@ def digest(arrays: Arrays) -> str:
     total = hashlib.sha256()
     for name, array in _digested(arrays):
         total.update(f"{name}{array.dtype.str}{array.shape}".encode())
-        total.update(one_nan(array).tobytes())
+        for first in range(0, len(array), _SPAN):
+            total.update(one_nan(array[first : first + _SPAN]).tobytes())
+            growing.let_go({name: array})
     return total.hexdigest()
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from netem.processes import system_errors
 
@@ -15,6 +17,7 @@ from netem.processes import system_errors
 _ENDING = struct.Struct("<QQI8sI")
 _BEGINNING = 2**18  # bytes: the blueprint, and what does not change
 _WORD = b"RRF2FOOT"
+_PATIENCE_S = 1.0
 _SYSTEM_ERROR = re.compile(r"\(os error (\d+)\)")
 
 
@@ -56,6 +59,16 @@ def make_room(path: Path) -> None:
             if path.is_file():  # and no device
                 path.unlink()
             raise
+
+
+def listens(viewer: str) -> bool:
+    """Whether somebody listens at the URL of a viewer: the library waits for seconds for one that is gone."""
+    place = urlsplit(viewer)
+    try:
+        socket.create_connection((place.hostname or "", place.port or 0), _PATIENCE_S).close()
+    except OSError:
+        return False
+    return True
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What the world of a run leaves behind while it flies: realised graph and recording, a batch of ticks at a time."""
+"""What the world of a run leaves to look at while it flies: realised graph and recording, a batch of ticks at a time."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from netem.processes import system_errors
 from world.books.history import Moments, Reports
 from world.books.kept import Kept
 from world.books.realised import GraphWatch, columns
+from world.books.spans import Spans
 from world.books.timing import TimingWriter
 from world.brief import RecordOptions
 from world.physics.world import World
@@ -66,7 +67,7 @@ class RunWriter:
         books: RecordOptions,
         pace: Pace | None = None,
     ) -> None:
-        self._every = books.every
+        self._every, self._spans = books.every, Spans(books.every)
         self._channels = list(channels)
         self._out = out
         self._graph = Stream(out / GRAPH, GRAPH_SCHEMA)
@@ -97,19 +98,29 @@ class RunWriter:
             with system_errors.about(self._out / GRAPH):
                 self._graph.close()
 
-        closing = [close_graph, *(open_file.close for open_file in (self._timing, self._recorder) if open_file)]
+        others = [open_file.close for open_file in (self._timing, self._recorder) if open_file]
+        closing = [self._write_the_rest, close_graph, *others]
         with system_errors.afterwards(*closing):
             if error is not None:
                 raise error
 
     def write(self, moments: Moments, timeline: Timeline) -> None:
-        """Write down consecutive ticks, flown under this timeline."""
-        realised = self._watch.follow(moments.first, moments.newest, timeline, self._every)
+        """Write down consecutive ticks, flown under this timeline, once all are known that one recorded moment stands for."""
+        self._timeline = timeline
+        if whole := self._spans.whole(moments):
+            self._write(whole)
+
+    def _write_the_rest(self) -> None:
+        if rest := self._spans.rest():
+            self._write(rest)
+
+    def _write(self, moments: Moments) -> None:
+        realised = self._watch.follow(moments.first, moments.newest, self._timeline, self._every)
         table = columns(realised, self._channels)
         with system_errors.about(self._out / GRAPH):
             self._graph.write({**table, "channel": named(table["channel"], self._channels)})
         if self._recorder:
-            self._recorder.record(moments, timeline, realised)
+            self._recorder.record(moments, self._timeline, realised)
 
     def write_kept(self, kept: Sequence[Kept]) -> None:
         """Write down how processes kept their time."""

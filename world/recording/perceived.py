@@ -34,8 +34,12 @@ class PerceivedFormations:
         self._origin = origin
         nominal = world.formation.nominal
         self._from_each = nominal[None] - nominal[:, None]
-        reach = float(np.ptp(nominal, axis=0).max())
-        stream.log("swarm/perceived", rr.Points3D.from_fields(radii=0.008 * reach, colors=_PERCEIVED), static=True)
+        self._reach = float(np.ptp(nominal, axis=0).max())
+
+    def begin(self) -> None:
+        """Log what does not change, in a part of the recording that has nothing yet."""
+        look = rr.Points3D.from_fields(radii=0.008 * self._reach, colors=_PERCEIVED)
+        self._stream.log("swarm/perceived", look, static=True)
 
     def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:  # noqa: ARG002
         """Consecutive ticks, of which those `kept` are recorded; who perceives no map is left out."""

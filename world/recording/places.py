@@ -38,16 +38,22 @@ class Places:
         self._dt = world.dt
         self._links = world.links
         self._first = FirstMeasurements(world.links, world.sensor, (), world.formation.dimension)
-        reach = float(np.ptp(world.formation.nominal, axis=0).max())
+        self._reach = float(np.ptp(world.formation.nominal, axis=0).max())
+        self._shown = 0
+
+    def begin(self) -> None:
+        """Log what does not change, in a part of the recording that has nothing yet."""
+        self._shown = 0
         for path, colour in (("swarm/place", _ESTIMATED), ("swarm/optimal", _OPTIMAL)):
-            stream.log(path, rr.Points3D.from_fields(radii=0.015 * reach, colors=colour), static=True)
-        width = rr.Radius.ui_points(0.5)
-        stream.log("swarm/measured", rr.LineStrips3D.from_fields(radii=width, colors=_ELLIPSE), static=True)
-        stream.log("metrics/localization", rr.SeriesLines(names="distance from the optimal places (m)"), static=True)
+            look = rr.Points3D.from_fields(radii=0.015 * self._reach, colors=colour)
+            self._stream.log(path, look, static=True)
+        lines = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_ELLIPSE)
+        self._stream.log("swarm/measured", lines, static=True)
+        says = rr.SeriesLines(names="distance from the optimal places (m)")
+        self._stream.log("metrics/localization", says, static=True)
 
     def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:
         """Consecutive ticks, of which those `kept` are recorded."""
-        known = self._first.seen.sum()
         for tick, measured, verdicts in zip(
             moments.ticks.tolist(), moments.measured, moments.verdicts[:, 0], strict=True
         ):
@@ -59,7 +65,8 @@ class Places:
         points(self._stream, "swarm/place", time, localization.beside(place, edges) + here)
         points(self._stream, "swarm/optimal", time, best)
         scalars(self._stream, "metrics/localization", time, localization.distance(place, edges)[:, None])
-        if self._first.seen.sum() > known:
+        if (seen := int(self._first.seen.sum())) > self._shown:
+            self._shown = seen
             self._log_ellipses(moments.first, position[0])
 
     def _log_ellipses(self, tick: int, position: Array) -> None:

@@ -20,6 +20,7 @@ from analysis.models.arrays import Array, Mask
 from analysis.models.information import reported
 from analysis.models.reports import NIS
 from netem.core.channels import PLACE, THETA
+from netem.core.parts import LARGEST, part
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
@@ -29,7 +30,7 @@ from world.books.kept import Kept
 from world.books.realised import Realised
 from world.formation.nominal import Formation
 from world.physics.world import World
-from world.recording.file import NotRecorded, make_room, writing, wrong_with
+from world.recording.file import NotRecorded, listens, make_room, writing, wrong_with
 from world.recording.perceived import PerceivedFormations
 from world.recording.places import Places
 from world.recording.stage import TIMELINE, origin, scalars, spatial
@@ -62,12 +63,12 @@ _COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 
 
 class Recorder:
-    """Writes `run.rrd`, and streams to a viewer when one listens.
+    """Writes `run.rrd`, in parts each of which opens by itself, and streams to a viewer when one listens.
 
     Parameters
     ----------
     path
-        Of the recording.
+        Of the first part.
     run
         What tells it from all others: a viewer takes recordings that share it for one.
     name
@@ -107,28 +108,24 @@ class Recorder:
         self._dt = world.dt
         self._every = every
         self._edges = np.array(world.formation.edges, dtype=np.int64) - 1
-        self._path = path
+        self._first_part, self._path, self._parts = path, path, 0
+        self._name, self._viewer = name, viewer
         self._stream = rr.RecordingStream("affinet", recording_id=run)
         if not rr.is_enabled(self._stream):
             raise NotRecorded(
                 f"{path} cannot be written: RERUN={os.environ.get('RERUN')} in the environment turns the recording off; "
                 "unset it, or set record.enabled=false"
             )
-        make_room(path)
         shown = _shown(world, reports)
-        sinks = [rr.FileSink(str(path)), *([rr.GrpcSink(viewer)] if viewer else [])]
-        with writing(path):
-            self._stream.set_sinks(
-                *sinks, default_blueprint=_blueprint(world.formation, shown, in_real_time=in_real_time)
-            )
-        self._stream.send_recording_name(name)
+        self._blueprint = _blueprint(world.formation, shown, in_real_time=in_real_time)
         self._origin = origin(world)
-        self._log_static()
         self._layers = [layer(self._stream, world, self._origin) for layer in shown]
-        self._flush()  # what a killed run leaves can be read from the first tick on
+        self._begin()
 
     def record(self, moments: Moments, timeline: Timeline, realised: Realised) -> None:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
+        if self._path.exists() and self._path.stat().st_size >= LARGEST:
+            self._begin()
         for tick in moments.ticks.tolist():
             self._log_events(tick, timeline)
         kept = slice(None, None, self._every)
@@ -168,8 +165,23 @@ class Recorder:
         """
         with system_errors.afterwards(self._stream.disconnect):
             self._flush()
-        if wrong := wrong_with(self._path):
-            raise NotRecorded(wrong)
+        _refuse_what_breaks_off(self._path)
+
+    def _begin(self) -> None:
+        """Begin the next part, which ends the one before."""
+        before, self._parts = self._path, self._parts + 1
+        self._path = part(self._first_part, self._parts)
+        make_room(self._path)
+        viewers = [rr.GrpcSink(self._viewer)] if self._viewer and listens(self._viewer) else []
+        with writing(self._path):
+            self._stream.set_sinks(rr.FileSink(str(self._path)), *viewers, default_blueprint=self._blueprint)
+        if before != self._path:
+            _refuse_what_breaks_off(before)
+        self._stream.send_recording_name(self._name)
+        self._log_static()
+        for layer in self._layers:
+            layer.begin()
+        self._flush()  # what a killed run leaves can be read from the first tick on
 
     def _flush(self) -> None:
         with writing(self._path):
@@ -316,6 +328,11 @@ class Recorder:
 
     def _scalars(self, path: str, time: list[rr.TimeColumn], values: Array) -> None:
         scalars(self._stream, path, time, values)
+
+
+def _refuse_what_breaks_off(path: Path) -> None:
+    if wrong := wrong_with(path):
+        raise NotRecorded(wrong)
 
 
 def _shown(world: World, reports: Reports) -> list[type[Layer]]:

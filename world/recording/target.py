@@ -33,13 +33,17 @@ class Pursued:
         self._stream = stream
         self._origin = origin
         self._nominal = world.formation.nominal
-        reach = float(np.ptp(world.formation.nominal, axis=0).max())
+        self._reach = float(np.ptp(world.formation.nominal, axis=0).max())
+
+    def begin(self) -> None:
+        """Log what does not change, in a part of the recording that has nothing yet."""
         for path, colour, size in (("target", _TARGET, 0.03), ("found", _FOUND, 0.01), ("agreed", _AGREED, 0.015)):
-            stream.log(f"swarm/{path}/at", rr.Points3D.from_fields(radii=size * reach, colors=colour), static=True)
-        width = rr.Radius.ui_points(0.5)
-        stream.log("swarm/agreed/spread", rr.LineStrips3D.from_fields(radii=width, colors=_ELLIPSE), static=True)
+            look = rr.Points3D.from_fields(radii=size * self._reach, colors=colour)
+            self._stream.log(f"swarm/{path}/at", look, static=True)
+        lines = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_ELLIPSE)
+        self._stream.log("swarm/agreed/spread", lines, static=True)
         names = ["found by oneself (m)", "agreed on (m)"]
-        stream.log("metrics/target", rr.SeriesLines(names=names), static=True)
+        self._stream.log("metrics/target", rr.SeriesLines(names=names), static=True)
 
     def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:  # noqa: ARG002
         """Consecutive ticks, of which those `kept` are recorded."""

@@ -44,7 +44,7 @@ def worth(plan, ticks):
 def flown(out, *overrides):
     plan = plan_of("corridor", *BEFORE, *overrides)
     fly(plan, "inprocess", out, lambda *_: None)
-    return plan, history.load(out / history.FILE)["verdicts"]
+    return plan, history.load(out / history.ARRAYS)["verdicts"]
 
 
 @pytest.fixture(scope="module")

@@ -83,7 +83,7 @@ def test_runs_in_the_same_second_all_fly():
     ]
 
 
-@pytest.mark.parametrize("left", ["summary.json", "arrays.npz", "run.rrd", "journal.arrows"])
+@pytest.mark.parametrize("left", ["summary.json", "arrays", "run.rrd", "journal.arrows"])
 def test_what_is_left_of_a_run_is_not_taken_for_this_one(left, out):
     out.mkdir()
     (out / left).touch()

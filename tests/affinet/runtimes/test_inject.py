@@ -64,7 +64,7 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
     assert {name: fault["at"] for name, fault in faults.items()} == pytest.approx(
         {"cut": cut.k * 0.01, "lose": lose.k * 0.01}
     )
-    recorded = journal.injected(journal.read(out / JOURNAL))
+    recorded = journal.told(out / JOURNAL).injected
     assert [(fault.verb, fault.start) for fault in recorded] == [(Verb.CUT, cut.k), (Verb.LOSE, lose.k)]
     assert recorded[1].end == healed.k
 
@@ -73,7 +73,7 @@ def test_what_is_injected_bites_lands_in_the_journal_and_is_flown_again(out, tmp
         assert again.digest == flight.outcome.digest
         tables = [journal.read(run / JOURNAL) for run in (out, tmp_path / name)]
         assert tables[0].drop_columns("event").equals(tables[1].drop_columns("event"))
-        assert journal.injected(tables[1]) == recorded
+        assert journal.told(tmp_path / name / JOURNAL).injected == recorded
 
 
 def test_nobody_injects_into_a_run_that_does_not_fly(out, capsys):

@@ -8,6 +8,7 @@ from io import StringIO
 import numpy as np
 import pytest
 from flying import plan_of
+from kept_arrays import rewrite
 
 from affinet.cli import commands
 from affinet.planning import making
@@ -31,8 +32,8 @@ def changed(flown, tmp_path):
 
     def change(of_inputs):
         shutil.copytree(flown, tmp_path / "changed")
-        arrays = history.load(flown / history.FILE)
-        np.savez(tmp_path / "changed" / history.FILE, **arrays | {"input": of_inputs(arrays["input"])})
+        arrays = history.load(flown / history.ARRAYS)
+        rewrite(tmp_path / "changed" / history.ARRAYS, arrays | {"input": of_inputs(arrays["input"])})
         return tmp_path / "changed"
 
     return change
@@ -61,7 +62,7 @@ def refused(capsys, *arguments):
 
 
 def test_the_model_is_that_of_the_inputs_flown(flown):
-    R0, R1 = moments(history.load(flown / history.FILE)["input"], 1)
+    R0, R1 = moments(history.load(flown / history.ARRAYS)["input"], 1)
     model = told(flown)
     assert set(model) == {"coefficients", "sigma_n", "sigma_u"}
     assert model["coefficients"] == pytest.approx([R1 / R0])
@@ -71,7 +72,7 @@ def test_the_model_is_that_of_the_inputs_flown(flown):
 
 
 def test_a_model_of_order_two_solves_two_equations(flown):
-    R0, R1, R2 = moments(history.load(flown / history.FILE)["input"], 2)
+    R0, R1, R2 = moments(history.load(flown / history.ARRAYS)["input"], 2)
     a = np.linalg.solve([[R0, R1], [R1, R0]], [R1, R2])
     model = told(flown, "--order", "2")
     np.testing.assert_allclose(model["coefficients"], a, rtol=1e-9)
@@ -122,7 +123,7 @@ def test_what_is_no_number_any_more_is_left_out(changed, flown):
         inputs[30:, 2] = np.nan
         return inputs
 
-    R0, R1 = moments(history.load(flown / history.FILE)["input"][:30], 1)
+    R0, R1 = moments(history.load(flown / history.ARRAYS)["input"][:30], 1)
     model = told(changed(diverging))
     assert model["coefficients"] == pytest.approx([R1 / R0])
     assert model["sigma_u"] == pytest.approx(np.sqrt(R0))

@@ -47,7 +47,7 @@ def test_the_journal_has_the_accounts_of_the_run(overrides, out):
     plan = plan_of("corridor", *overrides)
     flown = fly(plan, "inprocess", out, lambda *_: None)
     done = rehearse(plan)
-    booked = journal.accounts(journal.read(out / JOURNAL))
+    booked = journal.told(out / JOURNAL).accounts
     assert booked == accounts_of(done.arrays, booked.in_flight)
     assert booked.close
     assert booked.in_flight == done.outcome.messages["in_flight"] == flown.messages["in_flight"] > 0
@@ -68,9 +68,8 @@ def test_the_journal_and_its_accounts_outlive_the_world(out, monkeypatch):
     out.mkdir()
     flight = launcher.Launcher(plan, out, watch=lambda *_: None).fly()
     assert flight.failure.startswith("world (pid ")
-    assert not (out / "arrays.npz").exists()
     table = journal.read(out / JOURNAL)
-    booked = journal.accounts(table)
+    booked = journal.told(out / JOURNAL).accounts
     assert booked.close
     assert booked.ticks == table["tick"].to_numpy().max() + 1
     assert booked.ticks % batch  # what was not a whole batch yet is there too

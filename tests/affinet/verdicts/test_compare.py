@@ -91,7 +91,7 @@ def test_a_replay_is_compared_with_what_was_flown(out, tmp_path, capsys):
     (out / "scenario.json").write_text(json.dumps(told | {"seed": 5}))
     assert commands.main([*again, str(tmp_path / "other")]) == 1
     assert "tick 0: position of agent 4 is" in capsys.readouterr().err
-    assert history.load(tmp_path / "other" / history.FILE)["error"].shape == (50,)
+    assert history.load(tmp_path / "other" / history.ARRAYS)["error"].shape == (50,)
 
 
 def test_determinism_is_checked_in_both_runtimes(capsys):

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 from flying import PROCESSES, plan_of
+from kept_arrays import rewrite
 
 from affinet.cli import commands
 from affinet.runtimes.run import fly
@@ -13,7 +14,7 @@ from world.books import history
 
 pytestmark = PROCESSES
 
-ARRAYS, SCENARIO, CONTROL, BOOK = history.FILE, "scenario.json", "control.json", "inputs/inputs.json"
+ARRAYS, SCENARIO, CONTROL, BOOK = history.ARRAYS, "scenario.json", "control.json", "inputs/inputs.json"
 NOT_WHOLE = "control.json is not whole"
 
 
@@ -50,7 +51,7 @@ def replayed(capsys, run, tmp_path, *options, status):
 
 def rewritten(run, change):
     arrays = history.load(run / ARRAYS)
-    np.savez(run / ARRAYS, **change(arrays))
+    rewrite(run / ARRAYS, change(arrays))
 
 
 @pytest.mark.parametrize("options", [(), ("--verdicts",)])
@@ -76,7 +77,7 @@ def test_what_has_another_form_is_not_the_same_bits(change, differs, options, ru
 
 
 def test_a_replay_that_compared_nothing_fails_and_says_so(run, tmp_path, capsys):
-    (run / ARRAYS).unlink()
+    shutil.rmtree(run / ARRAYS)
     line = replayed(capsys, run, tmp_path, status=1)
     assert line.startswith(f"{run / ARRAYS}: not there, so no bit was compared")
     assert (
@@ -87,50 +88,53 @@ def test_a_replay_that_compared_nothing_fails_and_says_so(run, tmp_path, capsys)
     )
 
 
-def truncated(file):
+def broken_off(folder):
+    file = folder / "input.npy"
     file.write_bytes(file.read_bytes()[:2000])
 
 
-def flipped(file):
-    body = bytearray(file.read_bytes())
-    body[len(body) // 2] ^= 0xFF
-    file.write_bytes(body)
-
-
-def one_array(file):
-    with file.open("wb") as opened:
-        np.save(opened, np.zeros(3))
-
-
 def with_arrays(change):
-    return lambda file: rewritten(file.parent, change)
+    return lambda folder: rewritten(folder.parent, change)
+
+
+def saying(text):
+    return lambda folder: (folder / "input.npy").write_bytes(text)
 
 
 DAMAGES = {
-    "truncated": (truncated, "not a zip file"),
-    "a byte flipped": (flipped, "Bad CRC-32"),
-    "empty": (lambda file: file.write_bytes(b""), "No data left in file"),
-    "a text": (lambda file: file.write_text("nothing\n"), "pickle"),
-    "one array": (one_array, "one array, not an archive"),
-    "without a key": (with_arrays(lambda a: {n: v for n, v in a.items() if n != "input"}), "it has no input"),
-    "objects": (with_arrays(lambda a: a | {"input": np.array([None] * 20)}), "Object arrays cannot be loaded"),
-    "no axes": (with_arrays(lambda a: a | {"input": np.float64(1.0)}), "input is float64 of shape ()"),
-    "no ticks": (with_arrays(lambda a: a | {"error": np.float64(1.0)}), "is float64 of shape"),
-    "texts": (with_arrays(lambda a: a | {"input": np.full((20, 7, 2), "x")}), "input is <U1 of shape (20, 7, 2)"),
-    "other ticks": (with_arrays(lambda a: a | {"input": a["input"][:9]}), "of shape (9, 7, 2), in a run of 20"),
-    "a text beside": (with_arrays(lambda a: a | {"stranger": np.full((20, 7), "x")}), "stranger is <U1"),
+    "truncated": (broken_off, "input.npy", "it breaks off before its (20,) rows end"),
+    "empty": (saying(b""), "input.npy", "EOF: reading magic string"),
+    "a text": (saying(b"nothing\n"), "input.npy", "the magic string is not correct"),
+    "another format": (saying(b"\x93NUMPY\x02\x00"), "input.npy", "another format"),
+    "half a header": (saying(b"\x93NUMPY\x01\x00v\x00{'descr'"), "input.npy", "EOF: reading array header"),
+    "no header": (saying(b"\x93NUMPY\x01\x00\x02\x00[]"), "input.npy", "not a dictionary"),
+    "by columns": (with_arrays(lambda a: a | {"input": np.asfortranarray(a["input"])}), "input.npy", "no plain rows"),
+    "without a key": (with_arrays(lambda a: {n: v for n, v in a.items() if n != "input"}), "", "it has no input"),
+    "objects": (with_arrays(lambda a: a | {"input": np.array([None] * 20)}), "input.npy", "no plain rows of numbers"),
+    "no axes": (with_arrays(lambda a: a | {"input": np.float64(1.0)}), "", "input is a single number"),
+    "no ticks": (with_arrays(lambda a: a | {"error": np.float64(1.0)}), "", "error is a single number"),
+    "texts": (with_arrays(lambda a: a | {"input": np.full((20, 7, 2), "x")}), "", "input is <U1 of shape (20, 7, 2)"),
+    "a text beside": (with_arrays(lambda a: a | {"stranger": np.full((20, 7), "x")}), "", "stranger is <U1"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("verb", ["replay", "fit"])
-@pytest.mark.parametrize(("damage", "why"), DAMAGES.values(), ids=DAMAGES)
-def test_damaged_arrays_are_named_with_the_way_out(damage, why, verb, run, tmp_path, capsys):
+@pytest.mark.parametrize(("damage", "file", "why"), DAMAGES.values(), ids=DAMAGES)
+def test_damaged_arrays_are_named_with_the_way_out(damage, file, why, verb, run, tmp_path, capsys):
     damage(run / ARRAYS)
     line = replayed(capsys, run, tmp_path, status=2) if verb == "replay" else said(capsys, "fit", run, status=2)
-    assert line.startswith(f"{run / ARRAYS}: not what a run wrote there: ")
+    assert line.startswith(f"{run / ARRAYS / file}: not what a run wrote there: ")
     assert why in line
     assert line.endswith("fly the run again, or restore the file")
     assert not (tmp_path / "again").exists()
+
+
+def test_a_byte_that_was_flipped_is_not_the_same_bits(run, tmp_path, capsys):
+    file = run / ARRAYS / "input.npy"
+    body = bytearray(file.read_bytes())
+    body[-1] ^= 0x01
+    file.write_bytes(body)
+    assert "tick 19: input of agent 7 is " in replayed(capsys, run, tmp_path, status=1)
 
 
 @pytest.mark.parametrize("verb", ["replay", "fit", "inject"])

@@ -9,7 +9,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 from flying import PROCESSES
 from own_code import ESTIMATOR, LAW, broken, line_of, write
@@ -24,6 +23,7 @@ from affinet.testing.swarm import Broken, SwarmRuns
 from affinet.verdicts.checkers import always, eventually
 from affinet.verdicts.checking import Checker
 from netem.processes.user_code import UserCodeError
+from world.books.history import ARRAYS, load
 
 SHORT = ("time.dt=0.05", "time.duration=1")
 SIMPLE = ("agents.law=rest", *SHORT)  # no stress to solve
@@ -589,7 +589,7 @@ def test_a_run_that_it_ends_leaves_what_was_flown_and_the_traceback(folder, out)
     (reason,) = done.reasons
     assert reason.startswith(f"{name}:Own.fuse in tick 7: ZeroDivisionError: division by zero ({folder / name}.py:")
     assert json.loads((out / "summary.json").read_text())["reasons"] == [reason]
-    assert np.load(out / "arrays.npz")["position"].shape == (8, 7, 2)
+    assert load(out / ARRAYS)["position"].shape == (8, 7, 2)
     traceback = (out / "logs" / "inprocess.log").read_text()
     assert "return state, 1 / 0 if late else estimate" in traceback
     assert traceback.rstrip().endswith(reason)

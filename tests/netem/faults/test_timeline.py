@@ -1,5 +1,6 @@
 """Scripted faults: what holds in which tick; faults add up, and the end of one heals no other."""
 
+import tracemalloc
 from dataclasses import fields, replace
 
 import numpy as np
@@ -636,3 +637,62 @@ def test_a_fault_of_many_links_names_the_first_and_counts_the_rest():
 def test_a_fault_on_what_does_not_exist_names_it(fault, match):
     with pytest.raises(ValueError, match=match):
         Timeline(LINKS, [fault])
+
+
+# ---- long runs
+
+
+MANY = [
+    fault
+    for second in range(0, 40_000, 4)
+    for fault in (
+        Fault(Verb.CUT, second, second + 2, pairs=((1, 2),)),
+        Fault(Verb.KILL, second + 1, second + 3, agents=(3,)),
+    )
+]
+
+
+def test_many_faults_take_no_conditions_but_those_that_are_looked_at():
+    """Before: all were made at the first look, 1.7 kB for each of 20,000, in world, medium and launcher."""
+    timeline = Timeline(LINKS, MANY)
+    tracemalloc.start()
+    for tick in range(20_000):
+        timeline.at(tick)
+    early, _ = tracemalloc.get_traced_memory()
+    for tick in range(20_000, 40_000):
+        timeline.at(tick)
+    late, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert late - early < 20_000
+    assert timeline.at(7) is timeline.at(7)
+    assert (held(timeline.at(1).cut), timeline.at(3).dead.any()) == ({(1, 2)}, False)
+
+
+def test_who_takes_part_in_many_ticks_is_who_does_in_each():
+    timeline = Timeline(LINKS, [*MANY[:6], Fault(Verb.DEPART, 3, None, agents=(1,))])
+    ticks = [0, 1, 2, 3, 9, 5]
+    each = np.array([~timeline.at(tick).absent for tick in ticks])
+    np.testing.assert_array_equal(timeline.present(ticks), each, strict=True)
+    np.testing.assert_array_equal(timeline.each(ticks, lambda now: now.dead), [timeline.at(t).dead for t in ticks])
+    assert timeline.present([]).shape == (0, 4)
+
+
+def test_without_one_fault_the_others_hold_as_they_did_for_as_long_as_it_lasts():
+    faults = [
+        Fault(Verb.CUT, 0, 5, pairs=((1, 2),)),
+        Fault(Verb.LOSE, 3, 8, pairs=((2, 3),), probability=0.5),
+        Fault(Verb.PAUSE, 4, 6, agents=(1,)),
+        Fault(Verb.CUT, 7, None, pairs=((3, 4),)),
+        Fault(Verb.KILL, 8, 9, agents=(2,)),
+    ]
+    whole = Timeline(LINKS, faults)
+    for number, fault in enumerate(faults):
+        without = Timeline(LINKS, [other for place, other in enumerate(faults) if place != number])
+        alone = whole.without(number)
+        for tick in range(fault.start, fault.end or 12):
+            for field in fields(Conditions):
+                if field.name != "acting":
+                    np.testing.assert_array_equal(
+                        getattr(alone.at(tick), field.name), getattr(without.at(tick), field.name)
+                    )
+    assert [fault.verb for fault in whole.without(1).faults] == [Verb.CUT, Verb.PAUSE, Verb.CUT]

@@ -17,6 +17,7 @@ from affinet.scenario.sections import ScenarioError
 from netem.core.draws import Purpose, uniform
 from netem.medium.verdict import Verdict
 from netem.processes.user_code import UserCodeError
+from world.books.history import ARRAYS, load
 
 pytestmark = PROCESSES
 
@@ -129,7 +130,7 @@ def test_a_loss_by_an_entry_point_of_a_package_flies_over_processes(tmp_path):
         summary = json.loads((tmp_path / runtime / "summary.json").read_text())
         digests[runtime] = summary["digest"]
     assert digests["inprocess"] == digests["processes"]
-    book = np.load(tmp_path / "processes" / "arrays.npz")["verdicts"]
+    book = load(tmp_path / "processes" / ARRAYS)["verdicts"]
     dark = np.arange(len(book)) * 0.05 % 0.5 >= 0.25
     assert (book[dark] == Verdict.LOST).all()
     assert not (book[~dark] == Verdict.LOST).any()

@@ -21,7 +21,6 @@ from netem.medium import journal
 from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import about, afterwards, said
 from netem.wire.session import Login
-from world.books.history import History
 from world.recording.file import wrong_with
 from world.recording.logbook import RunWriter
 
@@ -341,13 +340,6 @@ def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, m
     ):
         with pytest.raises(KeyError, match="first"), table:
             raise KeyError("first")
-
-
-def test_arrays_are_saved_whole_or_not_at_all(tmp_path):
-    plan = plan_of("corridor", *SHORT)
-    with pytest.raises(OSError, match="gone") as caught:
-        History(plan.world, len(plan.channels), plan.reports).save(tmp_path / "gone" / "arrays.npz")
-    assert said(caught.value).startswith(f"'{tmp_path / 'gone'}")
 
 
 def test_access_that_is_gone_does_not_hide_what_ended_the_run(tmp_path):

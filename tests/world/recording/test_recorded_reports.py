@@ -11,6 +11,7 @@ from scripted import timeline
 
 from affinet.runtimes.run import fly
 from analysis.metrics import localization
+from world.books.history import ARRAYS, load
 from world.books.localized import FirstMeasurements
 from world.recording.target import _over_agents
 
@@ -34,7 +35,7 @@ def pursuit_on_file(tmp_path_factory):
 
 
 def test_a_recording_of_a_pursuit_shows_the_target_and_what_agents_know_of_it(pursuit_on_file):
-    chunks, arrays = recorded(pursuit_on_file), dict(np.load(pursuit_on_file / "arrays.npz"))
+    chunks, arrays = recorded(pursuit_on_file), load(pursuit_on_file / ARRAYS)
     kept = {name: array[:40:5] for name, array in arrays.items()}
     nominal = plan_of(NAME, *COARSE).world.formation.nominal
     points = {
@@ -77,7 +78,7 @@ def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(t
     blind = timeline({"verb": "cut", "at": 0, "until": 1.0, "links": ["all"]})
     out = tmp_path / "run"
     fly(plan_of("localization", "time.duration=1.5", blind), "inprocess", out, lambda *_: None)
-    chunks, arrays = recorded(out), dict(np.load(out / "arrays.npz"))
+    chunks, arrays = recorded(out), load(out / ARRAYS)
     place, best = (
         np.array(column(chunks, f"/swarm/{path}", "Points3D:positions"), dtype=float) for path in ("place", "optimal")
     )
@@ -103,7 +104,7 @@ def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
     dead = timeline({"verb": "kill", "at": 0.2, "agents": [4]})
     plan, out = plan_of("localization", "time.duration=0.4", dead), tmp_path / "run"
     fly(plan, "inprocess", out, lambda *_: None)
-    chunks, arrays = recorded(out), dict(np.load(out / "arrays.npz"))
+    chunks, arrays = recorded(out), load(out / ARRAYS)
     told = np.array(column(chunks, "/metrics/localization", "Scalars:scalars"), dtype=float)[:, 0]
     kept = arrays["place"][:40:5]
     assert np.isnan(kept).any(axis=(1, 2)).tolist() == [False] * 4 + [True] * 4
@@ -128,7 +129,7 @@ def test_a_recording_of_maps_shows_the_formation_as_each_agent_perceives_it(esti
         tmp_path / "run",
     )
     fly(plan, "inprocess", out, lambda *_: None)
-    arrays, nominal = dict(np.load(out / "arrays.npz")), plan.world.formation.nominal
+    arrays, nominal = load(out / ARRAYS), plan.world.formation.nominal
     shown = np.array(column(recorded(out), "/swarm/perceived", "Points3D:positions"), dtype=float)[..., :2]
     moments = len(shown)
     step = len(arrays["error"]) // moments

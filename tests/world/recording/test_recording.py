@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from affinet.runtimes.run import fly, rehearse
 from netem.medium.verdict import Verdict
-from world.books.history import UNTOLD
+from world.books.history import ARRAYS, UNTOLD, load
 
 FAULTS = (
     'timeline=[{verb="cut",at=0.5,until=1.0,links=["4-6"]},{verb="kill",at=1.2,agents=[7]},'
@@ -58,7 +58,7 @@ def test_it_is_on_simulated_time(chunks):
 
 def test_the_tracking_error_is_that_of_the_run(chunks, flown):
     recorded = [value[0] for value in column(chunks, "/metrics/tracking_error", "Scalars:scalars")]
-    assert recorded == np.load(flown / "arrays.npz")["error"][::5].tolist()
+    assert recorded == load(flown / ARRAYS)["error"][::5].tolist()
 
 
 def normalised(plan, arrays, tick):
@@ -81,7 +81,7 @@ def normalised(plan, arrays, tick):
 def test_consistency_is_that_of_the_edges_with_a_band_as_wide_as_they_are_many(chunks, flown):
     recorded = np.array(column(chunks, "/metrics/consistency", "Scalars:scalars"))
     assert recorded.shape == (40, 4)
-    plan, arrays = plan_of("corridor", "time.duration=2", FAULTS), np.load(flown / "arrays.npz")
+    plan, arrays = plan_of("corridor", "time.duration=2", FAULTS), load(flown / ARRAYS)
     arrays = {name: arrays[name] for name in ("position", "estimate", "known", "covariance", "nis", "verdicts")}
     numbers = []
     for moment in range(40):
@@ -99,7 +99,7 @@ def test_consistency_knows_ranges_and_bearings_from_coordinates(out):
     recorded = np.array(
         column(RrdReader(str(out / "run.rrd")).stream().to_chunks(), "/metrics/consistency", "Scalars:scalars")
     )
-    arrays = dict(np.load(out / "arrays.npz"))
+    arrays = load(out / ARRAYS)
     for moment in range(4):
         np.testing.assert_allclose(recorded[moment, :2], normalised(plan, arrays, 5 * moment)[:2], rtol=1e-6)
 
@@ -127,7 +127,7 @@ def test_a_swarm_that_diverges_in_space_is_recorded_to_the_end(estimator, sensin
 
 def test_messages_are_counted_over_all_ticks(chunks, flown):
     per_tick = np.array(column(chunks, "/metrics/messages", "Scalars:scalars"))
-    verdicts = np.load(flown / "arrays.npz")["verdicts"]
+    verdicts = load(flown / ARRAYS)["verdicts"]
     assert per_tick[:, 0].sum() * 5 == pytest.approx((verdicts == Verdict.DELIVERED).sum())
     assert per_tick.sum() * 5 == pytest.approx((verdicts != Verdict.SILENT).sum())
 
@@ -183,7 +183,7 @@ def test_positions_far_from_the_origin_keep_their_millimetres(tmp_path):
     fly(plan_of("corridor", "time.dt=0.05", "time.duration=0.5", home), "inprocess", tmp_path / "utm", lambda *_: None)
     far = RrdReader(str(tmp_path / "utm" / "run.rrd")).stream().to_chunks()
     recorded = np.array(column(far, "/swarm/agents", "Points3D:positions"))
-    position = np.load(tmp_path / "utm" / "arrays.npz")["position"][:-1:5]
+    position = load(tmp_path / "utm" / ARRAYS)["position"][:-1:5]
     assert np.abs(recorded[..., :2] + [500_000.0, 4_649_000.0] - position).max() < 1e-3
     (said,) = (chunk.to_record_batch() for chunk in far if str(chunk.entity_path) == "/origin")
     assert said.column("TextDocument:text").to_pylist() == [["positions are relative to (500000, 4649000) m"]]

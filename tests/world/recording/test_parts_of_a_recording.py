@@ -1,0 +1,78 @@
+"""A long recording is in parts: each opens by itself, and all together are the recording."""
+
+import socket
+from collections import Counter
+
+import pytest
+from flying import plan_of
+from rerun.chunk import RrdReader
+
+from affinet.runtimes.run import fly
+from netem.core.parts import parts
+from world.recording import recorder
+from world.recording.file import listens, wrong_with
+
+FAULT = 'timeline=[{verb="cut",at=0.5,until=1.0,links=["all"]}]'
+SMALL = 150_000  # bytes
+
+
+def flown(out, name):
+    plan = plan_of(name, "time.dt=0.02", "time.duration=4", "record.every=1", FAULT)
+    assert fly(plan, "inprocess", out, lambda *_: None).verdict != "fail"
+    return parts(out / "run.rrd")
+
+
+def rows(file):
+    """How many rows there are of each entity, those that do not change apart."""
+    changing, static = Counter(), Counter()
+    for chunk in RrdReader(str(file)).stream().to_chunks():
+        (static if chunk.is_static else changing)[str(chunk.entity_path)] += chunk.num_rows
+    return changing, static
+
+
+@pytest.mark.parametrize("name", ["corridor", "localization", "target"])
+def test_the_parts_are_the_recording_and_each_says_all_that_does_not_change(name, tmp_path, monkeypatch):
+    (whole,) = flown(tmp_path / "whole", name)
+    monkeypatch.setattr(recorder, "LARGEST", SMALL)
+    files = flown(tmp_path / "parted", name)
+    assert len(files) > 1
+    assert max(file.stat().st_size for file in files) < whole.stat().st_size
+    assert [wrong_with(file) for file in files] == [None] * len(files)
+    changing, static = rows(whole)
+    found = [rows(file) for file in files]
+    repeated = {"/swarm/measured"}  # where agents put their neighbours at first: in each part again
+    together = sum((each for each, _ in found), Counter())
+    assert {path: n for path, n in together.items() if path not in repeated} == {
+        path: n for path, n in changing.items() if path not in repeated
+    }
+    assert all(each.keys() >= changing.keys() & repeated for each, _ in found)
+    assert all(said.keys() == static.keys() for _, said in found)
+
+
+def test_a_part_that_breaks_off_fails_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder, "LARGEST", SMALL)
+    torn = []
+
+    def tear(*_):
+        files = parts(tmp_path / "run" / "run.rrd")
+        if len(files) == 2 and not torn:
+            torn.append(files[1])
+            files[1].unlink()
+            files[1].touch()
+
+    done = fly(
+        plan_of("corridor", "time.dt=0.02", "time.duration=4", "record.every=1"), "inprocess", tmp_path / "run", tear
+    )
+    assert done.verdict == "fail"
+    assert torn
+    assert "run-2.rrd" in done.reasons[0]
+
+
+def test_a_viewer_that_is_gone_is_not_waited_for():
+    with socket.socket() as viewer:
+        viewer.bind(("127.0.0.1", 0))
+        viewer.listen()
+        url = f"rerun+http://127.0.0.1:{viewer.getsockname()[1]}/proxy"
+        assert listens(url)
+    assert not listens(url)
+    assert not listens("rerun+http://nowhere.invalid:1/proxy")
