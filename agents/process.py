@@ -27,6 +27,7 @@ from netem.wire import messages
 from netem.wire.arrays import TRUTH, packed
 from netem.wire.carrier import Ear, Session, await_heard
 from netem.wire.keys import Keys
+from netem.wire.repeating import opened
 from netem.wire.sequence import Sequences
 from netem.wire.session import CENTRE, HUB, Login, client
 
@@ -252,13 +253,14 @@ def host() -> NoReturn:
 
 def _fly(supervisor: Supervisor) -> None:
     brief = supervisor.brief(AgentBrief)
-    with supervisor.confessing(), Session(client(brief.login)) as session:
+    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
         _until_the_end(supervisor, AgentsNode(session, supervisor, [brief]))
 
 
 def _carry(supervisor: Supervisor) -> None:
     brief = supervisor.brief(HostBrief)
-    with supervisor.confessing(), Session(client(brief.agents[0].login)) as session:
+    login = brief.agents[0].login
+    with supervisor.confessing(), opened(client(login), login, supervisor.lost) as session:
         _until_the_end(supervisor, AgentsNode(session, supervisor, brief.agents, brief.host))
 
 

@@ -31,6 +31,7 @@ from netem.wire.arrays import CODE, WHOLE, Form, WireError, channel_rows, number
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
+from netem.wire.repeating import opened
 from netem.wire.sequence import Numbering, Sequences
 from netem.wire.session import HUB, WORLD, Login, hub
 
@@ -370,7 +371,7 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
-    with supervisor.confessing(), Session(config) as session:
+    with supervisor.confessing(), opened(config, brief.login, supervisor.lost) as session:
         # These take a while to import: everybody else can log in by now.
         from netem.core.arrow import do_without_pandas
         from netem.medium import journal

@@ -13,6 +13,7 @@ from netem.core.clock import Clock, Lockstep
 from netem.processes import system_errors
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
+from netem.wire.repeating import opened
 from netem.wire.session import client
 from world import flight
 from world.books.history import FILE as ARRAYS
@@ -103,7 +104,7 @@ def main() -> None:
 
     do_without_pandas()
     out = Path(brief.out)
-    with supervisor.confessing(), Session(client(brief.login)) as session:
+    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
         last: list[Callable[[], None]] = []
         with (
             system_errors.afterwards(lambda: [step() for step in last]),

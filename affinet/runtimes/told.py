@@ -46,6 +46,7 @@ _OF_ALL: Mapping[str, Mapping[str, Check]] = {
     "ready": {},
     "beat": {"k": _is_count, "what": _is_text, "waits": _all(_is_text)},
     "failed": {"reason": _is_text},
+    "lost": {"key": _is_text, "count": _is_count},
 }
 _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {

@@ -87,6 +87,10 @@ class Supervisor:
             while line:
                 line = line[os.write(self._events, line) :]
 
+    def lost(self, key: str, count: int) -> None:
+        """Report messages that the transport lost, and that were had again."""
+        self.tell("lost", key=key, count=count)
+
     def works(self, tick: int) -> None:
         """From now on the child waits for nobody: what comes of this tick is up to it."""
         self._doing = _Doing(tick, "", tuple)

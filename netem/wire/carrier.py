@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -32,6 +32,11 @@ class Arrived:
         """The bytes."""
         return self._sample.payload.to_bytes()
 
+    @property
+    def note(self) -> bytes:
+        """What came beside them."""
+        return b"" if self._sample.attachment is None else self._sample.attachment.to_bytes()
+
 
 class Ear:
     """Hears what is said on a key."""
@@ -48,16 +53,16 @@ class Voice:
     """Says something on a key."""
 
     def __init__(self, publisher: zenoh.Publisher) -> None:
-        self._publisher = publisher
+        self.publisher = publisher
 
-    def say(self, data: bytes) -> None:
-        """Say it to whoever hears the key."""
-        self._publisher.put(data)
+    def say(self, data: bytes, note: bytes | None = None) -> None:
+        """Say it to whoever hears the key, with a note beside it."""
+        self.publisher.put(data, attachment=note)
 
     def await_heard(self) -> None:
         """Wait until somebody hears: what is said from then on is not lost at the start."""
-        changes = self._publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
-        matching: Any = self._publisher.matching_status
+        changes = self.publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
+        matching: Any = self.publisher.matching_status
         while not matching.matching:
             matching = changes.recv()
         changes.undeclare()  # type: ignore[no-untyped-call]
@@ -137,13 +142,49 @@ class Session:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
 
+    def hands(self, key: str, take: Callable[[Arrived], None]) -> None:
+        """Hand over what is said on a key, in a thread of the session's, where nothing may be said or asked."""
+        self._session.declare_subscriber(key, lambda sample: take(Arrived(sample)))
+
     def says(self, key: str) -> Voice:
         """Say something on a key."""
+        return self.says_once(key)
+
+    def says_once(self, key: str) -> Voice:
+        """Say something on a key that may be lost where links break."""
         return Voice(self._session.declare_publisher(key))
+
+    def is_here(self, key: str) -> None:
+        """Have it known by a key for as long as the session lasts."""
+        self._session.liveliness().declare_token(key)
+
+    def sees(self, key: str, take: Callable[[str, bool], None]) -> None:
+        """Hand over who comes, and who goes, by their keys, in a thread of the session's."""
+        self._session.liveliness().declare_subscriber(
+            key, lambda sample: take(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT), history=True
+        )
 
     def answers(self, key: str, room: int) -> Questions:
         """Answer questions on a key; so many may wait."""
         return Questions(key, self._session.declare_queryable(key, zenoh.handlers.FifoChannel(room)))
+
+    def asks(self, key: str, take: Callable[[Question], None]) -> None:
+        """Hand over what is asked on a key, in a thread of the session's; whoever takes it answers in another."""
+        self._session.declare_queryable(key, lambda query: take(Question(key, query)))
+
+    def ask_all(self, key: str, data: bytes, patience_s: float) -> list[bytes]:
+        """What all those answer within so many seconds who answer on a key."""
+        try:
+            answers = self._session.get(
+                key,
+                payload=data,
+                timeout=patience_s,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )
+        except zenoh.ZError as error:
+            raise NotCarried(str(error)) from error
+        return [reply.ok.payload.to_bytes() for reply in answers if reply.ok is not None]
 
     def ask(self, key: str, data: bytes, patience_s: float) -> bytes:
         """Ask whoever answers on a key.

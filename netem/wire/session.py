@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from netem.core.channels import INPUT, MEASUREMENT
-from netem.wire.keys import Keys
+from netem.wire.keys import Keys, again
 
 HUB = "netem"
 WORLD = "world"
@@ -40,6 +40,9 @@ _PENDING = 10_000
 # A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
 # that log in at once on two cores.
 _LEASE_MS = 3_600_000
+# Between machines a link breaks: it has to be noticed before TCP, which waits twice as long from try to try, comes to look only
+# after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
+_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
 
 
 _PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
@@ -83,6 +86,11 @@ class Login:
     endpoint: str
     name: str
     password: str
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it connects within one machine, by a file."""
+        return self.endpoint.startswith("unixsock-stream/")
 
 
 def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
@@ -132,12 +140,13 @@ def hub(
 
 
 def _config(base: dict[str, Any], login: Login, **auth: str) -> dict[str, Any]:
+    lease_ms, open_ms = (_LEASE_MS, _LEASE_MS) if login.is_local else (_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS)
     return base | {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
-            "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
-            "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
+            "unicast": {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING},
+            "link": {"tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
             "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
         },
     }
@@ -182,14 +191,29 @@ def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) 
         _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
         # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
         _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
+        *_repeats(f"{name}-again", [again(key) for key in hears], [again(key) for key in says]),
+    ]
+
+
+def _repeats(name: str, asked: list[str], answered: list[str]) -> list[dict[str, Any]]:
+    """Between machines, a message that was lost is asked for again."""
+    return [
+        *_asks(name, asked),
+        _allow(f"{name}-asked", "query", "egress", answered),
+        _allow(f"{name}-answers", "reply", "ingress", answered),
+        _allow(f"{name}-can", "declare_queryable", "ingress", answered),
     ]
 
 
 def _controls(keys: Keys) -> tuple[str, list[dict[str, Any]]]:
-    return CONTROL, [
-        _allow("control-asks", "query", "ingress", [keys.control]),
-        _allow("control-hears", "reply", "egress", [keys.control]),
-        _allow("control-learns", "declare_queryable", "egress", [keys.control]),
+    return CONTROL, _asks(CONTROL, [keys.control])
+
+
+def _asks(name: str, keys: list[str]) -> list[dict[str, Any]]:
+    return [
+        _allow(f"{name}-asks", "query", "ingress", keys),
+        _allow(f"{name}-hears", "reply", "egress", keys),
+        _allow(f"{name}-learns", "declare_queryable", "egress", keys),
     ]
 
 
