@@ -16,6 +16,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
+from datetime import timedelta
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -38,6 +39,8 @@ from analysis.models.finding import Finding
 from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
 from netem.processes.user_code import UserCodeError
+from netem.wire.certificates import NotTrusted
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, agent_name, host_name
 from world.books import history
 
 if TYPE_CHECKING:
@@ -71,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying, history.Damaged) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying, NotTrusted, history.Damaged) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except UserCodeError as error:
@@ -310,6 +313,16 @@ def _inject(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _keys(parsed: argparse.Namespace) -> int:
+    from netem.wire import authority  # its library takes a while to import
+
+    agents, hosts = range(1, parsed.agents + 1), range(1, (parsed.hosts or 0) + 1)
+    names = [HUB, WORLD, CENTRE, CONTROL, *map(agent_name, agents), *map(host_name, hosts)]
+    made = authority.make(parsed.directory, names, parsed.hub, timedelta(days=parsed.days))
+    show.keys(parsed.directory, made)
+    return PASS
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -320,4 +333,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "design": _design,
     "fit": _fit,
     "inject": _inject,
+    "keys": _keys,
 }

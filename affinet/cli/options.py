@@ -10,6 +10,8 @@ from affinet.scenario import files, loading
 from affinet.scenario.units import LARGEST, SMALLEST
 from world.formation.layouts import KINDS
 
+_LONGEST_DAYS = 3650  # as long as the authority
+
 
 def parser() -> argparse.ArgumentParser:
     """Reads a command line; `command` is the word of the command."""
@@ -45,6 +47,7 @@ def parser() -> argparse.ArgumentParser:
     _add_design(commands)
     _add_fit(commands)
     _add_inject(commands)
+    _add_keys(commands)
     return whole
 
 
@@ -88,6 +91,12 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
     return int(text)
+
+
+def _days(text: str) -> int:
+    if (days := _count(text)) > _LONGEST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text}: give at most {_LONGEST_DAYS}")
+    return days
 
 
 def _seed(text: str) -> int:
@@ -203,6 +212,30 @@ def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
     )
     fitting.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _add_keys(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    keys = commands.add_parser(
+        "keys",
+        help="certificates for runs over several machines",
+        description="Make an authority, and a certificate and a key for each process of a run. Run again, it makes new "
+        "certificates of the same authority for all who have one. docs/trust.md says what goes to which machine.",
+    )
+    keys.add_argument("directory", type=_path, metavar="DIR", help="where to keep them, for this user alone")
+    keys.add_argument("--agents", type=_count, default=10, metavar="N", help="for agents 1 to N (default: %(default)s)")
+    keys.add_argument(
+        "--hosts", type=_count, metavar="N", help="for N processes that carry several agents (agents.per_process)"
+    )
+    keys.add_argument(
+        "--hub",
+        nargs="+",
+        default=[],
+        metavar="ADDRESS",
+        help="host names and IP addresses under which the medium is reached, besides loopback",
+    )
+    keys.add_argument(
+        "--days", type=_days, default=30, metavar="D", help="how long they are valid (default: %(default)s)"
+    )
 
 
 def _groups(text: str) -> tuple[tuple[int, ...], ...]:

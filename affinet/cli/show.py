@@ -18,7 +18,9 @@ from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
 from analysis.models.finding import Finding
+from netem.core.listing import listed
 from netem.faults.control import Answer
+from netem.wire.certificates import AUTHORITY
 
 if TYPE_CHECKING:
     from affinet.planning.designing import Designed
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from affinet.studies.study import Result
     from affinet.testing.hunt import Counterexample, Coverage
     from affinet.testing.strategies import Entries
+    from netem.wire.authority import Made
 
 _SAYS = "{task.fields[says]}"
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
@@ -192,6 +195,17 @@ def designed(made: Designed, file: Path) -> None:
     has = f"{formation.agents} agents, {len(formation.edges)} edges, {len(formation.leaders)} leaders"
     print(f"{has}: what is slowest settles to 1/e in {made.settles:.1f} s")  # noqa: T201
     print(f"{file}: affinet run {directories.on_a_command_line(file)} --runtime inprocess")  # noqa: T201
+
+
+def keys(folder: Path, made: Made) -> None:
+    """Which certificates were made, and what to do with them."""
+    of = "the authority that was there" if made.renewed else "a new authority"
+    print(  # noqa: T201
+        f"{folder}: certificates of {of} for {len(made.names)} names until {made.ends:%Y-%m-%d %H:%M} UTC; "
+        f"the hub is reached at {listed(made.addresses)}\n"
+        f"copy to each machine {AUTHORITY}.pem, and NAME.pem and NAME.key of the processes there; "
+        f"{AUTHORITY}.key makes certificates, and stays here"
+    )
 
 
 def outcome(outcome: Outcome, plan: Plan) -> None:

@@ -20,9 +20,9 @@ from netem.faults.control import Answer, Order, OrderAction
 from netem.faults.fault import Fault, UnderWay, Verb
 from netem.processes.system_errors import about, afterwards
 from netem.wire import messages
-from netem.wire.carrier import NotCarried, Session
+from netem.wire.carrier import NotCarried, joined
 from netem.wire.keys import Keys
-from netem.wire.session import Login, client
+from netem.wire.session import Login
 
 _FILE = "control.json"
 _PATIENCE_S = 5.0
@@ -138,7 +138,7 @@ class Access:
             When nobody answers, or the medium could not read the order.
         """
         try:
-            with Session(client(self.login, _CONNECT_S)) as session:
+            with joined(self.login, _CONNECT_S) as session:
                 reply = session.ask(Keys(self.run).control, messages.pack(order), _PATIENCE_S)
         except NotCarried as error:
             raise NotFlying(f"the run has ended, stands still, or refuses: {error}") from error

@@ -9,6 +9,8 @@ from typing import Any
 
 import zenoh
 
+from netem.wire.session import Login, client
+
 _WAITING_CHANGES = 4
 
 
@@ -200,6 +202,22 @@ class Session:
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         raise NotCarried(f"no answer within {patience_s:g} s")
+
+
+def joined(login: Login, patience_s: float | None = None) -> Session:
+    """A session of a client of the hub, which is tried for as long as `patience_s`; None for ever.
+
+    Raises
+    ------
+    NotCarried
+        When it is not let in: why.
+    NotTrusted
+        When it has no proof of who it is that will do there.
+    """
+    try:
+        return Session(client(login, patience_s))
+    except NotCarried as error:
+        raise NotCarried(login.why_refused() or str(error)) from error
 
 
 def await_heard(voices: Iterable[Voice]) -> None:

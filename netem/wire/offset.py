@@ -32,7 +32,9 @@ class ClockOffset:
 SAME = ClockOffset(0.0, 0.0)  # of processes on one machine
 
 
-def measured(ask: Callable[[], float], clock: Callable[[], float] = time.monotonic, rounds: int = _ROUNDS) -> ClockOffset:
+def measured(
+    ask: Callable[[], float], clock: Callable[[], float] = time.monotonic, rounds: int = _ROUNDS
+) -> ClockOffset:
     """The offset of the clock that answers, by the quickest of some round trips.
 
     The answer was given at some moment of its round trip, and nothing says at which: the middle is off by half of it at most,

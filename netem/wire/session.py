@@ -1,25 +1,29 @@
-"""The network of a run as Zenoh is told of it: a hermetic star on loopback, with a name and a password for each process.
+"""The network of a run as Zenoh is told of it: a hermetic star, with a name for each process, and a proof of it.
 
-The medium is the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's
-messages to any other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
+On one machine the proof is a password, and nothing listens beyond loopback; beyond it a certificate, over TLS. The medium is
+the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's messages to any
+other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
 """
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from netem.core.channels import INPUT, MEASUREMENT
+from netem.wire.certificates import Certificates, NotTrusted
 from netem.wire.keys import Keys, again
 
 HUB = "netem"
 WORLD = "world"
 CONTROL = "control"
 CENTRE = "centre"
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
 _RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
@@ -48,6 +52,7 @@ _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
 _PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
 _LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
+_ADDRESS = re.compile(r"(tcp|tls)/(?:\[([0-9A-Fa-f:.]+)\]|([^\[\]:/?#]+)):([0-9]+)")
 
 
 def socket_folder() -> str:
@@ -81,23 +86,90 @@ def host_name(host: int) -> str:
 
 @dataclass(frozen=True)
 class Login:
-    """Where a process connects, and as whom."""
+    """Where a process connects, as whom, and how it proves that: by a password, or a certificate.
+
+    Parameters
+    ----------
+    endpoint
+        As Zenoh has it: "unixsock-stream/PATH", "tcp/ADDRESS:PORT" on loopback, or "tls/ADDRESS:PORT".
+    name
+        Who it is.
+    password
+        On this machine alone.
+    keys
+        For TLS the folder that `affinet keys` made, with a certificate of this name.
+    """
 
     endpoint: str
     name: str
-    password: str
+    password: str = field(default="", repr=False)  # what is printed of a brief goes to a log
+    keys: str | None = None
+
+    @property
+    def certificates(self) -> Certificates | None:
+        """The files by which it proves who it is, if it does by files."""
+        return None if self.keys is None else Certificates(self.keys, self.name)
 
     @property
     def is_local(self) -> bool:
-        """Whether it connects within one machine, by a file."""
-        return self.endpoint.startswith("unixsock-stream/")
+        """Whether it connects within one machine."""
+        return self.keys is None
+
+    @property
+    def address(self) -> tuple[str, int] | None:
+        """Host and port of the endpoint, if it has such."""
+        parts = _ADDRESS.fullmatch(self.endpoint)
+        return (parts[2] or parts[3], int(parts[4])) if parts else None
+
+    def why_refused(self) -> str | None:
+        """In one line why the hub does not let it in, where TLS knows more than Zenoh says."""
+        if self.certificates is None or self.address is None:
+            return None
+        return self.certificates.why_refused(*self.address)
+
+    def check(self) -> None:
+        """Go on if this may connect or listen, and will do as a proof.
+
+        Raises
+        ------
+        NotTrusted
+            When it would be heard beyond this machine without certificates, or these will not do.
+        """
+        if self.endpoint.startswith("unixsock-stream/"):
+            return
+        if self.address is None:
+            raise NotTrusted(f"{self.endpoint}: write it as tls/ADDRESS:PORT, or tcp/127.0.0.1:PORT on this machine")
+        protocol, address = self.endpoint.partition("/")[0], self.address[0]
+        if protocol == "tcp" and not _is_loopback(address):
+            raise NotTrusted(
+                f"{self.endpoint}: it would be heard beyond this machine, where nobody is known by a password: "
+                f"make certificates with `affinet keys`, and write tls/ for tcp/"
+            )
+        if (protocol == "tls") != (self.keys is not None):
+            raise NotTrusted(f"{self.endpoint}: TLS needs the folder that `affinet keys` made, and nothing else does")
+        if (certificates := self.certificates) is not None:
+            certificates.check()
+
+
+def _is_loopback(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
 
 
 def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
     """Configuration of an agent or the world: connects to the hub, and to nobody else.
 
     It tries for as long as `patience_s`; None for ever, where a launcher watches.
+
+    Raises
+    ------
+    NotTrusted
+        When it has no proof of who it is that will do there.
     """
+    login.check()
+    certificates = login.certificates
     return _config(
         {
             "mode": "client",
@@ -109,50 +181,69 @@ def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
             },
         },
         login,
+        auth=_by_password(login) if certificates is None else {},
+        tls={} if certificates is None else certificates.connecting(),
     )
 
 
 def hub(
-    login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+    login: Login, dictionary_file: str | None, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
 ) -> dict[str, Any]:
-    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do.
+    """Configuration of the medium: listens on one endpoint, knows who logs in and what each of them may do.
 
     Parameters
     ----------
     login, dictionary_file
-        Its own, and the file with everybody's password.
+        Its own, and the file with everybody's password; None where certificates prove who they are.
     keys
         Those of the run.
     agents
         All agents.
     hosts
         For each process that carries several of them, which.
+
+    Raises
+    ------
+    NotTrusted
+        When it would listen beyond this machine without certificates, or these will not do.
     """
+    login.check()
+    certificates = login.certificates
+    proof = "usernames" if certificates is None else "cert_common_names"
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "access_control": _access(keys, agents, hosts),
+            "access_control": _access(keys, agents, hosts, proof),
         },
         login,
-        dictionary_file=dictionary_file,
+        auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
+        tls={} if certificates is None else certificates.listening(),
     )
 
 
-def _config(base: dict[str, Any], login: Login, **auth: str) -> dict[str, Any]:
+def _by_password(login: Login, **known: str | None) -> dict[str, Any]:
+    return {"usrpwd": {"user": login.name, "password": login.password} | known}
+
+
+def _config(base: dict[str, Any], login: Login, auth: dict[str, Any], tls: dict[str, Any]) -> dict[str, Any]:
     lease_ms, open_ms = (_LEASE_MS, _LEASE_MS) if login.is_local else (_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS)
     return base | {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
             "unicast": {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING},
-            "link": {"tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
-            "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
+            "link": {
+                "protocols": [login.endpoint.partition("/")[0]],
+                "tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
+                "tls": tls,
+            },
+            "auth": auth,
         },
     }
 
 
-def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> dict[str, Any]:
+def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]], proof: str) -> dict[str, Any]:
     carried = {agent for of_host in hosts.values() for agent in of_host}
     rights = [
         _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
@@ -170,7 +261,7 @@ def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]
         "enabled": True,
         "default_permission": "deny",
         "rules": [rule for _, rules in rights for rule in rules],
-        "subjects": [{"id": name, "usernames": [name]} for name, _ in rights],
+        "subjects": [{"id": name, proof: [name]} for name, _ in rights],
         "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
     }
 
