@@ -19,7 +19,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from netem.processes.system_errors import about
 from netem.processes.whole import whole
 from netem.wire.certificates import AUTHORITY, NotTrusted, read_certificate, read_key
-from netem.wire.session import HUB, LOOPBACK
+from netem.wire.session import COORDINATOR, HUB, LOOPBACK
 
 _ALLOWED_SKEW = timedelta(hours=1)  # clocks of other machines
 _AUTHORITY_LASTS = timedelta(days=3650)
@@ -84,7 +84,8 @@ def make(folder: Path, names: Iterable[str], addresses: Sequence[str], lasts: ti
     for name in everybody:
         own = ec.generate_private_key(ec.SECP256R1())
         certificate = _builder(name, authority.subject, own, begins, ends)
-        certificate = _of_hub(certificate, addresses) if name == HUB else _of_client(certificate)
+        listens = name in (HUB, COORDINATOR)
+        certificate = _of_listener(certificate, addresses) if listens else _of_client(certificate)
         _keep(folder, name, certificate.sign(key, hashes.SHA256()), own)
     return Made(everybody, addresses, ends, renewed)
 
@@ -144,9 +145,10 @@ def _called(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
 
 
-def _of_hub(builder: x509.CertificateBuilder, addresses: Iterable[str]) -> x509.CertificateBuilder:
+def _of_listener(builder: x509.CertificateBuilder, addresses: Iterable[str]) -> x509.CertificateBuilder:
     names = x509.SubjectAlternativeName([_general_name(address) for address in addresses])
-    return _for(builder, ExtendedKeyUsageOID.SERVER_AUTH).add_extension(names, critical=False)
+    both = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH  # the medium joins a coordinator, too
+    return _for(builder, *both).add_extension(names, critical=False)
 
 
 def _of_client(builder: x509.CertificateBuilder) -> x509.CertificateBuilder:
@@ -154,9 +156,9 @@ def _of_client(builder: x509.CertificateBuilder) -> x509.CertificateBuilder:
     return _for(builder, ExtendedKeyUsageOID.CLIENT_AUTH)
 
 
-def _for(builder: x509.CertificateBuilder, purpose: x509.ObjectIdentifier) -> x509.CertificateBuilder:
+def _for(builder: x509.CertificateBuilder, *purposes: x509.ObjectIdentifier) -> x509.CertificateBuilder:
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-    return builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+    return builder.add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
 
 
 def _general_name(address: str) -> x509.GeneralName:

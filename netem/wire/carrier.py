@@ -57,8 +57,12 @@ class Voice:
     def __init__(self, publisher: zenoh.Publisher) -> None:
         self.publisher = publisher
 
-    def say(self, data: bytes, note: bytes | None = None) -> None:
-        """Say it to whoever hears the key, with a note beside it."""
+    def say(self, data: bytes) -> None:
+        """Say it to whoever hears the key."""
+        self.publisher.put(data)
+
+    def put(self, data: bytes, note: bytes) -> None:
+        """Say it, with a note beside it."""
         self.publisher.put(data, attachment=note)
 
     def await_heard(self) -> None:

@@ -13,6 +13,7 @@ import struct
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -126,11 +127,11 @@ class KeepingVoice(Voice):
         self._following = 0
         self._saying = threading.Lock()
 
-    def say(self, data: bytes, note: bytes | None = None) -> None:
+    def say(self, data: bytes) -> None:
         """Say it to whoever hears the key, with its number for a note."""
         with self._saying:
             self._kept.append((self._following, data))
-            super().say(data, _NOTE.pack(self._speaker, self._following))
+            self.put(data, _NOTE.pack(self._speaker, self._following))
             self._following += 1
 
     def repeat(self, question: bytes) -> bytes:
@@ -152,15 +153,15 @@ class AskingEar(Ear):
     ----------
     session
         Whose it is.
-    key
-        Which may be one of many.
+    key, room
+        Which may be one of many; and how many messages may wait.
     lost
         Told how many the transport lost.
     """
 
-    def __init__(self, session: Session, key: str, lost: Lost) -> None:
+    def __init__(self, session: Session, key: str, room: int, lost: Lost) -> None:
         self._session, self._key, self._lost = session, key, lost
-        self._arrivals: queue.SimpleQueue[Arrived | None] = queue.SimpleQueue()
+        self._arrivals: queue.Queue[Arrived | None] = queue.Queue(room)
         self._turn: deque[Arrived | Again] = deque()
         self._incoming: dict[str, Incoming[Arrived | Again]] = {}
         session.hands(key, self._arrivals.put)
@@ -194,14 +195,16 @@ class AskingEar(Ear):
             if incoming.unseen:
                 self._lost(key, incoming.unseen)
         self._incoming.clear()
-        self._arrivals.put(None)
+        with suppress(queue.Full):  # then nobody waits
+            self._arrivals.put_nowait(None)
 
     def _hear(self, arrived: Arrived) -> None:
         if len(arrived.note) != _NOTE.size:  # a program of somebody else's making does not number: docs/machines.md
             self._turn.append(arrived)
             return
         incoming = self._incoming.setdefault(arrived.key, Incoming())
-        turn, lost = incoming.heard(*_NOTE.unpack(arrived.note), arrived)
+        speaker, number = _NOTE.unpack(arrived.note)
+        turn, lost = incoming.heard(speaker, number, arrived)
         self._turn += turn
         if lost:
             self._lost(arrived.key, lost)
@@ -269,7 +272,7 @@ class RepeatingSession(Session):
 
     def hears(self, key: str, room: int) -> Ear:
         """Hear a key, in order and whole."""
-        ear = AskingEar(self, key, self._lost)
+        ear = AskingEar(self, key, room, self._lost)
         self._ears.append(ear)
         return ear
 

@@ -22,6 +22,7 @@ from netem.wire.keys import Keys, again
 HUB = "netem"
 WORLD = "world"
 CONTROL = "control"
+COORDINATOR = "coordinator"
 CENTRE = "centre"
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -207,14 +208,18 @@ def hub(
     NotTrusted
         When it would listen beyond this machine without certificates, or these will not do.
     """
+    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts))
+
+
+def listening(login: Login, dictionary_file: str | None, rights: Mapping[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone."""
     login.check()
     certificates = login.certificates
-    proof = "usernames" if certificates is None else "cert_common_names"
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "access_control": _access(keys, agents, hosts, proof),
+            "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
         auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
@@ -243,7 +248,9 @@ def _config(base: dict[str, Any], login: Login, auth: dict[str, Any], tls: dict[
     }
 
 
-def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]], proof: str) -> dict[str, Any]:
+def _rights_of_all(
+    keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+) -> dict[str, list[dict[str, Any]]]:
     carried = {agent for of_host in hosts.values() for agent in of_host}
     rights = [
         _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
@@ -257,12 +264,16 @@ def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]
         ),
         _controls(keys),
     ]
+    return dict(rights)
+
+
+def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str, Any]:
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule for _, rules in rights for rule in rules],
-        "subjects": [{"id": name, proof: [name]} for name, _ in rights],
-        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
+        "rules": [rule for rules in rights.values() for rule in rules],
+        "subjects": [{"id": name, proof: [name]} for name in rights],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights.items()],
     }
 
 
