@@ -172,8 +172,7 @@ class Machine:
             self._obey()
             for place in self._places:
                 place.relay()
-                if place.process is not None and place.process.returncode is not None:
-                    place.ended()
+                place.ended()
 
     def _start_nursery(self, kernels: dict[str, list[list[int]]]) -> None:
         prepared = {name: [(sizes, None) for sizes in of_one] for name, of_one in kernels.items()}
@@ -263,8 +262,7 @@ class Machine:
             assert place.process is not None
             with suppress(RunFailed):  # it has ended, and there is no nursery any more that would say how
                 end_by(deadline_s, place.process)
-            if place.process.returncode is not None:
-                place.ended()
+            place.ended()
         if self._nursery is not None:
             self._nursery.leave(_GRACE_S)
 
@@ -272,7 +270,7 @@ class Machine:
         """See when the coordinator is gone; while this machine was stopped itself, nobody was silent."""
         silent_s = 0.0
         while not self._over.wait(BEAT_S):
-            if any([place.beaten.is_set() for place in self._places]):
+            if any(place.beaten.is_set() for place in self._places):
                 silent_s = 0.0
                 for place in self._places:
                     place.beaten.clear()

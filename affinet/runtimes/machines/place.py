@@ -139,11 +139,12 @@ class Place:
 
     def ended(self) -> None:
         """The process has: tell all there is to tell of it."""
-        assert self.process is not None and self.process.returncode is not None
+        process = self.process
+        if process is None or process.returncode is None:
+            return
         self.relay()
-        status = self.process.returncode
-        self._forget()
-        self.tell(Ended(self.number, status))
+        self._forget(process)
+        self.tell(Ended(self.number, process.returncode))
 
     def beat(self) -> None:
         """Say that we live, and what the process does."""
@@ -165,9 +166,8 @@ class Place:
             self.process.terminate()
             self.process.send_signal(signal.SIGCONT)
 
-    def _forget(self) -> None:
-        assert self.process is not None
-        for pipe in (self.process.stdin, self.process.stdout):
+    def _forget(self, process: ForkedProcess) -> None:
+        for pipe in (process.stdin, process.stdout):
             with suppress(BrokenPipeError):
                 pipe.close()
         os.close(self.log_fd)
