@@ -54,8 +54,8 @@ class Nursery:
         self._living: dict[int, ForkedProcess] = {}
 
     @classmethod
-    def started(cls, log: IO[bytes], patience_s: float) -> Nursery:
-        """A nursery that has been started, and says when it is ready.
+    def started(cls, log: IO[bytes], patience_s: float, private: Path) -> Nursery:
+        """A nursery that has been started, and says when it is ready; at its end it removes a folder.
 
         Raises
         ------
@@ -68,7 +68,7 @@ class Nursery:
             ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             unless_started.enter_context(ours)
             with theirs:
-                process = started(program(), theirs.fileno(), log)
+                process = started(program(private), theirs.fileno(), log)
             unless_started.pop_all()
         return cls(Child(NURSERY, None, process, Path(log.name), trusted=True), ours, patience_s)
 
@@ -215,10 +215,11 @@ class ForkedProcess:
         os.close(self._descriptor)
 
 
-def program() -> list[str]:
-    """The command line of the nursery, with the search path of this process, and the kernels that planning has called."""
+def program(private: Path) -> list[str]:
+    """The command line of the nursery: the search path of this process, a private folder, kernels that planning has called."""
     path = [os.path.abspath(entry) for entry in sys.path if entry]
-    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__, json.dumps(kernels.prepared())]
+    told = [str(private), json.dumps(kernels.prepared())]
+    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__, *told]
 
 
 def end_by(deadline: float, process: Process) -> None:

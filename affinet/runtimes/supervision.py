@@ -70,8 +70,8 @@ class ProcessGroup:
         """All of the run, the nursery too."""
         return [*self.children, *([] if self._nursery is None else [self._nursery.child])]
 
-    def start_nursery(self) -> None:
-        """Start the nursery, and wait until it can fork.
+    def start_nursery(self, private: Path) -> None:
+        """Start the nursery, which removes this folder when the launcher is gone, and wait until it can fork.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class ProcessGroup:
             When it dies or fails, or does not get anywhere for too long; or there is no such thing on this system.
         """
         with self._log(NURSERY) as log:
-            self._nursery = Nursery.started(log, self._patience_s)
+            self._nursery = Nursery.started(log, self._patience_s, private)
         child = self._nursery.child
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         self.await_ready([child])

@@ -10,8 +10,8 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
-import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -44,31 +44,7 @@ _PENDING = 10_000
 # A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
 # that log in at once on two cores.
 _LEASE_MS = 3_600_000
-
-
-_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
-_PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
-_LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
 _ADDRESS = re.compile(r"(tcp|tls)/(?:\[([0-9A-Fa-f:.]+)\]|([^\[\]:/?#]+)):([0-9]+)")
-
-
-def socket_folder() -> str:
-    """A temporary folder in which the path of a socket is short enough for the system and plain enough for an endpoint.
-
-    Raises
-    ------
-    OSError
-        When there is none.
-    """
-    own = tempfile.gettempdir()
-    for folder in (own, *_PLACES):
-        fits = len(folder) + len(_SOCKET) <= _LONGEST_SOCKET and _PLAIN_PATH.fullmatch(folder)
-        if fits and os.access(folder, os.W_OK | os.X_OK):
-            return folder
-    raise OSError(
-        f"{own!r} is too long or too odd a path for the run's socket, and {', '.join(_PLACES)} cannot be written to; "
-        f"set TMPDIR to a plain path of at most {_LONGEST_SOCKET - len(_SOCKET)} characters"
-    )
 
 
 def agent_name(agent: int) -> str:
@@ -79,6 +55,18 @@ def agent_name(agent: int) -> str:
 def host_name(host: int) -> str:
     """The name under which a process logs in that carries several agents."""
     return f"host-{host}"
+
+
+def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[str]:
+    """The names of all who log in at the hub; agents that a host carries do not."""
+    carried = {agent for of_host in hosts.values() for agent in of_host}
+    lone = [agent for agent in agents if agent not in carried]
+    return [WORLD, CENTRE, CONTROL, *map(host_name, hosts), *map(agent_name, lone)]
+
+
+def identity(name: str) -> str:
+    """Which Zenoh session is that of a process: another that logs in as it may do nothing, and so each has one."""
+    return name.encode().hex()
 
 
 @dataclass(frozen=True)
@@ -201,29 +189,50 @@ def hub(
     """
     login.check()
     certificates = login.certificates
-    proof = "usernames" if certificates is None else "cert_common_names"
+    rights = _rights_of_all(keys, agents, hosts)
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "access_control": _access(keys, agents, hosts, proof),
+            "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
         auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
         tls={} if certificates is None else certificates.listening(),
+        max_sessions=len(rights),
     )
+
+
+@contextmanager
+def dictionary(passwords: Mapping[str, str]) -> Iterator[str | None]:
+    """A file with these passwords as Zenoh reads it, that lies on no disk, and is gone with the block; None for none."""
+    if not passwords:
+        yield None
+        return
+    with open(os.memfd_create("passwords"), "wb") as file:
+        file.write("".join(f"{name}:{password}\n" for name, password in passwords.items()).encode())
+        file.flush()
+        yield f"/proc/self/fd/{file.fileno()}"
 
 
 def _by_password(login: Login, **known: str | None) -> dict[str, Any]:
     return {"usrpwd": {"user": login.name, "password": login.password} | known}
 
 
-def _config(base: dict[str, Any], login: Login, auth: dict[str, Any], tls: dict[str, Any]) -> dict[str, Any]:
+def _config(
+    base: dict[str, Any],
+    login: Login,
+    auth: dict[str, Any],
+    tls: dict[str, Any],
+    **unicast: int,
+) -> dict[str, Any]:
+    times = {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING}
     return base | {
+        "id": identity(login.name),
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
-            "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
+            "unicast": times | unicast,
             "link": {
                 "protocols": [login.endpoint.partition("/")[0]],
                 "tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
@@ -234,26 +243,33 @@ def _config(base: dict[str, Any], login: Login, auth: dict[str, Any], tls: dict[
     }
 
 
-def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]], proof: str) -> dict[str, Any]:
+def _rights_of_all(
+    keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+) -> dict[str, list[dict[str, Any]]]:
     carried = {agent for of_host in hosts.values() for agent in of_host}
-    rights = [
-        _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
-        *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
-        *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
-        _rights(
-            CENTRE,
-            says=[keys.told("*")],
-            hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
-            learns=[keys.told("*")],
-        ),
-        _controls(keys),
-    ]
+    return dict(
+        [
+            _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+            *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
+            *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
+            _rights(
+                CENTRE,
+                says=[keys.told("*")],
+                hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
+                learns=[keys.told("*")],
+            ),
+            _controls(keys),
+        ]
+    )
+
+
+def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str, Any]:
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule for _, rules in rights for rule in rules],
-        "subjects": [{"id": name, proof: [name]} for name, _ in rights],
-        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
+        "rules": [rule for rules in rights.values() for rule in rules],
+        "subjects": [{"id": name, proof: [name], "zids": [identity(name)]} for name in rights],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights.items()],
     }
 
 
