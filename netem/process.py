@@ -7,7 +7,7 @@ changes it.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -33,7 +33,7 @@ from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.repeating import opened
 from netem.wire.sequence import Numbering, Sequences
-from netem.wire.session import HUB, WORLD, Login, hub
+from netem.wire.session import HUB, WORLD, Login, clients, dictionary, hub
 
 if TYPE_CHECKING:
     from netem.medium.journal import Writer
@@ -49,8 +49,8 @@ class MediumBrief:
     ----------
     run
         The run's name, part of every key.
-    login, dictionary_file
-        Where to listen, and the file with everybody's password.
+    login, passwords
+        Where to listen, and the password of each who logs in by one.
     seed, links, channels, profiles, faults, triggers
         What the medium is made of.
     injected
@@ -69,7 +69,7 @@ class MediumBrief:
 
     run: str
     login: Login
-    dictionary_file: str
+    passwords: Mapping[str, str] = field(repr=False)
     seed: int
     links: Links
     channels: tuple[str, ...]
@@ -165,6 +165,7 @@ class MediumNode:
         self._broadcasts = session.hears(keys.broadcast("*", "*"), 4096)
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
+        self._doorway = session.doorway(clients(agents, brief.hosts))
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
         self._streams = {agent: f"inbox {agent}" for agent in agents}
         self._positioned = brief.positioned.tolist()
@@ -183,6 +184,7 @@ class MediumNode:
             sense = messages.unpack(messages.Sense, self._sense.next().data)
             self._from_world.check("sense", sense.seq)
             self._supervisor.works(sense.k)
+            self._doorway.refuse_strangers()
             if sense.last:
                 self._end(sense.k)
                 return
@@ -366,12 +368,17 @@ def _rows(data: bytes, count: int, which: Integers) -> tuple[bytes, int]:
     return np.frombuffer(data, f"V{size}", count)[which].tobytes(), size
 
 
+def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
+    agents = range(1, brief.links.agents + 1)
+    with dictionary(brief.passwords) as file:
+        return opened(hub(brief.login, file, Keys(brief.run), agents, brief.hosts), brief.login, supervisor.lost)
+
+
 def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
-    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
-    with supervisor.confessing(), opened(config, brief.login, supervisor.lost) as session:
+    with supervisor.confessing(), _listening(supervisor, brief) as session:
         # These take a while to import: everybody else can log in by now.
         from netem.core.arrow import do_without_pandas
         from netem.medium import journal

@@ -102,13 +102,17 @@ class Access:
     login: Login
 
     @contextmanager
-    def granted(self, out: Path) -> Iterator[None]:
-        """Leave the access in the run directory, for this user alone, for as long as the run flies."""
-        file = out / _FILE
-        with afterwards(partial(file.unlink, missing_ok=True)):
-            with about(file):
+    def granted(self, out: Path, private: Path) -> Iterator[None]:
+        """Leave the access in the run directory, for this user alone, for as long as the run flies.
+
+        What stands there is a link into the private folder of the run, which goes however the run ends.
+        """
+        link, file = out / _FILE, private / _FILE
+        with afterwards(partial(link.unlink, missing_ok=True), partial(file.unlink, missing_ok=True)):
+            with about(link):
                 file.touch(mode=0o600)
                 file.write_text(json.dumps({"run": self.run, "login": vars(self.login)}))
+                link.symlink_to(file)
             yield
 
     @classmethod

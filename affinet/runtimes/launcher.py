@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import tempfile
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
+from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.arrivals import forms_of
@@ -29,7 +29,7 @@ from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
-from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, host_name, socket_folder
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name
 from world.brief import WorldBrief
 from world.physics.world import World
 
@@ -119,24 +119,22 @@ class Launcher:
         launched = time.perf_counter()
         with (
             afterwards(partial(self._note, group), partial(_remove_unwritten, self._out)),
-            tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private,
+            private_folder() as self._private,
             group,
         ):
-            self._private = Path(private)
             self._start(group)
-            with Access(self._run, self._logins[CONTROL]).granted(self._out):
+            with Access(self._run, self._logins[CONTROL]).granted(self._out, self._private):
                 self._fly(group, launched)
 
     def _note(self, group: ProcessGroup) -> None:
         self.flight.processes = [child.report() for child in group.processes]
 
     def _start(self, group: ProcessGroup) -> None:
-        private = self._private
-        self._logins = self._make_logins(private)
+        self._logins = self._make_logins(self._private)
         _prepare_kernels(self._plan.world)
-        group.start_nursery()
+        group.start_nursery(self._private)
         group.fork("world", self._world_brief(self._logins[WORLD]), trusted=True)
-        medium = self._medium_brief(self._logins[HUB], private / "users")
+        medium = self._medium_brief(self._logins[HUB])
         own_losses = any(profile.own for profile in medium.profiles)
         group.fork("netem", medium, trusted=not own_losses)
         if self._plan.centre:
@@ -147,23 +145,11 @@ class Launcher:
         for number in self._lone:
             self._start_agent(group, number)
         group.await_ready(group.children)
-        (private / "users").unlink()  # the medium knows them now, and nobody else has to
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
         endpoint = f"unixsock-stream/{private}/z.sock"
-        names = [
-            HUB,
-            WORLD,
-            CONTROL,
-            CENTRE,
-            *map(host_name, self._hosts),
-            *map(agent_name, self._lone),
-        ]
-        logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
-        users = private / "users"
-        users.touch(mode=0o600)
-        users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
-        return logins
+        names = [HUB, *clients(self._numbers, self._hosts)]
+        return {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
 
     def _fly(self, group: ProcessGroup, launched: float) -> None:
         world, medium = group.children[0], group.children[1]
@@ -213,7 +199,11 @@ class Launcher:
     def _lone(self) -> list[int]:
         """Agents that have a process to themselves."""
         carried = {number for of_host in self._hosts.values() for number in of_host}
-        return [number for number in range(1, self._plan.world.links.agents + 1) if number not in carried]
+        return [number for number in self._numbers if number not in carried]
+
+    @property
+    def _numbers(self) -> range:
+        return range(1, self._plan.world.links.agents + 1)
 
     def _host_brief(self, host: int, carried: Sequence[int]) -> HostBrief:
         login = self._logins[host_name(host)]
@@ -242,11 +232,11 @@ class Launcher:
             books=self._plan.books(self._viewer),
         )
 
-    def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
+    def _medium_brief(self, login: Login) -> MediumBrief:
         return MediumBrief(
             run=self._run,
             login=login,
-            dictionary_file=str(users),
+            passwords={name: of.password for name, of in self._logins.items()},
             seed=self._plan.scenario.seed,
             links=self._plan.world.links,
             channels=self._plan.channels,

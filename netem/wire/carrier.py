@@ -9,13 +9,18 @@ from typing import Any
 
 import zenoh
 
-from netem.wire.session import Login, client
+from netem.wire.session import Login, client, identity
 
 _WAITING_CHANGES = 4
+_WAITING_ENTRANTS = 1024
 
 
 class NotCarried(RuntimeError):
     """Nobody can be reached, or nobody answers: why."""
+
+
+class StrangerEntered(RuntimeError):
+    """Somebody has opened a session by the proof of a process of the run, and is not it: who."""
 
 
 class Arrived:
@@ -115,6 +120,35 @@ class Questions:
         return None if query is None else Question(self._key, query)
 
 
+class Doorway:
+    """Who enters at the hub."""
+
+    def __init__(self, session: zenoh.Session, names: Iterable[str]) -> None:
+        self._known = {identity(name): name for name in names}
+        self._session = session
+        self._events = session.info.declare_transport_events_listener(zenoh.handlers.RingChannel(_WAITING_ENTRANTS))
+
+    def refuse_strangers(self) -> None:
+        """Go on if each session that was opened is that of a process of the run.
+
+        Raises
+        ------
+        StrangerEntered
+            When one is not: as whom it entered, where that is known.
+        """
+        while (event := self._events.try_recv()) is not None:
+            if event.kind == zenoh.SampleKind.PUT and (number := str(event.transport.zid)) not in self._known:
+                raise StrangerEntered(
+                    f"{self._whose(number)} opened a second session, called {number}: a process has one, "
+                    "called by the id of its login (docs/protocol.md)"
+                )
+
+    def _whose(self, number: str) -> str:
+        links = [link for link in self._session.info.links() if str(link.zid) == number]
+        named = [link.auth_identifier for link in links if link.auth_identifier]
+        return named[0] if named else "somebody who has a password of this run"
+
+
 class Session:
     """One process on the network; a block leaves it.
 
@@ -191,6 +225,10 @@ class Session:
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
         return [reply.ok.payload.to_bytes() for reply in answers if reply.ok is not None]
+
+    def doorway(self, names: Iterable[str]) -> Doorway:
+        """Watch who enters from now on, when these are expected."""
+        return Doorway(self._session, names)
 
     def ask(self, key: str, data: bytes, patience_s: float) -> bytes:
         """Ask whoever answers on a key.

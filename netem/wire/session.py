@@ -10,8 +10,8 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
-import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,31 +48,7 @@ _LEASE_MS = 3_600_000
 # Between machines a link breaks: it has to be noticed before TCP, which waits twice as long from try to try, comes to look only
 # after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
 _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
-
-
-_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
-_PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
-_LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
 _ADDRESS = re.compile(r"(tcp|tls)/(?:\[([0-9A-Fa-f:.]+)\]|([^\[\]:/?#]+)):([0-9]+)")
-
-
-def socket_folder() -> str:
-    """A temporary folder in which the path of a socket is short enough for the system and plain enough for an endpoint.
-
-    Raises
-    ------
-    OSError
-        When there is none.
-    """
-    own = tempfile.gettempdir()
-    for folder in (own, *_PLACES):
-        fits = len(folder) + len(_SOCKET) <= _LONGEST_SOCKET and _PLAIN_PATH.fullmatch(folder)
-        if fits and os.access(folder, os.W_OK | os.X_OK):
-            return folder
-    raise OSError(
-        f"{own!r} is too long or too odd a path for the run's socket, and {', '.join(_PLACES)} cannot be written to; "
-        f"set TMPDIR to a plain path of at most {_LONGEST_SOCKET - len(_SOCKET)} characters"
-    )
 
 
 def agent_name(agent: int) -> str:
@@ -83,6 +59,23 @@ def agent_name(agent: int) -> str:
 def host_name(host: int) -> str:
     """The name under which a process logs in that carries several agents."""
     return f"host-{host}"
+
+
+def seat_name(role: str, number: int | None) -> str:
+    """The name under which a process of a role logs in."""
+    return role if number is None else f"{role}-{number}"
+
+
+def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[str]:
+    """The names of all who log in at the hub; agents that a host carries do not."""
+    carried = {agent for of_host in hosts.values() for agent in of_host}
+    lone = [agent for agent in agents if agent not in carried]
+    return [WORLD, CENTRE, CONTROL, *map(host_name, hosts), *map(agent_name, lone)]
+
+
+def identity(name: str) -> str:
+    """Which Zenoh session is that of a process: another that logs in as it may do nothing, and so each has one."""
+    return name.encode().hex()
 
 
 @dataclass(frozen=True)
@@ -224,20 +217,41 @@ def listening(login: Login, dictionary_file: str | None, rights: Mapping[str, li
         login,
         auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
         tls={} if certificates is None else certificates.listening(),
+        max_sessions=len(rights),
     )
+
+
+@contextmanager
+def dictionary(passwords: Mapping[str, str]) -> Iterator[str | None]:
+    """A file with these passwords as Zenoh reads it, that lies on no disk, and is gone with the block; None for none."""
+    if not passwords:
+        yield None
+        return
+    with open(os.memfd_create("passwords"), "wb") as file:
+        file.write("".join(f"{name}:{password}\n" for name, password in passwords.items()).encode())
+        file.flush()
+        yield f"/proc/self/fd/{file.fileno()}"
 
 
 def _by_password(login: Login, **known: str | None) -> dict[str, Any]:
     return {"usrpwd": {"user": login.name, "password": login.password} | known}
 
 
-def _config(base: dict[str, Any], login: Login, auth: dict[str, Any], tls: dict[str, Any]) -> dict[str, Any]:
+def _config(
+    base: dict[str, Any],
+    login: Login,
+    auth: dict[str, Any],
+    tls: dict[str, Any],
+    **unicast: int,
+) -> dict[str, Any]:
     lease_ms, open_ms = (_LEASE_MS, _LEASE_MS) if login.is_local else (_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS)
+    times = {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING}
     return base | {
+        "id": identity(login.name),
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
-            "unicast": {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING},
+            "unicast": times | unicast,
             "link": {
                 "protocols": [login.endpoint.partition("/")[0]],
                 "tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
@@ -252,19 +266,20 @@ def _rights_of_all(
     keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
 ) -> dict[str, list[dict[str, Any]]]:
     carried = {agent for of_host in hosts.values() for agent in of_host}
-    rights = [
-        _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
-        *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
-        *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
-        _rights(
-            CENTRE,
-            says=[keys.told("*")],
-            hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
-            learns=[keys.told("*")],
-        ),
-        _controls(keys),
-    ]
-    return dict(rights)
+    return dict(
+        [
+            _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+            *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
+            *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
+            _rights(
+                CENTRE,
+                says=[keys.told("*")],
+                hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
+                learns=[keys.told("*")],
+            ),
+            _controls(keys),
+        ]
+    )
 
 
 def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str, Any]:
@@ -272,7 +287,7 @@ def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str,
         "enabled": True,
         "default_permission": "deny",
         "rules": [rule for rules in rights.values() for rule in rules],
-        "subjects": [{"id": name, proof: [name]} for name in rights],
+        "subjects": [{"id": name, proof: [name], "zids": [identity(name)]} for name in rights],
         "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights.items()],
     }
 

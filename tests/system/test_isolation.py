@@ -51,7 +51,8 @@ def test_a_wrong_password_is_refused(out):
     def intrude(_tick, _error):
         if not refused:
             try:
-                with Session(client(Login(launcher.endpoint, "agent-1", "guess"), patience_s=2.0)):
+                # Whose session is not open: another of one that is would be refused for that.
+                with Session(client(Login(launcher.endpoint, "control", "guess"), patience_s=2.0)):
                     pass
                 refused.append(False)
             except NotCarried:

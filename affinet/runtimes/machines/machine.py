@@ -10,7 +10,6 @@ import os
 import select
 import signal
 import socket
-import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -109,8 +108,8 @@ class Machine:
         For files of the processes.
     """
 
-    def __init__(self, folder: str) -> None:
-        self._folder = Path(folder)
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._stack = ExitStack()
         self._places: list[Place] = []
         self._nursery: Nursery | None = None
@@ -177,7 +176,7 @@ class Machine:
     def _start_nursery(self, kernels: dict[str, list[list[int]]]) -> None:
         prepared = {name: [(sizes, None) for sizes in of_one] for name, of_one in kernels.items()}
         with self._log(NURSERY) as log:
-            self._nursery = Nursery.started(log, _PATIENCE_S, json.dumps(prepared))
+            self._nursery = Nursery.started(log, _PATIENCE_S, self._folder, json.dumps(prepared))
         child = self._nursery.child
         deadline_s = time.monotonic() + _READY_S
         while not child.is_ready:

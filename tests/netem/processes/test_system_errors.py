@@ -351,8 +351,11 @@ def test_arrays_are_saved_whole_or_not_at_all(tmp_path):
 
 
 def test_access_that_is_gone_does_not_hide_what_ended_the_run(tmp_path):
+    private = tmp_path / "private"
+    private.mkdir()
+
     def interrupted():
-        with Access("run", Login("", "", "")).granted(tmp_path):
+        with Access("run", Login("", "", "")).granted(tmp_path, private):
             (tmp_path / "control.json").unlink()
             raise KeyError("first")
 
