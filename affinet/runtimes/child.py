@@ -127,6 +127,8 @@ class Child:
         Whether it has told so.
     pss_mb
         The most memory it was seen to take, in megabytes; what several share is divided among them.
+    lost
+        How many messages it says that the transport lost.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
     looks
@@ -145,6 +147,7 @@ class Child:
     is_ready: bool = False
     is_done: bool = False
     pss_mb: float = 0.0
+    lost: int = 0
     doing: Beat | None = None
     beat_s: float = 0.0
     looks: StatusHistory | None = None
@@ -274,6 +277,8 @@ class Child:
                 raise UserCodeFailed(f"{self.name}: {printable(event['reason'])[:_LONGEST_REASON]}")
             case "beat":
                 self.doing = beat(event)
+            case "lost":
+                self.lost += event["count"]
             case "ready" if self.is_ready or self.is_done:
                 raise RunFailed(f"{self.who}: it said twice that it is ready (docs/protocol.md)")
             case "done" if self.is_done or not self.is_ready:

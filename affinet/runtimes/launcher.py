@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,8 +15,10 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
+from affinet.runtimes.forked import NURSERY
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
+from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
@@ -29,7 +32,7 @@ from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
-from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
 from world.brief import WorldBrief
 from world.physics.world import World
 
@@ -44,6 +47,8 @@ class LaunchRecord:
         Messages lost that nobody ordered; None when the run did not get to its end.
     fired
         In which tick each trigger fired that did.
+    lost
+        Messages that the transport between machines lost, and that were had again.
     failure, user_code
         Why the run ended early, if it did, and whether a user's own code is why.
     start_s, wall_s
@@ -54,6 +59,7 @@ class LaunchRecord:
 
     uninstructed: int | None = None
     fired: dict[int, int] = field(default_factory=dict)
+    lost: int = 0
     failure: str | None = None
     user_code: bool = False
     start_s: float = 0.0
@@ -73,6 +79,7 @@ class Launcher:
         viewer: str | None = None,
         programs: Mapping[int, Sequence[str]] | None = None,
         interruption: Interruption | None = None,
+        spread: Spread | None = None,
     ) -> None:
         """Nothing is started yet.
 
@@ -88,6 +95,8 @@ class Launcher:
             Command lines of programs that fly some agents in place of ours (docs/protocol.md).
         interruption
             What may ask the run to end.
+        spread
+            The other machines that fly some of it.
         """
         self._plan = plan
         self._out = out
@@ -99,6 +108,7 @@ class Launcher:
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}  # that have a process to themselves
         self._hosts = hosts_of(plan, self._programs)
+        self._spread = spread
         self.flight = LaunchRecord()
 
     def fly(self) -> LaunchRecord:
@@ -115,11 +125,13 @@ class Launcher:
     def _launch(self) -> None:
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
-        group = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption)
+        machines = None if self._spread is None else self._spread.coordinator
+        group = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption, machines)
         launched = time.perf_counter()
         with (
             afterwards(partial(self._note, group), partial(_remove_unwritten, self._out)),
             private_folder() as self._private,
+            self._spread or nullcontext(),
             group,
         ):
             self._start(group)
@@ -127,12 +139,20 @@ class Launcher:
                 self._fly(group, launched)
 
     def _note(self, group: ProcessGroup) -> None:
-        self.flight.processes = [child.report() for child in group.processes]
+        self.flight.lost = sum(child.lost for child in group.processes)
+        self.flight.processes = [child.report() | self._clock(child) for child in group.processes]
+
+    def _clock(self, child: Child) -> dict[str, float]:
+        if self._spread is None or child.role == NURSERY:
+            return {}
+        return self._spread.report(seat_name(child.role, child.number))
 
     def _start(self, group: ProcessGroup) -> None:
-        self._logins = self._make_logins(self._private)
         _prepare_kernels(self._plan.world)
         group.start_nursery(self._private)
+        if self._spread is not None:
+            self._spread.coordinator.await_everybody(self._interruption.heed)
+        self._logins = self._make_logins(self._private)
         group.fork("world", self._world_brief(self._logins[WORLD]), trusted=True)
         medium = self._medium_brief(self._logins[HUB])
         own_losses = any(profile.own for profile in medium.profiles)
@@ -147,8 +167,10 @@ class Launcher:
         group.await_ready(group.children)
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
-        endpoint = f"unixsock-stream/{private}/z.sock"
         names = [HUB, *clients(self._numbers, self._hosts)]
+        if self._spread is not None:
+            return self._spread.logins(names)
+        endpoint = f"unixsock-stream/{private}/z.sock"
         return {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
 
     def _fly(self, group: ProcessGroup, launched: float) -> None:
@@ -212,12 +234,16 @@ class Launcher:
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         warm = number in self._plan.timeline.warm
-        checkpoint = str(self._private / f"agent-{number}.npz") if warm else None
+        checkpoint = str(self._folder(agent_name(number), self._private) / f"agent-{number}.npz") if warm else None
         brief = self._agent_brief(number, login, checkpoint, remembers=remembers)
         program = self._programs.get(number)
         child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
         self._agents[number] = child
         return child
+
+    def _folder(self, name: str, here: Path) -> Path:
+        """Where a process of this name writes."""
+        return here if self._spread is None else self._spread.folder(name, here)
 
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(
@@ -236,7 +262,7 @@ class Launcher:
         return MediumBrief(
             run=self._run,
             login=login,
-            passwords={name: of.password for name, of in self._logins.items()},
+            passwords={name: of.password for name, of in self._logins.items() if of.password},
             seed=self._plan.scenario.seed,
             links=self._plan.world.links,
             channels=self._plan.channels,
@@ -248,7 +274,7 @@ class Launcher:
             forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
             hosts=self._hosts,
-            journal=str(self._out / JOURNAL),
+            journal=str(self._folder(HUB, self._out) / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
         )
 

@@ -86,10 +86,7 @@ def serve(wanted: Wanted, tell: Callable[[str], None]) -> None:
     """
     for number in _ENDING:
         signal.signal(number, _end)
-    with (
-        tempfile.TemporaryDirectory(prefix="affinet-", ignore_cleanup_errors=True) as folder,
-        Machine(folder) as machine,
-    ):
+    with private_folder() as folder, Machine(folder) as machine:
         machine.join(wanted)
         tell(f"joined {wanted.connect}: {', '.join(wanted.names)}")
         machine.run()
