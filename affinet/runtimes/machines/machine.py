@@ -24,6 +24,7 @@ from affinet.runtimes.machines.coordinator import SILENT_S
 from affinet.runtimes.machines.identity import Identity, own
 from affinet.runtimes.machines.joining import Down, Failed, Joining, Leave, Say, Shut, Signal, Start
 from affinet.runtimes.machines.place import Place, own_name, part_of
+from affinet.runtimes.private import private_folder
 from netem.processes.supervised import BEAT_S
 from netem.processes.system_errors import said
 from netem.wire.carrier import Question
