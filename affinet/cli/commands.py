@@ -21,12 +21,15 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import options, show, terminal
+from affinet.cli import machines, options, show, terminal
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.interruption import Interrupted
+from affinet.runtimes.machines import hosts
+from affinet.runtimes.machines.place import Refused
+from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
@@ -74,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying, NotTrusted, history.Damaged) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying, NotTrusted, Refused, history.Damaged) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except UserCodeError as error:
@@ -157,6 +160,19 @@ def _check(parsed: argparse.Namespace) -> int:
 def _run(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed)
+
+
+def _world(parsed: argparse.Namespace) -> int:
+    plan = planning.make(_scenario(parsed))
+    return _fly(plan, Path(parsed.scenario).stem, parsed, machines.typed(plan, parsed))
+
+
+def _hosts(parsed: argparse.Namespace) -> int:
+    read = hosts.load(parsed.file)
+    folder = parsed.file.absolute().parent
+    parsed.scenario = parsed.scenario or read.scenario_from(folder)
+    plan = planning.make(_scenario(parsed))
+    return _fly(plan, Path(parsed.scenario).stem, parsed, machines.started(plan, read, folder))
 
 
 def _replay(parsed: argparse.Namespace) -> int:
@@ -277,14 +293,15 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
     return FAIL
 
 
-def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
+def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
     if parsed.out:
         refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
     parsed.out = parsed.out or directories.for_run(name)
     claim(parsed.out)
     with show.Progress(plan, name, parsed.out) as watch:
-        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
+        elsewhere = None if spread is None else spread(parsed.out)
+        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer, elsewhere)
     if parsed.json:
         print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
     else:
@@ -334,4 +351,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "fit": _fit,
     "inject": _inject,
     "keys": _keys,
+    "hosts": _hosts,
+    "world": _world,
+    **dict.fromkeys(("agent", "host", "netem"), machines.hold),
 }

@@ -40,14 +40,15 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
         )
-        command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
-        command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+        _add_output(command)
     _add_hunt(commands)
     _add_study(commands)
     _add_design(commands)
     _add_fit(commands)
     _add_inject(commands)
     _add_keys(commands)
+    _add_coordinators(commands)
+    _add_seats(commands)
     return whole
 
 
@@ -62,6 +63,52 @@ def _add_overrides(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", metavar="N", help="seed")
     command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
     command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+
+
+def _add_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
+    command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+
+
+def _add_coordinators(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    hosts = commands.add_parser(
+        "hosts", help="fly a scenario over several machines, whose commands are started from here"
+    )
+    hosts.add_argument(
+        "file", type=_path, metavar="HOSTS", help="which machines, and who is on which: docs/machines.md"
+    )
+    hosts.add_argument("scenario", nargs="?", help="in place of the one in the file")
+    world = commands.add_parser("world", help="fly a scenario over several machines, whose commands are typed there")
+    world.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(loading.shipped())}")
+    world.add_argument("--listen", required=True, metavar="tls/ADDRESS:PORT", help="where they find this machine")
+    world.add_argument("--keys", required=True, metavar="DIR", help="made by `affinet keys`")
+    world.add_argument(
+        "--gone-after",
+        type=_positive,
+        default=20.0,
+        metavar="S",
+        help="give up a silent machine (default: %(default)s)",
+    )
+    for command in (hosts, world):
+        command.set_defaults(runtime="processes")
+        _add_overrides(command)
+        _add_output(command)
+
+
+def _add_seats(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    agent = commands.add_parser("agent", help="hold agents of a run over several machines on this one")
+    agent.add_argument("numbers", nargs="+", type=_count, metavar="N", help="which")
+    host = commands.add_parser("host", help="hold processes that carry several agents (agents.per_process)")
+    host.add_argument("numbers", nargs="+", type=_count, metavar="N", help="which")
+    netem = commands.add_parser("netem", help="hold the medium of a run over several machines on this one")
+    netem.add_argument("--listen", required=True, metavar="tls/ADDRESS:PORT", help="where all others find it")
+    for command in (agent, host, netem):
+        command.add_argument(
+            "--connect", required=True, metavar="tls/ADDRESS:PORT", help="where `affinet world` listens"
+        )
+        command.add_argument("--keys", required=True, metavar="DIR", help="the certificates of this machine")
+        command.add_argument("--scenario", help="refuse to fly any other; without it what the others fly is taken")
+        command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides of that")
 
 
 def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -210,7 +210,7 @@ def keys(folder: Path, made: Made) -> None:
 
 def outcome(outcome: Outcome, plan: Plan) -> None:
     """What came of a run."""
-    table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
+    table = Table(show_header=False, title=_VERDICTS.get(outcome.verdict, f"[yellow]{outcome.verdict}[/]"))
     flown, messages = outcome.flown, outcome.messages
     errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
     errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
@@ -234,6 +234,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
             ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
+        *([("lost by the transport", f"{lost}, and asked for again")] if (lost := messages["transport_lost"]) else []),
         *(("fault", str(bite)) for bite in outcome.faults),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),

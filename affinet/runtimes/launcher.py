@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,6 +18,7 @@ from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.forked import NURSERY
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
+from affinet.runtimes.machines.seats import hosts_of
 from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
@@ -107,7 +108,7 @@ class Launcher:
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}  # that have a process to themselves
-        self._hosts = hosts_of(plan, self._programs)
+        self._hosts = hosts_of(plan, self._programs, () if spread is None else spread.groups)
         self._spread = spread
         self.flight = LaunchRecord()
 
@@ -300,14 +301,6 @@ class Launcher:
             checkpoint=checkpoint,
             remembers=remembers,
         )
-
-
-def hosts_of(plan: Plan, programs: Collection[int]) -> dict[int, tuple[int, ...]]:
-    """The processes that carry several agents, and which; programs fly on their own, and so does who would be alone."""
-    size = plan.scenario.agents.per_process
-    ours = [number for number in range(1, plan.world.links.agents + 1) if number not in programs]
-    carried = [tuple(ours[first : first + size]) for first in range(0, len(ours), size)]
-    return {host: of_host for host, of_host in enumerate(carried, 1) if len(of_host) > 1}
 
 
 def _prepare_kernels(world: World) -> None:

@@ -78,6 +78,25 @@ def identity(name: str) -> str:
     return name.encode().hex()
 
 
+def address_of(endpoint: str) -> tuple[str, int]:
+    """Host and port of an endpoint for several machines.
+
+    Raises
+    ------
+    NotTrusted
+        When it is none.
+    """
+    address = _address_in(endpoint)
+    if address is None or not endpoint.startswith("tls/"):
+        raise NotTrusted(f"{endpoint!r} is no address for several machines: write tls/ADDRESS:PORT")
+    return address
+
+
+def _address_in(endpoint: str) -> tuple[str, int] | None:
+    parts = _ADDRESS.fullmatch(endpoint)
+    return (parts[2] or parts[3], int(parts[4])) if parts else None
+
+
 @dataclass(frozen=True)
 class Login:
     """Where a process connects, as whom, and how it proves that: by a password, or a certificate.
@@ -112,8 +131,7 @@ class Login:
     @property
     def address(self) -> tuple[str, int] | None:
         """Host and port of the endpoint, if it has such."""
-        parts = _ADDRESS.fullmatch(self.endpoint)
-        return (parts[2] or parts[3], int(parts[4])) if parts else None
+        return _address_in(self.endpoint)
 
     def why_refused(self) -> str | None:
         """In one line why the hub does not let it in, where TLS knows more than Zenoh says."""

@@ -120,6 +120,7 @@ class Coordinator:
         *,
         scenario: str,
         gone_after_s: float,
+        tell: Callable[[str], None] = lambda _: None,
         identity: Identity | None = None,
     ) -> None:
         """Nobody can join yet.
@@ -134,12 +135,14 @@ class Coordinator:
             The digest of what is flown.
         gone_after_s
             After how long without a word who is on the other side of a link gives up, in seconds.
+        tell
+            Told in a line who is still to come.
         identity
             What all have to fly with; by default what this machine does.
         """
         self._login, self._names = login, tuple(names)
         self._scenario, self._gone_after_s = scenario, gone_after_s
-        self._identity = identity or own()
+        self._tell, self._identity = tell, identity or own()
         self._asked: queue.SimpleQueue[tuple[str, Question] | None] = queue.SimpleQueue()
         self._over = threading.Event()
         self._is_given_up = False
@@ -202,7 +205,11 @@ class Coordinator:
         RunFailed
             When one who was there has gone.
         """
-        while self.awaited:
+        told: list[str] = []
+        while awaited := self.awaited:
+            if awaited != told:
+                self._tell(f"waiting at {self._login.endpoint} for {listed(awaited)}")
+            told = awaited
             heed()
             self.heed()
             self._over.wait(0.1)

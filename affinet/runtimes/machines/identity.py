@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from affinet.scenario.sections import Scenario
 from netem.core.listing import listed
 from netem.processes.user_code import OURS
 
@@ -70,6 +71,11 @@ def own() -> Identity:
         _digest_of_code(),
         _digest_of_arithmetic(),
     )
+
+
+def digest_of(scenario: Scenario) -> str:
+    """What tells one scenario from another: all its keys, as resolved."""
+    return hashlib.blake2b(scenario.model_dump_json(exclude_none=True).encode(), digest_size=16).hexdigest()
 
 
 def _digest_of_code() -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
+from affinet.runtimes.machines.commands import Commands
 from affinet.runtimes.machines.coordinator import Coordinator
 from netem.medium.medium import JOURNAL
 from netem.wire.session import HUB, Login
@@ -19,6 +20,10 @@ class Spread:
     ----------
     coordinator
         To whom they come.
+    groups
+        Agents that are on one machine, for each.
+    commands
+        What is started to have them come, if not by hand.
     listen
         Where the medium listens, if it is on this machine.
     keys
@@ -27,13 +32,24 @@ class Spread:
         The run directory.
     """
 
-    def __init__(self, coordinator: Coordinator, listen: str, keys: str, out: Path) -> None:
-        self.coordinator = coordinator
+    def __init__(
+        self,
+        coordinator: Coordinator,
+        groups: Sequence[Collection[int]],
+        commands: Commands,
+        listen: str,
+        keys: str,
+        out: Path,
+    ) -> None:
+        self.coordinator, self.groups, self._commands = coordinator, groups, commands
+        coordinator.heed_too = commands.heed
         self._listen, self._keys, self._out = listen, keys, out
         self._stack = ExitStack()
 
     def __enter__(self) -> Spread:
+        self._stack.push(self._commands.__exit__)  # they are waited for once they were told to leave
         self._stack.enter_context(self.coordinator)
+        self._commands.__enter__()
         self._stack.callback(self._bring)
         return self
 
