@@ -168,6 +168,7 @@ class Session:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
+        self._tokens: list[zenoh.LivelinessToken] = []
 
     def __enter__(self) -> Session:
         self._session.__enter__()
@@ -196,7 +197,7 @@ class Session:
 
     def is_here(self, key: str) -> None:
         """Have it known by a key for as long as the session lasts."""
-        self._session.liveliness().declare_token(key)
+        self._tokens.append(self._session.liveliness().declare_token(key))  # one that is forgotten is taken back
 
     def sees(self, key: str, take: Callable[[str, bool], None]) -> None:
         """Hand over who comes, and who goes, by their keys, in a thread of the session's."""

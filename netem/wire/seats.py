@@ -62,12 +62,12 @@ def coordinator(login: Login, seats: Iterable[str]) -> dict[str, Any]:
 
 
 def _of_seat(seat: str) -> tuple[str, list[dict[str, Any]]]:
-    name, own = _rights(seat, says=[up(seat)], hears=[down(seat)], learns=[up(seat)])
+    name, own = _rights(seat, says=[up(seat)], hears=[down(seat)], learns=[up("*")])
     return name, [
         *own,
         *_asks(f"{seat}-joins", [join(seat), CLOCK]),
         _allow(f"{seat}-lives", "put", "ingress", [alive(seat)]),
-        _allow(f"{seat}-sees", "declare_subscriber", "egress", [alive(seat)]),
+        _allow(f"{seat}-sees", "declare_subscriber", "egress", [alive("*")]),
         _allow(f"{seat}-listens", "declare_subscriber", "ingress", [BEAT]),
         _allow(f"{seat}-beaten", "put", "egress", [BEAT]),
         _allow(f"{seat}-here", "liveliness_token", "ingress", [here(seat)]),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.told import printable
@@ -26,6 +27,12 @@ class Command:
     words: tuple[str, ...]
 
 
+class _Running(NamedTuple):
+    command: Command
+    process: subprocess.Popen[bytes]
+    log: Path
+
+
 class Commands:
     """Started when the block begins, and gone when it is left.
 
@@ -41,7 +48,7 @@ class Commands:
 
     def __init__(self, commands: Sequence[Command], logs: Path) -> None:
         self._commands, self._logs = commands, logs
-        self._running: list[tuple[Command, subprocess.Popen[bytes], Path]] = []
+        self._running: list[_Running] = []
 
     def __enter__(self) -> Commands:
         self._logs.mkdir(parents=True, exist_ok=True)
@@ -51,15 +58,15 @@ class Commands:
                 process = subprocess.Popen(
                     command.words, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
                 )
-            self._running.append((command, process, log))
+            self._running.append(_Running(command, process, log))
         return self
 
     def __exit__(self, *_: object) -> None:
         deadline_s = time.monotonic() + _LEFT_WITHIN_S
-        for _, process, _ in self._running:
+        for process in [running.process for running in self._running]:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(max(0.0, deadline_s - time.monotonic()))
-        for _, process, _ in self._running:
+        for process in [running.process for running in self._running]:
             _end(process)
 
     def heed(self) -> None:

@@ -104,10 +104,10 @@ class Seat:
             self.silent_s += since_s
         if self.is_here:
             self.gone_s, self.was_closed = 0.0, False
-        else:
-            # A cut link goes silent first; a session that goes before was closed, since its process has died.
-            self.was_closed = self.was_closed or (self.gone_s == 0.0 and self.silent_s < SILENT_S)
-            self.gone_s += since_s
+            return
+        # A cut link goes silent first; a session that goes before was closed, since its process has died.
+        self.was_closed = self.was_closed or (self.gone_s == 0.0 and self.silent_s < SILENT_S)
+        self.gone_s += since_s
 
 
 class Coordinator:

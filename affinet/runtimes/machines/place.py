@@ -21,6 +21,7 @@ from affinet.runtimes.machines.joining import Admitted, Alive, Down, Ended, Join
 from netem.wire import offset, seats
 from netem.wire.arrays import WireError
 from netem.wire.carrier import Ear, NotCarried, Question
+from netem.wire.certificates import AGAIN
 from netem.wire.offset import ClockOffset
 from netem.wire.repeating import RepeatingSession
 from netem.wire.sequence import UninstructedLoss
@@ -208,7 +209,7 @@ def _found(login: Login) -> RepeatingSession:
             return RepeatingSession(config, _nothing, KEPT)
         except NotCarried as error:
             why = login.why_refused() or str(error)
-            if "nobody can be reached" not in why or time.monotonic() > deadline_s:
+            if AGAIN in why or time.monotonic() > deadline_s:
                 raise Refused(why) from error
 
 
