@@ -326,15 +326,16 @@ def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) 
         _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
         # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
         _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
-        *_repeats(f"{name}-again", [again(key) for key in hears], [again(key) for key in says]),
+        *_repeats(f"{name}-again", hears, says, learns),
     ]
 
 
-def _repeats(name: str, asked: list[str], answered: list[str]) -> list[dict[str, Any]]:
-    """Between machines, a message that was lost is asked for again."""
+def _repeats(name: str, hears: list[str], says: list[str], learns: list[str]) -> list[dict[str, Any]]:
+    """Between machines, a message that was lost is asked for again: in one question of all who speak on such a key."""
+    answered = [again(key) for key in says]
     return [
-        *_asks(name, asked),
-        _allow(f"{name}-asked", "query", "egress", answered),
+        *_asks(name, [again(key) for key in hears]),
+        _allow(f"{name}-asked", "query", "egress", [again(key) for key in learns]),
         _allow(f"{name}-answers", "reply", "ingress", answered),
         _allow(f"{name}-can", "declare_queryable", "ingress", answered),
     ]

@@ -109,6 +109,7 @@ class Place:
         self.number, self.process, self.log_fd = number, process, log_fd
         self.pending.clear()
         self.is_shut = False
+        self._beats = 0
         for fd in (process.stdin.fileno(), process.stdout.fileno(), log_fd):
             os.set_blocking(fd, False)
         self.tell(Started(number, process.pid))
@@ -155,7 +156,7 @@ class Place:
                 process = psutil.Process(self.process.pid)
                 used = process.cpu_times()
                 status, used_s = process.status(), used.user + used.system
-                if self._beats % _PSS_EVERY == 0:
+                if self._beats % _PSS_EVERY == 1:
                     self._pss_mb = max(self._pss_mb, process.memory_full_info().pss / 2**20)
         self._beats += 1
         number = 0 if self.process is None else self.number
