@@ -20,7 +20,15 @@ _MARK = "AFFINET_FLEET"
 
 def keys_in(folder, agents, *addresses):
     """Certificates for a swarm."""
-    names = [COORDINATOR, HUB, WORLD, CENTRE, CONTROL, *map(agent_name, range(1, agents + 1)), *map(host_name, (1, 2, 3))]
+    names = [
+        COORDINATOR,
+        HUB,
+        WORLD,
+        CENTRE,
+        CONTROL,
+        *map(agent_name, range(1, agents + 1)),
+        *map(host_name, (1, 2, 3)),
+    ]
     authority.make(folder, names, addresses, timedelta(days=1))
     return folder
 

@@ -39,7 +39,9 @@ def swarm(tmp_path):
         text = (files("affinet.shipped") / "scenarios" / "corridor.toml").read_text()
         entries = "".join(f"\n[[timeline]]\n{entry}\n" for entry in timeline)
         file = tmp_path / "swarm.toml"
-        file.write_text(f"{text}\n[record]\nenabled = false\n{entries}".replace("duration = 60.0", f"duration = {duration}"))
+        file.write_text(
+            f"{text}\n[record]\nenabled = false\n{entries}".replace("duration = 60.0", f"duration = {duration}")
+        )
         return file
 
     return written
@@ -100,9 +102,7 @@ def typed(fleet, keys, scenario, out, listen, medium, *, to=lambda _: (), gone_a
         "some": ("b", "agent", 1, 2, 3, "--connect", listen),
         "others": ("c", "agent", 4, 5, 6, 7, "--connect", listen),
     }
-    return {
-        name: fleet.start(*words, "--keys", keys, to=to(machine)) for name, (machine, *words) in commands.items()
-    }
+    return {name: fleet.start(*words, "--keys", keys, to=to(machine)) for name, (machine, *words) in commands.items()}
 
 
 def test_typed_on_three_machines_world_medium_and_agents_fly_the_bits_of_one(fleet, swarm, keys, out):
@@ -143,3 +143,82 @@ def rows_of(out):
     """How many ticks the world has written down so far."""
     graph = out / "graph.arrows"
     return graph.stat().st_size if graph.exists() else 0
+
+
+def awaiting_flight(out, commands):
+    """Go on when it flies."""
+    await_true(lambda: rows_of(out) > 0 or any(one.poll() is not None for one in commands.values()), "it never flew")
+
+
+def typed_here(fleet, swarm, keys, out, **options):
+    """All commands of a run that lasts, on this machine, in flight."""
+    commands = typed(fleet, keys, swarm(duration=600.0), out, endpoint(), endpoint(), **options)
+    awaiting_flight(out, commands)
+    return commands
+
+
+def test_when_the_coordinator_is_killed_its_machines_end_what_they_run(fleet, swarm, keys, out):
+    commands = typed_here(fleet, swarm, keys, out)
+    commands["world"].send_signal(signal.SIGKILL)
+    for name in ("netem", "some", "others"):
+        status, said = ended(commands[name])
+        assert (status, "the coordinator has ended: nobody listens at 127.0.0.1 port" in said) == (1, True), said
+    await_true(lambda: not fleet.running(), "something is left")
+    assert journal.read(out / "journal.arrows") if (out / "journal.arrows").exists() else True
+
+
+def test_when_the_command_of_a_machine_is_killed_the_run_ends_and_names_it(fleet, swarm, keys, out):
+    commands = typed_here(fleet, swarm, keys, out)
+    commands["others"].send_signal(signal.SIGKILL)
+    status, said = ended(commands["world"])
+    assert status == 1
+    assert f"agent 4 on {socket.gethostname()}" in said
+    await_true(lambda: not fleet.running(), "something is left")
+    assert flown(out) > 0
+    assert len(np.load(out / "arrays.npz")["error"]) > 0
+
+
+def test_a_machine_that_does_not_come_back_is_given_up_on_both_sides(fleet, swarm, keys, out):
+    with network("a", "b", "c") as machines:
+        addresses = [endpoint(machines.address(name), PORT) for name in ("a", "b")]
+        commands = typed(fleet, keys, swarm(duration=600.0), out, *addresses, to=machines.to, gone_after=5.0)
+        awaiting_flight(out, commands)
+        machines.cut("c")
+        status, said = ended(commands["world"])
+        assert status == 1
+        assert "agent 4 on" in said, (said, ended(commands["netem"]))
+        assert "not heard of for 5 s, and given up" in said, said
+        status, said = ended(commands["others"])
+        assert (status, "the coordinator was not heard of for 5 s" in said) == (1, True), said
+        await_true(lambda: not any(map(machines.running, machines.names)), "something is left")
+    assert flown(out) > 0
+
+
+def test_a_process_that_is_killed_on_its_machine_is_named_with_it(fleet, swarm, keys, out):
+    commands = typed_here(fleet, swarm, keys, out)
+    victim = next(process for process in fleet.running() if process.name() == "agent 5")
+    victim.kill()
+    status, said = ended(commands["world"])
+    assert status == 1
+    assert f"agent 5 (pid {victim.pid} on {socket.gethostname()}) was killed by SIGKILL" in said
+    assert [ended(commands[name])[0] for name in ("netem", "some", "others")] == [0, 0, 0]
+    assert not fleet.running()
+
+
+def test_ctrl_c_at_the_coordinator_ends_all_in_order(fleet, swarm, keys, out):
+    commands = typed_here(fleet, swarm, keys, out)
+    commands["world"].send_signal(signal.SIGINT)
+    assert ended(commands["world"])[0] == 130
+    assert [ended(commands[name])[0] for name in ("netem", "some", "others")] == [0, 0, 0]
+    assert not fleet.running()
+
+
+def test_another_scenario_is_refused_in_a_line(fleet, swarm, keys, out):
+    listen = endpoint()
+    fleet.start("world", swarm(), "--listen", listen, "--keys", keys, "--out", out)
+    other = fleet.start("agent", 1, "--connect", listen, "--keys", keys, "--scenario", "corridor")
+    status, said = ended(other)
+    assert status == 2
+    assert "agent 1: agent-1 on" in said
+    assert "has another scenario" in said
+    assert len(said.splitlines()) == 1

@@ -10,6 +10,7 @@ from types import TracebackType
 from affinet.runtimes.machines.commands import Commands
 from affinet.runtimes.machines.coordinator import Coordinator
 from netem.medium.medium import JOURNAL
+from netem.processes.system_errors import afterwards
 from netem.wire.session import HUB, Login
 
 
@@ -50,13 +51,14 @@ class Spread:
         self._stack.push(self._commands.__exit__)  # they are waited for once they were told to leave
         self._stack.enter_context(self.coordinator)
         self._commands.__enter__()
-        self._stack.callback(self._bring)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._stack.__exit__(kind, error, trace)
+        with self._stack, afterwards(self._bring):
+            if error is not None:
+                raise error
 
     def logins(self, names: Iterable[str]) -> dict[str, Login]:
         """How each process logs in, once all machines have joined: where the medium listens, by a certificate of its own."""
