@@ -202,7 +202,7 @@ class MediumNode:
             # The agents now work on what they heard: time to write down, and to decide the next tick, where that needs no
             # positions.
             self._relay.finish(sense.k)
-            self._written.enter(decided.entry, self._relay.in_flight)
+            self._written.enter(decided.entry, self._relay.in_flight, self._supervisor.lost_anywhere())
             tick = sense.k + 1
             decided = self._decide(tick, None) if self._relay.ahead else None
 

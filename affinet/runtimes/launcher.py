@@ -31,6 +31,7 @@ from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
+from netem.processes.supervised import LOST
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
 from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
@@ -196,6 +197,8 @@ class Launcher:
             case "kill" | "restart" | "pause" | "resume" as order:
                 self._move(group, order, event)
                 child.order(order)
+            case "lost":
+                group.children[1].order(f"{LOST} {event['key'].split('/', 2)[-1]} {event['count']}")
             case "fired":
                 self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
             case "done" if child.role == WORLD:

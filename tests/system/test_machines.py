@@ -12,6 +12,7 @@ from fleets import AFFINET, Fleet, ended, keys_in
 from flying import PROCESSES, digest_of
 from networks import network
 
+from affinet.verdicts import reading
 from netem.medium import journal
 
 pytestmark = PROCESSES
@@ -137,6 +138,9 @@ def test_a_machine_that_is_cut_off_and_comes_back_goes_on_and_what_was_lost_is_c
     lost = summary(out)["messages"]["transport_lost"]
     assert lost > 0
     assert summary(out)["verdict"] == f"pass, transport lost {lost}"
+    table = journal.read(out / "journal.arrows")
+    assert sum(sum(of_tick.values()) for of_tick in journal.lost(table).values()) == lost
+    assert reading.evidence(out).outcome.verdict == summary(out)["verdict"]
 
 
 def rows_of(out):
