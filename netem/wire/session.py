@@ -7,16 +7,15 @@ other that subscribes, so access control at the hub says, by default deny, who m
 
 from __future__ import annotations
 
-import ipaddress
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from netem.core.channels import INPUT, MEASUREMENT
-from netem.wire.certificates import Certificates, NotTrusted
+from netem.wire import endpoints
+from netem.wire.certificates import Certificates
 from netem.wire.keys import Keys
 
 HUB = "netem"
@@ -44,7 +43,8 @@ _PENDING = 10_000
 # A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
 # that log in at once on two cores.
 _LEASE_MS = 3_600_000
-_ADDRESS = re.compile(r"(tcp|tls)/(?:\[([0-9A-Fa-f:.]+)\]|([^\[\]:/?#]+)):([0-9]+)")
+LARGEST = 2**20  # bytes that an agent may say at once; what is longer the hub drops before anybody reads it
+_LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
 
 def agent_name(agent: int) -> str:
@@ -95,17 +95,12 @@ class Login:
         """The files by which it proves who it is, if it does by files."""
         return None if self.keys is None else Certificates(self.keys, self.name)
 
-    @property
-    def address(self) -> tuple[str, int] | None:
-        """Host and port of the endpoint, if it has such."""
-        parts = _ADDRESS.fullmatch(self.endpoint)
-        return (parts[2] or parts[3], int(parts[4])) if parts else None
-
     def why_refused(self) -> str | None:
         """In one line why the hub does not let it in, where TLS knows more than Zenoh says."""
-        if self.certificates is None or self.address is None:
+        where = endpoints.address(self.endpoint)
+        if self.certificates is None or where is None:
             return None
-        return self.certificates.why_refused(*self.address)
+        return self.certificates.why_refused(*where)
 
     def check(self) -> None:
         """Go on if this may connect or listen, and will do as a proof.
@@ -115,27 +110,9 @@ class Login:
         NotTrusted
             When it would be heard beyond this machine without certificates, or these will not do.
         """
-        if self.endpoint.startswith("unixsock-stream/"):
-            return
-        if self.address is None:
-            raise NotTrusted(f"{self.endpoint}: write it as tls/ADDRESS:PORT, or tcp/127.0.0.1:PORT on this machine")
-        protocol, address = self.endpoint.partition("/")[0], self.address[0]
-        if protocol == "tcp" and not _is_loopback(address):
-            raise NotTrusted(
-                f"{self.endpoint}: it would be heard beyond this machine, where nobody is known by a password: "
-                f"make certificates with `affinet keys`, and write tls/ for tcp/"
-            )
-        if (protocol == "tls") != (self.keys is not None):
-            raise NotTrusted(f"{self.endpoint}: TLS needs the folder that `affinet keys` made, and nothing else does")
+        endpoints.refuse(self.endpoint, certified=self.keys is not None)
         if (certificates := self.certificates) is not None:
             certificates.check()
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"
 
 
 def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
@@ -194,6 +171,7 @@ def hub(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
+            "low_pass_filter": [_no_longer_than(LARGEST, [keys.broadcast("*", "**"), keys.act("*"), keys.control])],
             "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
@@ -235,12 +213,17 @@ def _config(
             "unicast": times | unicast,
             "link": {
                 "protocols": [login.endpoint.partition("/")[0]],
+                "rx": {"max_message_size": _LARGEST_OF_ALL},
                 "tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
                 "tls": tls,
             },
             "auth": auth,
         },
     }
+
+
+def _no_longer_than(size: int, keys: list[str]) -> dict[str, Any]:
+    return {"id": "size", "flows": ["ingress"], "messages": ["put", "query"], "key_exprs": keys, "size_limit": size}
 
 
 def _rights_of_all(
