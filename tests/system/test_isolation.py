@@ -82,7 +82,7 @@ def test_a_second_session_of_a_login_ends_the_run(out):
     flight = launcher.fly()
     intruding[0].__exit__(None, None, None)
     assert flight.failure == (
-        "netem: StrangerEntered: somebody who has a password of this run opened a second session, called 5ec0d: "
+        "netem: StrangerEntered: somebody who has a password of this run opened a session called 5ec0d: "
         "a process has one, called by the id of its login (docs/protocol.md)"
     )
 

@@ -414,16 +414,17 @@ def test_there_are_no_more_sessions_than_logins(star, protected):
     assert sum(entered) == (len(NAMES) - 1 if protected else 9)
 
 
-def test_a_stranger_among_the_sessions_is_noticed_and_named(certified):
+@pytest.mark.parametrize("called", ["5ec0d", identity(WORLD)])
+def test_a_stranger_among_the_sessions_is_noticed_and_named(certified, called):
     login = certified.login
     with Session(hub(login(HUB), None, KEYS, AGENTS, {})) as session:
         door = session.doorway(NAMES)
         ear = session.hears(KEYS.broadcast("*", "*"), 16)
         agent = certified.join("agent-1")
-        certified.join("agent-2", id="5ec0d")
+        certified.join("agent-2", id=called)
         awaited(agent.declare_publisher(KEYS.broadcast(1, "input"))).put(b"here")
         assert ear.next().data == b"here"
-        with pytest.raises(StrangerEntered, match=r"^agent-2 opened a second session, called 5ec0d: "):
+        with pytest.raises(StrangerEntered, match=rf"^agent-2 opened a session called {called}: "):
             door.refuse_strangers()
         door.refuse_strangers()
 
