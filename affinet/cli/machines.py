@@ -20,14 +20,15 @@ from affinet.runtimes.machines.seats import Seats
 from affinet.runtimes.machines.spread import Spread
 from affinet.scenario import files, loading
 from affinet.scenario.words import one_line
-from netem.wire.session import COORDINATOR, HUB, Login, address_of, seat_name
+from netem.wire import endpoints
+from netem.wire.session import COORDINATOR, HUB, Login, seat_name
 
 _DONE, _FAILED = 0, 1
 
 
 def typed(plan: Plan, parsed: argparse.Namespace) -> Callable[[Path], Spread]:
     """All but the world is elsewhere, and its commands are typed there."""
-    address_of(parsed.listen)
+    endpoints.over_machines(parsed.listen)
     found = seats.by_hand(plan)
     return partial(_spread, plan, found, parsed.listen, hosts.beside(parsed.listen), parsed.keys, parsed.gone_after, ())
 
@@ -50,7 +51,7 @@ def hold(parsed: argparse.Namespace) -> int:
     names = [HUB] if numbers is None else [seat_name(parsed.command, number) for number in dict.fromkeys(numbers)]
     listen = getattr(parsed, "listen", None)
     for endpoint in filter(None, (parsed.connect, listen)):
-        address_of(endpoint)
+        endpoints.over_machines(endpoint)
     scenario = None
     if parsed.scenario is not None:
         scenario = digest_of(loading.load(parsed.scenario, parsed.set, files.working_directory()))

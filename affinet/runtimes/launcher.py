@@ -266,7 +266,7 @@ class Launcher:
         return MediumBrief(
             run=self._run,
             login=login,
-            passwords={name: of.password for name, of in self._logins.items() if of.password},
+            passwords={name: of.password for name, of in self._logins.items() if of.keys is None},
             seed=self._plan.scenario.seed,
             links=self._plan.world.links,
             channels=self._plan.channels,

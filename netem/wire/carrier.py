@@ -137,16 +137,20 @@ class Doorway:
             When one is not: as whom it entered, where that is known.
         """
         while (event := self._events.try_recv()) is not None:
-            if event.kind == zenoh.SampleKind.PUT and (number := str(event.transport.zid)) not in self._known:
+            if event.kind != zenoh.SampleKind.PUT:
+                continue
+            called = str(event.transport.zid)
+            proven, expected = self._proven(called), self._known.get(called)
+            if expected is None or proven not in (None, expected):
                 raise StrangerEntered(
-                    f"{self._whose(number)} opened a second session, called {number}: a process has one, "
-                    "called by the id of its login (docs/protocol.md)"
+                    f"{proven or 'somebody who has a password of this run'} opened a session called {called}: a process "
+                    "has one, called by the id of its login (docs/protocol.md)"
                 )
 
-    def _whose(self, number: str) -> str:
-        links = [link for link in self._session.info.links() if str(link.zid) == number]
-        named = [link.auth_identifier for link in links if link.auth_identifier]
-        return named[0] if named else "somebody who has a password of this run"
+    def _proven(self, called: str) -> str | None:
+        """Of whom the certificate is by which a session entered; None where it did by a password."""
+        links = [link for link in self._session.info.links() if str(link.zid) == called]
+        return next((link.auth_identifier for link in links if link.auth_identifier), None)
 
 
 class Session:

@@ -7,16 +7,15 @@ other that subscribes, so access control at the hub says, by default deny, who m
 
 from __future__ import annotations
 
-import ipaddress
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from netem.core.channels import INPUT, MEASUREMENT
-from netem.wire.certificates import Certificates, NotTrusted
+from netem.wire import endpoints
+from netem.wire.certificates import Certificates
 from netem.wire.keys import Keys, again
 
 HUB = "netem"
@@ -48,7 +47,8 @@ _LEASE_MS = 3_600_000
 # Between machines a link breaks: it has to be noticed before TCP, which waits twice as long from try to try, comes to look only
 # after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
 _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
-_ADDRESS = re.compile(r"(tcp|tls)/(?:\[([0-9A-Fa-f:.]+)\]|([^\[\]:/?#]+)):([0-9]+)")
+LARGEST = 2**20  # bytes that an agent may say at once; what is longer the hub drops before anybody reads it
+_LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
 
 def agent_name(agent: int) -> str:
@@ -76,25 +76,6 @@ def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[s
 def identity(name: str) -> str:
     """Which Zenoh session is that of a process: another that logs in as it may do nothing, and so each has one."""
     return name.encode().hex()
-
-
-def address_of(endpoint: str) -> tuple[str, int]:
-    """Host and port of an endpoint for several machines.
-
-    Raises
-    ------
-    NotTrusted
-        When it is none.
-    """
-    address = _address_in(endpoint)
-    if address is None or not endpoint.startswith("tls/"):
-        raise NotTrusted(f"{endpoint!r} is no address for several machines: write tls/ADDRESS:PORT")
-    return address
-
-
-def _address_in(endpoint: str) -> tuple[str, int] | None:
-    parts = _ADDRESS.fullmatch(endpoint)
-    return (parts[2] or parts[3], int(parts[4])) if parts else None
 
 
 @dataclass(frozen=True)
@@ -128,16 +109,12 @@ class Login:
         """Whether it connects within one machine."""
         return self.keys is None
 
-    @property
-    def address(self) -> tuple[str, int] | None:
-        """Host and port of the endpoint, if it has such."""
-        return _address_in(self.endpoint)
-
     def why_refused(self) -> str | None:
         """In one line why the hub does not let it in, where TLS knows more than Zenoh says."""
-        if self.certificates is None or self.address is None:
+        where = endpoints.address(self.endpoint)
+        if self.certificates is None or where is None:
             return None
-        return self.certificates.why_refused(*self.address)
+        return self.certificates.why_refused(*where)
 
     def check(self) -> None:
         """Go on if this may connect or listen, and will do as a proof.
@@ -147,27 +124,9 @@ class Login:
         NotTrusted
             When it would be heard beyond this machine without certificates, or these will not do.
         """
-        if self.endpoint.startswith("unixsock-stream/"):
-            return
-        if self.address is None:
-            raise NotTrusted(f"{self.endpoint}: write it as tls/ADDRESS:PORT, or tcp/127.0.0.1:PORT on this machine")
-        protocol, address = self.endpoint.partition("/")[0], self.address[0]
-        if protocol == "tcp" and not _is_loopback(address):
-            raise NotTrusted(
-                f"{self.endpoint}: it would be heard beyond this machine, where nobody is known by a password: "
-                f"make certificates with `affinet keys`, and write tls/ for tcp/"
-            )
-        if (protocol == "tls") != (self.keys is not None):
-            raise NotTrusted(f"{self.endpoint}: TLS needs the folder that `affinet keys` made, and nothing else does")
+        endpoints.refuse(self.endpoint, certified=self.keys is not None)
         if (certificates := self.certificates) is not None:
             certificates.check()
-
-
-def _is_loopback(address: str) -> bool:
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"
 
 
 def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
@@ -230,6 +189,7 @@ def listening(login: Login, dictionary_file: str | None, rights: Mapping[str, li
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
+            "low_pass_filter": [_no_longer_than(LARGEST, [keys.broadcast("*", "**"), keys.act("*"), keys.control])],
             "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
@@ -272,12 +232,17 @@ def _config(
             "unicast": times | unicast,
             "link": {
                 "protocols": [login.endpoint.partition("/")[0]],
+                "rx": {"max_message_size": _LARGEST_OF_ALL},
                 "tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
                 "tls": tls,
             },
             "auth": auth,
         },
     }
+
+
+def _no_longer_than(size: int, keys: list[str]) -> dict[str, Any]:
+    return {"id": "size", "flows": ["ingress"], "messages": ["put", "query"], "key_exprs": keys, "size_limit": size}
 
 
 def _rights_of_all(

@@ -12,7 +12,7 @@ from affinet.scenario.explain import explained, named_in
 from affinet.scenario.profiles import Section
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.source import Source
-from netem.wire.session import address_of
+from netem.wire import endpoints
 
 Agent = Annotated[int, Field(ge=1)]
 GONE_AFTER_S = 20.0
@@ -55,7 +55,7 @@ class Hosts(Section):
         if len([machine for machine in self.machines if machine.netem]) > 1:
             raise ValueError("the medium is on one machine: give netem to one of them")
         for endpoint in filter(None, (self.listen, self.medium, *(machine.netem for machine in self.machines))):
-            address_of(endpoint)
+            endpoints.over_machines(endpoint)
         return self
 
     def scenario_from(self, folder: Path) -> str:

@@ -27,6 +27,7 @@ from affinet.runtimes.machines.place import Place, own_name, part_of
 from affinet.runtimes.private import private_folder
 from netem.processes.supervised import BEAT_S
 from netem.processes.system_errors import said
+from netem.wire import endpoints
 from netem.wire.carrier import Question
 from netem.wire.session import Login
 
@@ -150,8 +151,7 @@ class Machine:
             )
             place.beat()
             kernels |= admitted.kernels
-        address = Login(wanted.connect, wanted.names[0], keys=keys).address
-        assert address is not None, "it has connected there"
+        address = endpoints.over_machines(wanted.connect)
         threading.Thread(target=self._watch, args=(address, admitted.gone_after_s), daemon=True).start()
         self._start_nursery(kernels)
 

@@ -1,4 +1,4 @@
-"""Who may enter by which certificate, over TLS; whoever may not is told why in one line."""
+"""Certificates: how they are made, and whoever is refused is told why in one line; what they keep out: test_trust.py."""
 
 import socket
 from contextlib import contextmanager
@@ -97,20 +97,6 @@ def test_a_hub_at_an_address_that_is_not_its_own_is_not_trusted(tmp_path):
         joined(Login(endpoint, "agent-1", keys=folder), SOON),
     ):
         pass
-
-
-def test_nobody_enters_without_a_certificate(tmp_path):
-    folder = made(tmp_path / "keys")
-    with flying(folder) as (endpoint, _):
-        bare = client(Login(endpoint, "agent-1", keys=folder), SOON)
-        tls = bare["transport"]["link"]["tls"]
-        for word in ("connect_certificate", "connect_private_key"):
-            del tls[word]
-        with pytest.raises(NotCarried):
-            Session(bare | {"mode": "client"})
-        plain = client(Login(f"tcp/127.0.0.1:{port(endpoint)}", "agent-1", "guess"), SOON)
-        with pytest.raises(NotCarried):
-            Session(plain)
 
 
 def test_an_expired_certificate_is_refused_by_both(tmp_path):
