@@ -58,7 +58,7 @@ def coordinator(login: Login, seats: Iterable[str]) -> dict[str, Any]:
     NotTrusted
         When it has no proof of who it is that will do there.
     """
-    return listening(login, None, dict(map(_of_seat, seats)))
+    return listening(login, None, dict(map(_of_seat, seats)), [up("*"), alive("*"), join("*"), CLOCK])
 
 
 def _of_seat(seat: str) -> tuple[str, list[dict[str, Any]]]:

@@ -178,18 +178,24 @@ def hub(
     NotTrusted
         When it would listen beyond this machine without certificates, or these will not do.
     """
-    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts))
+    limited = [keys.broadcast("*", "**"), keys.act("*"), keys.control]
+    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts), limited)
 
 
-def listening(login: Login, dictionary_file: str | None, rights: Mapping[str, list[dict[str, Any]]]) -> dict[str, Any]:
-    """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone."""
+def listening(
+    login: Login, dictionary_file: str | None, rights: Mapping[str, list[dict[str, Any]]], limited: list[str]
+) -> dict[str, Any]:
+    """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone.
+
+    Nobody may say more than a mebibyte at once on the keys that are `limited`.
+    """
     login.check()
     certificates = login.certificates
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "low_pass_filter": [_no_longer_than(LARGEST, [keys.broadcast("*", "**"), keys.act("*"), keys.control])],
+            "low_pass_filter": [_no_longer_than(LARGEST, limited)],
             "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
