@@ -10,6 +10,7 @@ from agents.real_time import RealTimeAgentsNode
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
+from netem.wire.repeating import opened
 from netem.wire.session import client
 
 
@@ -25,13 +26,14 @@ def host() -> NoReturn:
 
 def _fly(supervisor: Supervisor) -> None:
     brief = supervisor.brief(AgentBrief)
-    with supervisor.confessing(), Session(client(brief.login)) as session:
+    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
         _until_the_end(supervisor, node_of(session, supervisor, [brief], None))
 
 
 def _carry(supervisor: Supervisor) -> None:
     brief = supervisor.brief(HostBrief)
-    with supervisor.confessing(), Session(client(brief.agents[0].login)) as session:
+    login = brief.agents[0].login
+    with supervisor.confessing(), opened(client(login), login, supervisor.lost) as session:
         _until_the_end(supervisor, node_of(session, supervisor, brief.agents, brief.host))
 
 

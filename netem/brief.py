@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from analysis.models.arrays import Mask
 from netem.core.links import Links
@@ -23,8 +23,8 @@ class MediumBrief:
     ----------
     run
         The run's name, part of every key.
-    login, dictionary_file
-        Where to listen, and the file with everybody's password.
+    login, passwords
+        Where to listen, and the password of each who logs in by one.
     seed, links, channels, profiles, faults, triggers
         What the medium is made of.
     injected
@@ -45,7 +45,7 @@ class MediumBrief:
 
     run: str
     login: Login
-    dictionary_file: str
+    passwords: Mapping[str, str] = field(repr=False)
     seed: int
     links: Links
     channels: tuple[str, ...]

@@ -96,6 +96,7 @@ class LockstepNode:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
             sense = self._ports.sense(self._sense.next().data)
             self._supervisor.works(sense.k)
+            self._ports.refuse_strangers()
             if sense.last:
                 self._ports.end(sense.k)
                 return
@@ -112,7 +113,7 @@ class LockstepNode:
             # The agents now work on what they heard: time to write down, and to decide the next tick, where that needs no
             # positions.
             self._relay.finish(sense.k)
-            self._written.enter(decided.entry, self._relay.in_flight)
+            self._written.enter(decided.entry, self._relay.in_flight, self._supervisor.lost_anywhere())
             tick = sense.k + 1
             decided = self._decide(tick, None) if self._relay.ahead else None
 

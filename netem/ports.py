@@ -26,7 +26,7 @@ from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
-from netem.wire.session import HUB
+from netem.wire.session import HUB, clients
 
 
 class Seen(NamedTuple):
@@ -53,6 +53,7 @@ class MediumPorts:
         self._numbers = Numbering()
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
+        self._doorway = session.doorway(clients(agents, brief.hosts))
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
         self._streams = {agent: f"inbox {agent}" for agent in agents}
         self._positioned = brief.positioned.tolist()
@@ -80,6 +81,10 @@ class MediumPorts:
         """The agents' positions, shape (N, D), in metres."""
         position: Array = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
         return position
+
+    def refuse_strangers(self) -> None:
+        """Look who has come in."""
+        self._doorway.refuse_strangers()
 
     def obey_orders(self, tick: int) -> None:
         """Do what was asked of the medium, from this tick on."""

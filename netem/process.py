@@ -14,15 +14,21 @@ from netem.processes.supervised import Supervisor
 from netem.real_time import RealTimeNode
 from netem.wire.carrier import Session
 from netem.wire.keys import Keys
-from netem.wire.session import hub
+from netem.wire.repeating import opened
+from netem.wire.session import dictionary, hub
+
+
+def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
+    agents = range(1, brief.links.agents + 1)
+    with dictionary(brief.passwords) as file:
+        return opened(hub(brief.login, file, Keys(brief.run), agents, brief.hosts), brief.login, supervisor.lost)
 
 
 def main() -> None:
     """Run the medium until the run is over."""
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
-    config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)
-    with supervisor.confessing(), Session(config) as session:
+    with supervisor.confessing(), _listening(supervisor, brief) as session:
         # These take a while to import: everybody else can log in by now.
         from netem.core.arrow import do_without_pandas
         from netem.medium import journal

@@ -80,6 +80,7 @@ class RealTimeNode:
             self._hear(arrived)
 
     def _begin(self, sense: messages.Sense) -> None:
+        self._ports.refuse_strangers()
         if sense.last:
             self._over = True
             self._write_down(all_of_them=True)
@@ -136,5 +137,5 @@ class RealTimeNode:
             handed, self._handed = self._handed, [0] * len(self._handed)
             kept = messages.Punctuality(late=self._late / self._pace.factor, missed=int(self._late > self._pace.dt))
             self._ports.tell_the_world(self._ports.journal(self._told, entry, handed, kept))
-            self._written.enter(entry, self._relay.in_flight)
+            self._written.enter(entry, self._relay.in_flight, self._supervisor.lost_anywhere())
             self._told, self._late = self._told + 1, 0.0

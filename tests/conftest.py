@@ -1,6 +1,7 @@
 """Fixtures of all tests."""
 
 import signal
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,3 +22,11 @@ def signals_as_at_a_terminal() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def free_endpoint() -> str:
+    """Where to listen over TLS on this machine: at a port that is free."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tls/127.0.0.1:{free.getsockname()[1]}"

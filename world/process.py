@@ -12,6 +12,7 @@ from netem.core.clock import Clock, Lockstep
 from netem.processes import system_errors
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
+from netem.wire.repeating import opened
 from netem.wire.session import client
 from world import flight
 from world.books.archive import Archive
@@ -118,7 +119,7 @@ def main() -> None:
 
     do_without_pandas()
     out = Path(brief.out)
-    with supervisor.confessing(), Session(client(brief.login)) as session:
+    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
         with (
             Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
             RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,

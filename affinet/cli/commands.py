@@ -16,16 +16,20 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
+from datetime import timedelta
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import options, show, terminal
+from affinet.cli import machines, options, show, terminal
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.interruption import Interrupted
+from affinet.runtimes.machines import hosts
+from affinet.runtimes.machines.place import Refused
+from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.rerun_command import NoViewer, open_viewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
@@ -38,6 +42,8 @@ from analysis.models.finding import Finding
 from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
 from netem.processes.user_code import UserCodeError
+from netem.wire.certificates import NotTrusted
+from netem.wire.session import CENTRE, CONTROL, COORDINATOR, HUB, WORLD, agent_name, host_name
 from world.books import history
 
 if TYPE_CHECKING:
@@ -71,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)
-    except (ScenarioError, PlanError, NoViewer, NotFlying, history.Damaged) as error:
+    except (ScenarioError, PlanError, NoViewer, NotFlying, NotTrusted, Refused, history.Damaged) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     except UserCodeError as error:
@@ -154,6 +160,19 @@ def _check(parsed: argparse.Namespace) -> int:
 def _run(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed)
+
+
+def _world(parsed: argparse.Namespace) -> int:
+    plan = planning.make(_scenario(parsed))
+    return _fly(plan, Path(parsed.scenario).stem, parsed, machines.typed(plan, parsed))
+
+
+def _hosts(parsed: argparse.Namespace) -> int:
+    read = hosts.load(parsed.file)
+    folder = parsed.file.absolute().parent
+    parsed.scenario = parsed.scenario or read.scenario_from(folder)
+    plan = planning.make(_scenario(parsed))
+    return _fly(plan, Path(parsed.scenario).stem, parsed, machines.started(plan, read, folder))
 
 
 def _replay(parsed: argparse.Namespace) -> int:
@@ -278,14 +297,15 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
     return FAIL
 
 
-def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
+def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
     if parsed.out:
         refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
     parsed.out = parsed.out or directories.for_run(name)
     claim(parsed.out)
     with show.Progress(plan, name, parsed.out) as watch:
-        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer)
+        elsewhere = None if spread is None else spread(parsed.out)
+        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer, elsewhere)
     if parsed.json:
         print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
     else:
@@ -314,6 +334,16 @@ def _inject(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _keys(parsed: argparse.Namespace) -> int:
+    from netem.wire import authority  # its library takes a while to import
+
+    agents, hosts = range(1, parsed.agents + 1), range(1, (parsed.hosts or 0) + 1)
+    names = [COORDINATOR, HUB, WORLD, CENTRE, CONTROL, *map(agent_name, agents), *map(host_name, hosts)]
+    made = authority.make(parsed.directory, names, parsed.hub, timedelta(days=parsed.days))
+    show.keys(parsed.directory, made)
+    return PASS
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -324,4 +354,8 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "design": _design,
     "fit": _fit,
     "inject": _inject,
+    "keys": _keys,
+    "hosts": _hosts,
+    "world": _world,
+    **dict.fromkeys(("agent", "host", "netem"), machines.hold),
 }

@@ -10,6 +10,8 @@ from affinet.scenario import files, loading
 from affinet.scenario.units import LARGEST, SMALLEST
 from world.formation.layouts import KINDS
 
+_LONGEST_DAYS = 3650  # as long as the authority
+
 
 def parser() -> argparse.ArgumentParser:
     """Reads a command line; `command` is the word of the command."""
@@ -38,13 +40,15 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
         )
-        command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
-        command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+        _add_output(command)
     _add_hunt(commands)
     _add_study(commands)
     _add_design(commands)
     _add_fit(commands)
     _add_inject(commands)
+    _add_keys(commands)
+    _add_coordinators(commands)
+    _add_seats(commands)
     return whole
 
 
@@ -59,6 +63,52 @@ def _add_overrides(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", metavar="N", help="seed")
     command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
     command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+
+
+def _add_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
+    command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+
+
+def _add_coordinators(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    hosts = commands.add_parser(
+        "hosts", help="fly a scenario over several machines, whose commands are started from here"
+    )
+    hosts.add_argument(
+        "file", type=_path, metavar="HOSTS", help="which machines, and who is on which: docs/machines.md"
+    )
+    hosts.add_argument("scenario", nargs="?", help="in place of the one in the file")
+    world = commands.add_parser("world", help="fly a scenario over several machines, whose commands are typed there")
+    world.add_argument("scenario", help=f"a TOML file, or one of: {', '.join(loading.shipped())}")
+    world.add_argument("--listen", required=True, metavar="tls/ADDRESS:PORT", help="where they find this machine")
+    world.add_argument("--keys", required=True, metavar="DIR", help="made by `affinet keys`")
+    world.add_argument(
+        "--gone-after",
+        type=_positive,
+        default=20.0,
+        metavar="S",
+        help="give up a silent machine (default: %(default)s)",
+    )
+    for command in (hosts, world):
+        command.set_defaults(runtime="processes")
+        _add_overrides(command)
+        _add_output(command)
+
+
+def _add_seats(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    agent = commands.add_parser("agent", help="hold agents of a run over several machines on this one")
+    agent.add_argument("numbers", nargs="+", type=_count, metavar="N", help="which")
+    host = commands.add_parser("host", help="hold processes that carry several agents (agents.per_process)")
+    host.add_argument("numbers", nargs="+", type=_count, metavar="N", help="which")
+    netem = commands.add_parser("netem", help="hold the medium of a run over several machines on this one")
+    netem.add_argument("--listen", required=True, metavar="tls/ADDRESS:PORT", help="where all others find it")
+    for command in (agent, host, netem):
+        command.add_argument(
+            "--connect", required=True, metavar="tls/ADDRESS:PORT", help="where `affinet world` listens"
+        )
+        command.add_argument("--keys", required=True, metavar="DIR", help="the certificates of this machine")
+        command.add_argument("--scenario", help="refuse to fly any other; without it what the others fly is taken")
+        command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides of that")
 
 
 def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -88,6 +138,12 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: give a whole number, at least 1")
     return int(text)
+
+
+def _days(text: str) -> int:
+    if (days := _count(text)) > _LONGEST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text}: give at most {_LONGEST_DAYS}")
+    return days
 
 
 def _seed(text: str) -> int:
@@ -203,6 +259,30 @@ def _add_fit(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--order", type=_count, default=1, metavar="P", help="ticks it takes in (default: %(default)s)"
     )
     fitting.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _add_keys(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    keys = commands.add_parser(
+        "keys",
+        help="certificates for runs over several machines",
+        description="Make an authority, and a certificate and a key for each process of a run. Run again, it makes new "
+        "certificates of the same authority for all who have one. docs/trust.md says what goes to which machine.",
+    )
+    keys.add_argument("directory", type=_path, metavar="DIR", help="where to keep them, for this user alone")
+    keys.add_argument("--agents", type=_count, default=10, metavar="N", help="for agents 1 to N (default: %(default)s)")
+    keys.add_argument(
+        "--hosts", type=_count, metavar="N", help="for N processes that carry several agents (agents.per_process)"
+    )
+    keys.add_argument(
+        "--hub",
+        nargs="+",
+        default=[],
+        metavar="ADDRESS",
+        help="host names and IP addresses under which the medium is reached, besides loopback",
+    )
+    keys.add_argument(
+        "--days", type=_days, default=30, metavar="D", help="how long they are valid (default: %(default)s)"
+    )
 
 
 def _groups(text: str) -> tuple[tuple[int, ...], ...]:

@@ -19,7 +19,9 @@ from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
 from affinet.verdicts.timing import DelayError, Lateness, Timing
 from analysis.models.finding import Finding
+from netem.core.listing import listed
 from netem.faults.control import Answer
+from netem.wire.certificates import AUTHORITY
 from netem.wire.session import HUB, WORLD
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from affinet.studies.study import Result
     from affinet.testing.hunt import Counterexample, Coverage
     from affinet.testing.strategies import Entries
+    from netem.wire.authority import Made
 
 _SAYS = "{task.fields[says]}"
 _LEVELS = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "error": "[red]error[/]"}
@@ -196,9 +199,20 @@ def designed(made: Designed, file: Path) -> None:
     print(f"{file}: affinet run {directories.on_a_command_line(file)} --runtime inprocess")  # noqa: T201
 
 
+def keys(folder: Path, made: Made) -> None:
+    """Which certificates were made, and what to do with them."""
+    of = "the authority that was there" if made.renewed else "a new authority"
+    print(  # noqa: T201
+        f"{folder}: certificates of {of} for {len(made.names)} names until {made.ends:%Y-%m-%d %H:%M} UTC; "
+        f"the hub is reached at {listed(made.addresses)}\n"
+        f"copy to each machine {AUTHORITY}.pem, and NAME.pem and NAME.key of the processes there; "
+        f"{AUTHORITY}.key makes certificates, and stays here"
+    )
+
+
 def outcome(outcome: Outcome, plan: Plan) -> None:
     """What came of a run."""
-    table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
+    table = Table(show_header=False, title=_VERDICTS.get(outcome.verdict, f"[yellow]{outcome.verdict}[/]"))
     flown, messages = outcome.flown, outcome.messages
     errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
     errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
@@ -222,6 +236,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
             ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
+        *([("lost by the transport", f"{lost}, and asked for again")] if (lost := messages["transport_lost"]) else []),
         *(("fault", str(bite)) for bite in outcome.faults),
         *([] if outcome.timing is None else _timing(outcome.timing)),
         ("digest", str(outcome.digest)),

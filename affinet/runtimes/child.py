@@ -59,6 +59,21 @@ class Process(Protocol):
         """End it."""
 
 
+class Elsewhere(Protocol):
+    """What is known of a process on another machine, by what its machine says."""
+
+    @property
+    def where(self) -> str:
+        """The machine."""
+
+    @property
+    def pss_mb(self) -> float:
+        """The most memory it was seen to take there, in megabytes."""
+
+    def look(self) -> ProcessStatus:
+        """What the system there says of it."""
+
+
 class RunFailed(RuntimeError):
     """The run ended before its last tick: why."""
 
@@ -100,6 +115,8 @@ class Child:
         The process, and the file its standard error goes to.
     trusted
         Whether what it runs is sure to come to an end, as no code of a user's own is.
+    elsewhere
+        The same process, where it runs on another machine.
     expected_to_die
         Whether its death is in the script, or the run is over.
     confessed
@@ -108,6 +125,8 @@ class Child:
         Whether it has told so.
     pss_mb
         The most memory it was seen to take, in megabytes; what several share is divided among them.
+    lost
+        How many messages it says that the transport lost.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
     looks
@@ -119,11 +138,13 @@ class Child:
     process: Process
     log: Path
     trusted: bool
+    elsewhere: Elsewhere | None = None
     expected_to_die: bool = False
     confessed: bool = False
     is_ready: bool = False
     is_done: bool = False
     pss_mb: float = 0.0
+    lost: int = 0
     doing: Beat | None = None
     beat_s: float = 0.0
     looks: StatusHistory | None = None
@@ -136,8 +157,9 @@ class Child:
 
     @property
     def who(self) -> str:
-        """Its name, and its number among the processes of the machine."""
-        return f"{self.name} (pid {self.process.pid})"
+        """Its name, its number among the processes of its machine, and which that is, if it is another."""
+        where = "" if self.elsewhere is None else f" on {self.elsewhere.where}"
+        return f"{self.name} (pid {self.process.pid}{where})"
 
     @property
     def is_mute(self) -> bool:
@@ -172,7 +194,9 @@ class Child:
 
     def measure(self) -> None:
         """Note its memory."""
-        if self.process.returncode is not None:
+        if self.elsewhere is not None:
+            self.pss_mb = self.elsewhere.pss_mb
+        if self.elsewhere is not None or self.process.returncode is not None:
             return
         with suppress(psutil.NoSuchProcess, psutil.AccessDenied):  # a program with other rights keeps it to itself
             self.pss_mb = max(self.pss_mb, psutil.Process(self.process.pid).memory_full_info().pss / 2**20)
@@ -187,9 +211,7 @@ class Child:
         """
         if self.process.poll() is not None:  # something that it had started keeps its pipe open
             raise RunFailed(self.obituary())
-        process = psutil.Process(self.process.pid)
-        used = process.cpu_times()
-        now = ProcessStatus(process.status(), used.user + used.system)
+        now = _status(self.process.pid) if self.elsewhere is None else self.elsewhere.look()
         self.looks = StatusHistory(now, now, now) if self.looks is None else self.looks.then(now)
         return now
 
@@ -230,13 +252,14 @@ class Child:
 
     def report(self) -> dict[str, Any]:
         """For the summary."""
-        return {
+        report = {
             "role": self.role,
             "id": self.number,
             "pid": self.process.pid,
             "pss_mb": round(self.pss_mb, 1),
             "exit": self.process.returncode,
         }
+        return report if self.elsewhere is None else report | {"machine": self.elsewhere.where}
 
     def _event(self, line: bytes) -> Event:
         try:
@@ -251,6 +274,8 @@ class Child:
                 raise UserCodeFailed(f"{self.name}: {printable(event['reason'])[:_LONGEST_REASON]}")
             case "beat":
                 self.doing = beat(event)
+            case "lost":
+                self.lost += event["count"]
             case "ready" if self.is_ready or self.is_done:
                 raise RunFailed(f"{self.who}: it said twice that it is ready (docs/protocol.md)")
             case "done" if self.is_done or not self.is_ready:
@@ -266,3 +291,9 @@ class Child:
         with suppress(BrokenPipeError, ValueError):  # it is gone, or the run is over and the pipe closed
             stdin.write(data)
             stdin.flush()
+
+
+def _status(pid: int) -> ProcessStatus:
+    process = psutil.Process(pid)
+    used = process.cpu_times()
+    return ProcessStatus(process.status(), used.user + used.system)

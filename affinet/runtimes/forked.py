@@ -54,8 +54,17 @@ class Nursery:
         self._living: dict[int, ForkedProcess] = {}
 
     @classmethod
-    def started(cls, log: IO[bytes], patience_s: float) -> Nursery:
-        """A nursery that has been started, and says when it is ready.
+    def started(cls, log: IO[bytes], patience_s: float, private: Path, prepared: str | None = None) -> Nursery:
+        """A nursery that has been started, and says when it is ready; at its end it removes a folder.
+
+        Parameters
+        ----------
+        log, patience_s
+            Where its standard error goes; how long it may do nothing before it answers, in seconds.
+        private
+            The folder.
+        prepared
+            The kernels that it is to load, as JSON; by default those that were called in this process.
 
         Raises
         ------
@@ -68,7 +77,7 @@ class Nursery:
             ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             unless_started.enter_context(ours)
             with theirs:
-                process = started(program(), theirs.fileno(), log)
+                process = started(program(private, prepared), theirs.fileno(), log)
             unless_started.pop_all()
         return cls(Child(NURSERY, None, process, Path(log.name), trusted=True), ours, patience_s)
 
@@ -96,6 +105,10 @@ class Nursery:
         stdout.close()
         process = self._living[forked[0]] = ForkedProcess(self, *forked, orders, events)
         return process
+
+    def fileno(self) -> int:
+        """Readable when it has something to tell: `hear` takes it in."""
+        return self._connection.fileno()
 
     def leave(self, grace_s: float) -> None:
         """Let it go, within so many seconds: nobody is forked any more, and of nobody it is asked how he ended."""
@@ -215,10 +228,11 @@ class ForkedProcess:
         os.close(self._descriptor)
 
 
-def program() -> list[str]:
-    """The command line of the nursery, with the search path of this process, and the kernels that planning has called."""
+def program(private: Path, prepared: str | None = None) -> list[str]:
+    """The command line of the nursery: the search path of this process, a private folder, kernels that planning has called."""
     path = [os.path.abspath(entry) for entry in sys.path if entry]
-    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__, json.dumps(kernels.prepared())]
+    told = [str(private), json.dumps(kernels.prepared()) if prepared is None else prepared]
+    return [sys.executable, "-P", "-c", _RUN, json.dumps(path), "-m", nursery.__name__, *told]
 
 
 def end_by(deadline: float, process: Process) -> None:

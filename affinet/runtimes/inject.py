@@ -20,9 +20,9 @@ from netem.faults.control import Answer, Order, OrderAction
 from netem.faults.fault import Fault, UnderWay, Verb
 from netem.processes.system_errors import about, afterwards
 from netem.wire import messages
-from netem.wire.carrier import NotCarried, Session
+from netem.wire.carrier import NotCarried, joined
 from netem.wire.keys import Keys
-from netem.wire.session import Login, client
+from netem.wire.session import Login
 
 _FILE = "control.json"
 _PATIENCE_S = 5.0
@@ -102,13 +102,17 @@ class Access:
     login: Login
 
     @contextmanager
-    def granted(self, out: Path) -> Iterator[None]:
-        """Leave the access in the run directory, for this user alone, for as long as the run flies."""
-        file = out / _FILE
-        with afterwards(partial(file.unlink, missing_ok=True)):
-            with about(file):
+    def granted(self, out: Path, private: Path) -> Iterator[None]:
+        """Leave the access in the run directory, for this user alone, for as long as the run flies.
+
+        What stands there is a link into the private folder of the run, which goes however the run ends.
+        """
+        link, file = out / _FILE, private / _FILE
+        with afterwards(partial(link.unlink, missing_ok=True), partial(file.unlink, missing_ok=True)):
+            with about(link):
                 file.touch(mode=0o600)
                 file.write_text(json.dumps({"run": self.run, "login": vars(self.login)}))
+                link.symlink_to(file)
             yield
 
     @classmethod
@@ -138,7 +142,7 @@ class Access:
             When nobody answers, or the medium could not read the order.
         """
         try:
-            with Session(client(self.login, _CONNECT_S)) as session:
+            with joined(self.login, _CONNECT_S) as session:
                 reply = session.ask(Keys(self.run).control, messages.pack(order), _PATIENCE_S)
         except NotCarried as error:
             raise NotFlying(f"the run has ended, stands still, or refuses: {error}") from error

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import secrets
-import tempfile
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,8 +15,12 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
+from affinet.runtimes.forked import NURSERY
 from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
+from affinet.runtimes.machines.seats import hosts_of
+from affinet.runtimes.machines.spread import Spread
+from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.arrivals import forms_of
@@ -27,9 +31,10 @@ from netem.brief import MediumBrief
 from netem.faults.fault import Fault, Verb
 from netem.faults.timeline import Timeline
 from netem.medium.medium import JOURNAL
+from netem.processes.supervised import LOST
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
-from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, host_name, socket_folder
+from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
 from world.brief import WorldBrief
 from world.physics.world import World
 
@@ -44,6 +49,8 @@ class LaunchRecord:
         Messages lost that nobody ordered; None when the run did not get to its end.
     fired
         In which tick each trigger fired that did.
+    lost
+        Messages that the transport between machines lost, and that were had again.
     failure, user_code
         Why the run ended early, if it did, and whether a user's own code is why.
     start_s, wall_s
@@ -54,6 +61,7 @@ class LaunchRecord:
 
     uninstructed: int | None = None
     fired: dict[int, int] = field(default_factory=dict)
+    lost: int = 0
     failure: str | None = None
     user_code: bool = False
     start_s: float = 0.0
@@ -73,6 +81,7 @@ class Launcher:
         viewer: str | None = None,
         programs: Mapping[int, Sequence[str]] | None = None,
         interruption: Interruption | None = None,
+        spread: Spread | None = None,
     ) -> None:
         """Nothing is started yet.
 
@@ -88,6 +97,8 @@ class Launcher:
             Command lines of programs that fly some agents in place of ours (docs/protocol.md).
         interruption
             What may ask the run to end.
+        spread
+            The other machines that fly some of it.
         """
         self._plan = plan
         self._out = out
@@ -98,7 +109,8 @@ class Launcher:
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
         self._agents: dict[int, Child] = {}  # that have a process to themselves
-        self._hosts = hosts_of(plan, self._programs)
+        self._hosts = hosts_of(plan, self._programs, () if spread is None else spread.groups)
+        self._spread = spread
         self.flight = LaunchRecord()
 
     def fly(self) -> LaunchRecord:
@@ -115,28 +127,36 @@ class Launcher:
     def _launch(self) -> None:
         logs = self._out / "logs"
         logs.mkdir(parents=True, exist_ok=True)
-        group = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption)
+        machines = None if self._spread is None else self._spread.coordinator
+        group = ProcessGroup(logs, self._plan.scenario.time.patience, self._interruption, machines)
         launched = time.perf_counter()
         with (
             afterwards(partial(self._note, group), partial(_remove_unwritten, self._out)),
-            tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True) as private,
+            private_folder() as self._private,
+            self._spread or nullcontext(),
             group,
         ):
-            self._private = Path(private)
             self._start(group)
-            with Access(self._run, self._logins[CONTROL]).granted(self._out):
+            with Access(self._run, self._logins[CONTROL]).granted(self._out, self._private):
                 self._fly(group, launched)
 
     def _note(self, group: ProcessGroup) -> None:
-        self.flight.processes = group.reports
+        self.flight.lost = group.lost
+        self.flight.processes = [report | self._clock(report["role"], report["id"]) for report in group.reports]
+
+    def _clock(self, role: str, number: int | None) -> dict[str, float]:
+        if self._spread is None or role == NURSERY:
+            return {}
+        return self._spread.report(seat_name(role, number))
 
     def _start(self, group: ProcessGroup) -> None:
-        private = self._private
-        self._logins = self._make_logins(private)
         _prepare_kernels(self._plan.world)
-        group.start_nursery()
+        group.start_nursery(self._private)
+        if self._spread is not None:
+            self._spread.coordinator.await_everybody(self._interruption.heed)
+        self._logins = self._make_logins(self._private)
         group.fork("world", self._world_brief(self._logins[WORLD]), trusted=True)
-        medium = self._medium_brief(self._logins[HUB], private / "users")
+        medium = self._medium_brief(self._logins[HUB])
         own_losses = any(profile.own for profile in medium.profiles)
         group.fork("netem", medium, trusted=not own_losses)
         if self._plan.centre:
@@ -147,23 +167,13 @@ class Launcher:
         for number in self._lone:
             self._start_agent(group, number)
         group.await_ready(group.children)
-        (private / "users").unlink()  # the medium knows them now, and nobody else has to
 
     def _make_logins(self, private: Path) -> dict[str, Login]:
+        names = [HUB, *clients(self._numbers, self._hosts)]
+        if self._spread is not None:
+            return self._spread.logins(names)
         endpoint = f"unixsock-stream/{private}/z.sock"
-        names = [
-            HUB,
-            WORLD,
-            CONTROL,
-            CENTRE,
-            *map(host_name, self._hosts),
-            *map(agent_name, self._lone),
-        ]
-        logins = {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
-        users = private / "users"
-        users.touch(mode=0o600)
-        users.write_text("".join(f"{login.name}:{login.password}\n" for login in logins.values()))
-        return logins
+        return {name: Login(endpoint, name, secrets.token_hex(16)) for name in names}
 
     def _fly(self, group: ProcessGroup, launched: float) -> None:
         world, medium = group.children[0], group.children[1]
@@ -187,6 +197,8 @@ class Launcher:
             case "kill" | "restart" | "pause" | "resume" as order:
                 self._move(group, order, event)
                 child.order(order)
+            case "lost":
+                group.children[1].order(f"{LOST} {event['key'].split('/', 2)[-1]} {event['count']}")
             case "fired":
                 self.flight.fired |= dict.fromkeys(event["triggers"], event["k"])
             case "done" if child.role == WORLD:
@@ -215,7 +227,11 @@ class Launcher:
     def _lone(self) -> list[int]:
         """Agents that have a process to themselves."""
         carried = {number for of_host in self._hosts.values() for number in of_host}
-        return [number for number in range(1, self._plan.world.links.agents + 1) if number not in carried]
+        return [number for number in self._numbers if number not in carried]
+
+    @property
+    def _numbers(self) -> range:
+        return range(1, self._plan.world.links.agents + 1)
 
     def _host_brief(self, host: int, carried: Sequence[int]) -> HostBrief:
         login = self._logins[host_name(host)]
@@ -224,12 +240,16 @@ class Launcher:
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         warm = number in self._plan.timeline.warm
-        checkpoint = str(self._private / f"agent-{number}.npz") if warm else None
+        checkpoint = str(self._folder(agent_name(number), self._private) / f"agent-{number}.npz") if warm else None
         brief = self._agent_brief(number, login, checkpoint, remembers=remembers)
         program = self._programs.get(number)
         child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
         self._agents[number] = child
         return child
+
+    def _folder(self, name: str, here: Path) -> Path:
+        """Where a process of this name writes."""
+        return here if self._spread is None else self._spread.folder(name, here)
 
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(
@@ -245,11 +265,11 @@ class Launcher:
             pace=self._plan.pace,
         )
 
-    def _medium_brief(self, login: Login, users: Path) -> MediumBrief:
+    def _medium_brief(self, login: Login) -> MediumBrief:
         return MediumBrief(
             run=self._run,
             login=login,
-            dictionary_file=str(users),
+            passwords={name: of.password for name, of in self._logins.items() if of.keys is None},
             seed=self._plan.scenario.seed,
             links=self._plan.world.links,
             channels=self._plan.channels,
@@ -261,7 +281,7 @@ class Launcher:
             forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
             hosts=self._hosts,
-            journal=str(self._out / JOURNAL),
+            journal=str(self._folder(HUB, self._out) / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
             pace=self._plan.pace,
         )
@@ -289,14 +309,6 @@ class Launcher:
             remembers=remembers,
             timer=plan.timers[row] if plan.timers else None,
         )
-
-
-def hosts_of(plan: Plan, programs: Collection[int]) -> dict[int, tuple[int, ...]]:
-    """The processes that carry several agents, and which; programs fly on their own, and so does who would be alone."""
-    size = plan.scenario.agents.per_process
-    ours = [number for number in range(1, plan.world.links.agents + 1) if number not in programs]
-    carried = [tuple(ours[first : first + size]) for first in range(0, len(ours), size)]
-    return {host: of_host for host, of_host in enumerate(carried, 1) if len(of_host) > 1}
 
 
 def _prepare_kernels(world: World) -> None:

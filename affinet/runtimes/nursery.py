@@ -25,10 +25,12 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 
 import numpy as np
 
+from affinet.runtimes.private import remove
 from agents import estimators, laws
 from agents import process as agent_process
 from agents.centre import process as centre_process
@@ -164,7 +166,9 @@ def main() -> None:
     run = None
     with suppress(BrokenPipeError, ConnectionResetError):  # the launcher is gone
         run = Forks(socket.socket(fileno=_STDIN)).next()
-    if run is not None:
+    if run is None:
+        remove(Path(sys.argv[-2]))  # the launcher may have been killed, and could not
+    else:
         run()
 
 

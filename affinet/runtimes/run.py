@@ -16,6 +16,7 @@ from affinet.planning.plan import Plan, PlanError
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
+from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.rerun_command import NotMended, NoViewer, mend
 from affinet.scenario.words import among, shown
 from affinet.verdicts import outcome, timing
@@ -49,7 +50,9 @@ def runtime_of(word: str) -> Runtime:
     return cast("Runtime", word)
 
 
-def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | None = None) -> Outcome:
+def fly(
+    plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | None = None, spread: Spread | None = None
+) -> Outcome:
     """Run a plan.
 
     Parameters
@@ -64,6 +67,8 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
         Called with the tick reached and its tracking error, in square metres, now and then.
     viewer
         URL of a Rerun viewer that is listening.
+    spread
+        The other machines, of a run over processes that some of them fly.
 
     Raises
     ------
@@ -76,7 +81,7 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     Interrupted
         When a signal asked the run to end; its outcome is written down all the same.
     """
-    fly_in = _RUNTIMES[runtime_of(runtime)]
+    fly_in = _RUNTIMES[runtime_of(runtime)] if spread is None else partial(_over_processes, spread=spread)
     outcome.prepare(plan, out)
     with interruptible() as interruption:
         done = fly_in(plan, out, watch, viewer, interruption)
@@ -128,10 +133,17 @@ def evidence(plan: Plan, done: Outcome) -> Evidence | None:
     return Evidence(plan, history.load(path), done) if path.exists() else None
 
 
-def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, interruption: Interruption) -> Outcome:
+def _over_processes(
+    plan: Plan,
+    out: Path,
+    watch: Watch,
+    viewer: str | None,
+    interruption: Interruption,
+    spread: Spread | None = None,
+) -> Outcome:
     from netem.medium import journal  # pyarrow takes a while to import, and the start should not wait for it
 
-    launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption)
+    launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption, spread=spread)
     flight = launcher.flight
     launcher.fly()
     path, recording, book = out / history.ARRAYS, parts(out / "run.rrd"), out / JOURNAL
@@ -162,6 +174,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
         wall_s=flight.wall_s,
         processes=flight.processes,
         out=out,
+        lost=flight.lost,
         timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),
     )
 

@@ -17,10 +17,12 @@ from typing import IO, Any
 from affinet.runtimes.child import Child, RunFailed, named, started
 from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.interruption import Interruption
+from affinet.runtimes.machines.coordinator import Coordinator
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
 from netem.core.listing import listed
 from netem.processes.supervised import BEAT_S, called
+from netem.wire.session import seat_name
 
 _GRACE_S = 1.2
 # To start takes a second of processor time, and there may be a hundred on two cores.
@@ -35,7 +37,9 @@ class ProcessGroup:
     was stopped, or did not come to look, is nobody's silence.
     """
 
-    def __init__(self, logs: Path, patience_s: float, interruption: Interruption) -> None:
+    def __init__(
+        self, logs: Path, patience_s: float, interruption: Interruption, machines: Coordinator | None = None
+    ) -> None:
         """No children yet.
 
         Parameters
@@ -46,8 +50,10 @@ class ProcessGroup:
             How long nothing may move before somebody is to blame, in seconds.
         interruption
             What may ask the run to end.
+        machines
+            The other machines of the run.
         """
-        self._logs = logs
+        self._logs, self._machines = logs, machines
         self._patience_s = patience_s
         self._interruption = interruption
         self._selector = selectors.DefaultSelector()
@@ -55,6 +61,7 @@ class ProcessGroup:
         self.now_s = self._moved_s = self._looked_s = 0.0
         self.children: list[Child] = []
         self._killed: list[dict[str, Any]] = []
+        self._lost_by_killed = 0
         self._host_of: dict[str, str] = {}
 
     def __enter__(self) -> ProcessGroup:
@@ -72,8 +79,13 @@ class ProcessGroup:
         there = [*self.children, *([] if self._nursery is None else [self._nursery.child])]
         return [*(child.report() for child in there), *self._killed]
 
-    def start_nursery(self) -> None:
-        """Start the nursery, and wait until it can fork.
+    @property
+    def lost(self) -> int:
+        """How many messages the processes say that the transport lost."""
+        return self._lost_by_killed + sum(child.lost for child in self.children)
+
+    def start_nursery(self, private: Path) -> None:
+        """Start the nursery, which removes this folder when the launcher is gone, and wait until it can fork.
 
         Raises
         ------
@@ -81,7 +93,7 @@ class ProcessGroup:
             When it dies or fails, or does not get anywhere for too long; or there is no such thing on this system.
         """
         with self._log(NURSERY) as log:
-            self._nursery = Nursery.started(log, self._patience_s)
+            self._nursery = Nursery.started(log, self._patience_s, private)
         child = self._nursery.child
         self._selector.register(child.events_fd, selectors.EVENT_READ, child)
         self.await_ready([child])
@@ -95,7 +107,7 @@ class ProcessGroup:
         trusted: bool = False,
         carrying: Collection[int] = (),
     ) -> Child:
-        """Have the nursery fork a process.
+        """Have a process forked, by the nursery here or on the machine that has its seat.
 
         Parameters
         ----------
@@ -113,12 +125,19 @@ class ProcessGroup:
         RunFailed
             When the nursery is gone, or does not answer.
         """
-        assert self._nursery is not None, "start the nursery first"
         name = named(role, number)
         self._host_of |= dict.fromkeys(map(called, carrying), name)
         with self._log(name) as log:
-            process = self._nursery.fork(name, log)
-        return self._brief(Child(role, number, process, Path(log.name), trusted), brief)
+            child = self._forked(role, number, log, trusted)
+        return self._brief(child, brief)
+
+    def _forked(self, role: str, number: int | None, log: IO[bytes], trusted: bool) -> Child:
+        name, seat = named(role, number), seat_name(role, number)
+        if self._machines is not None and seat in self._machines.seats:
+            remote = self._machines.start(seat, name, log)
+            return Child(role, number, remote, Path(log.name), trusted, elsewhere=remote)
+        assert self._nursery is not None, "start the nursery first"
+        return Child(role, number, self._nursery.fork(name, log), Path(log.name), trusted)
 
     def start(self, role: str, command: Sequence[str], brief: Any, number: int | None = None) -> Child:
         """Start a program of somebody else's making, and give it its brief."""
@@ -176,6 +195,9 @@ class ProcessGroup:
         began_s = time.monotonic()
         ready = self._selector.select(BEAT_S)
         self.now_s += min(time.monotonic() - began_s, BEAT_S)
+        if self._machines is not None and self._machines.heed():
+            self._moved_s = self.now_s  # behind a link that is cut nobody is to blame
+            self._forget_looks()
         return [(key.data, event) for key, _ in ready for event in self._hear(key.data)]
 
     def blame_the_silent(self, awaited: Collection[Child]) -> None:
@@ -219,6 +241,7 @@ class ProcessGroup:
         self._forget(child)
         self.children.remove(child)
         self._killed.append(child.report())
+        self._lost_by_killed += child.lost
 
     def release(self) -> None:
         """The run is over: from now on everybody may leave."""
@@ -298,6 +321,8 @@ class ProcessGroup:
             child.free()
 
     def _end_all(self) -> None:
+        if self._machines is not None:
+            self._machines.give_up()
         if self._nursery is not None:
             self._nursery.child.resume()  # stopped, it could not say how the others end
         # The world goes first: it has a recording to close.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ Check = Callable[[Any], bool]
 
 LONGEST_LINE = 1 << 20
 _SHOWN = 120
+_KEY = re.compile(r"[\w/-]{1,200}", re.ASCII)
 
 
 class NotItsOwn(ValueError):
@@ -33,6 +35,10 @@ def _is_text(value: Any) -> bool:
     return type(value) is str
 
 
+def _is_key(value: Any) -> bool:
+    return type(value) is str and _KEY.fullmatch(value) is not None
+
+
 def _is_number(value: Any) -> bool:
     return type(value) is float
 
@@ -46,6 +52,7 @@ _OF_ALL: Mapping[str, Mapping[str, Check]] = {
     "ready": {},
     "beat": {"k": _is_count, "what": _is_text, "waits": _all(_is_text)},
     "failed": {"reason": _is_text},
+    "lost": {"key": _is_key, "count": _is_count},
 }
 _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {

@@ -11,7 +11,6 @@ from affinet.scenario.words import among
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
-from affinet.verdicts.outcome import RunVerdict
 from analysis.metrics import consistency, localization
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
@@ -323,11 +322,10 @@ def smooth(share: float) -> Checker:
     return Checker(name, check)
 
 
-def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> RunVerdict:
+def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> str:
     """The verdict of a test: a failure outweighs what proved nothing, and that outweighs a pass."""
     verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
-    ranked: tuple[RunVerdict, ...] = ("fail", "vacuous", "pass")
-    return next(verdict for verdict in ranked if verdict in verdicts)
+    return next((verdict for verdict in ("fail", "vacuous") if verdict in verdicts), evidence.outcome.verdict)
 
 
 def _truths(name: str, signal: Signal, evidence: Evidence) -> Mask:

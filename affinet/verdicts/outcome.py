@@ -38,13 +38,14 @@ RunVerdict = Literal["pass", "fail", "vacuous"]
 class Outcome:
     """The summary of a run; `to_json` is what `--json` prints and `summary.json` holds.
 
-    `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
-    where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
-    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early;
-    `timing` says how processes kept their time in a run in real time.
+    `verdict` is a `RunVerdict`, or of a run that would pass if the transport between machines had lost nothing, "pass,
+    transport lost 3"; `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents
+    that find out where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the
+    faults where they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run
+    ended early; `timing` says how processes kept their time in a run in real time.
     """
 
-    verdict: RunVerdict
+    verdict: str
     reasons: tuple[str, ...]
     user_code: bool
     digest: str | None
@@ -114,6 +115,7 @@ def judge(
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
+    lost: int = 0,
     timing: Timing | None = None,
 ) -> Outcome:
     """The outcome of a run.
@@ -137,6 +139,8 @@ def judge(
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
+    lost
+        Messages that the transport between machines lost, and that were had again.
     timing
         How they kept their time, in a run in real time.
     """
@@ -150,9 +154,10 @@ def judge(
     empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
     empty += _untracked(arrays)
     verdict: RunVerdict = "fail" if wrong else "vacuous" if empty else "pass"
+    said = f"{verdict}, transport lost {lost}" if verdict == "pass" and lost else verdict
     reasons = wrong or empty
     return Outcome(
-        verdict=verdict,
+        verdict=said,
         reasons=tuple(reasons),
         user_code=user_code,
         digest=None if arrays is None else digest(arrays),
@@ -162,7 +167,7 @@ def judge(
         simulated_s=ticks * plan.world.dt,
         tracking_error=_tracking(arrays),
         errors={} if arrays is None else measures.errors(plan, timeline, arrays),
-        messages=_messages(booked, uninstructed),
+        messages=_messages(booked, uninstructed, lost),
         faults=tuple(faults),
         timeline=timeline,
         processes=tuple(processes),
@@ -225,8 +230,9 @@ def prepare(plan: Plan, out: Path) -> None:
             file.write(text)
 
 
-def _messages(booked: Accounts, uninstructed: int | None) -> dict[str, Any]:
-    return {"ticks": booked.ticks} | vars(booked.ledger) | {"in_flight": booked.in_flight, "uninstructed": uninstructed}
+def _messages(booked: Accounts, uninstructed: int | None, lost: int) -> dict[str, Any]:
+    after = {"in_flight": booked.in_flight, "uninstructed": uninstructed, "transport_lost": lost}
+    return {"ticks": booked.ticks} | vars(booked.ledger) | after
 
 
 def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from msgspec import Meta
 
@@ -13,7 +13,6 @@ from affinet.planning import making
 from affinet.scenario.sections import ScenarioError
 from affinet.verdicts import outcome, timing
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.outcome import RunVerdict
 from netem.core.plain import PlainError, from_plain
 from netem.faults.timeline import Timeline
 from netem.medium.ledger import Accounts
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _Count = Annotated[int, Meta(ge=0)]
+_Verdict = Annotated[str, Meta(pattern="^(pass(, transport lost [0-9]+)?|fail|vacuous)$")]
 _Seconds = Annotated[float, Meta(ge=0.0, le=1e12)]
 
 
@@ -48,6 +48,7 @@ class _Messages:
     dropped: dict[str, _Count]
     in_flight: _Count
     uninstructed: _Count | None
+    transport_lost: _Count
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,16 @@ class _Process:
     pid: int
     pss_mb: float
     exit: int | None
+    machine: str | None = None
+    clock_offset_s: float | None = None
+    clock_uncertainty_s: float | None = None
 
 
 @dataclass(frozen=True)
 class _Summary:
     """Of `summary.json` what the arrays do not say again."""
 
-    verdict: RunVerdict
+    verdict: _Verdict
     reasons: tuple[str, ...]
     user_code: bool
     digest: str | None
@@ -103,10 +107,11 @@ def evidence(out: Path) -> Evidence:
         arrays,
         accounts=accounts,
         uninstructed=summary.messages.uninstructed,
+        lost=summary.messages.transport_lost,
         failure=None,
         user_code=summary.user_code,
         wall_s=summary.wall_s,
-        processes=[asdict(process) for process in summary.processes],
+        processes=[_told(process) for process in summary.processes],
         out=out,
         timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),
     )
@@ -134,6 +139,10 @@ def journal(out: Path) -> pa.Table:
         return journals.read(file)
     except journals.JournalError as error:
         raise Damaged(file, str(error).removeprefix(f"{file}: ")) from error
+
+
+def _told(process: _Process) -> dict[str, Any]:
+    return {name: value for name, value in asdict(process).items() if value is not None or name in ("id", "exit")}
 
 
 def _summary(out: Path) -> _Summary:

@@ -23,6 +23,7 @@ from netem.wire.arrays import WHOLE, WireError, numbers, packed
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
 from netem.wire.keys import Keys
+from netem.wire.repeating import opened
 from netem.wire.sequence import Numbering
 from netem.wire.session import CENTRE, Login, client
 
@@ -138,7 +139,7 @@ def main() -> NoReturn:
 def _estimate() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(CentreBrief)
-    with supervisor.confessing(), Session(client(brief.login)) as session:
+    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
         centre = centre_of(brief.estimator.build(), brief.swarm)
         if centre is None:
             raise RuntimeError(f"{brief.estimator.path} wanted a centre when it was planned, and now wants none")

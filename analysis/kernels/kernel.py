@@ -109,7 +109,7 @@ def prepared() -> dict[str, list[tuple[tuple[int, ...], str]]]:
     return {name: one.prepared for name, one in _EVERY.items() if one.prepared}
 
 
-def prepare(wanted: Mapping[str, Sequence[tuple[Sequence[int], str]]]) -> None:
+def prepare(wanted: Mapping[str, Sequence[tuple[Sequence[int], str | None]]]) -> None:
     """Make kernels ready, as another process has `prepared` them, if what they are in is imported."""
     for name, many in wanted.items():
         for sizes, file in many if name in _EVERY else ():

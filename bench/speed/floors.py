@@ -17,9 +17,10 @@ from speed.lines import Pipes
 from speed.started import PeerFailed, Process, all_of
 
 from affinet.planning.plan import Plan
+from affinet.runtimes.private import socket_folder
 from netem.wire import messages
 from netem.wire.arrays import CODE, TRUTH, packed
-from netem.wire.session import HUB, WORLD, agent_name, socket_folder
+from netem.wire.session import HUB, WORLD, agent_name
 
 TRANSPORTS = ("pipes", "ZeroMQ", "Zenoh", "Ray actors")
 _NEEDS = {"ZeroMQ": "zmq", "Ray actors": "ray"}

@@ -16,8 +16,8 @@ from speed.problem import numbers
 from speed.started import all_of
 
 from affinet.planning.plan import Plan
+from affinet.runtimes.private import socket_folder
 from analysis.models.arrays import Array
-from netem.wire.session import socket_folder
 
 
 class Swarmed(NamedTuple):

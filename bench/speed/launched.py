@@ -10,7 +10,8 @@ from typing import NamedTuple
 import psutil
 
 from affinet.planning.plan import Plan
-from affinet.runtimes.launcher import Launcher, hosts_of
+from affinet.runtimes.launcher import Launcher
+from affinet.runtimes.machines.seats import hosts_of
 
 _SETTLED, _NEARLY_OVER = 0.2, 0.8  # as shares of a run, between which processors are looked at
 

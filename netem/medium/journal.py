@@ -6,10 +6,10 @@ The file is an Arrow stream, so what a killed run has written can be read. Which
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +45,7 @@ SCHEMA = pa.schema(
         ("deliver_tick", pa.int32()),
         ("mark", NAMES),
         ("event", pa.string()),
+        ("transport", pa.string()),
     ]
 )
 
@@ -78,6 +79,7 @@ class Writer:
         self._offered = np.zeros((len(channels), len(links)), dtype=np.int64)
         self._batch = batch
         self._entered: list[Entry] = []
+        self._transport: dict[int, Mapping[str, int]] = {}
         self.accounts = NOTHING
         with system_errors.about(path):
             self._stream = Stream(path, SCHEMA)
@@ -92,8 +94,18 @@ class Writer:
             if error is not None:
                 raise error
 
-    def enter(self, entry: Entry, in_flight: int) -> None:
-        """Write down the next tick, after which so many messages are under way."""
+    def enter(self, entry: Entry, in_flight: int, lost: Mapping[str, int] = MappingProxyType({})) -> None:
+        """Write down the next tick, after which so many messages are under way.
+
+        Parameters
+        ----------
+        entry, in_flight
+            What was decided in it, and how many are under way.
+        lost
+            How many messages the transport is known by now to have lost, by key, beside all verdicts: they were had again.
+        """
+        if lost:
+            self._transport[self.accounts.ticks + len(self._entered)] = lost
         self._entered.append(entry)
         self._in_flight = in_flight
         if len(self._entered) == self._batch:
@@ -112,15 +124,13 @@ class Writer:
         ledger = self.accounts.ledger.plus(_ledger(verdicts, entries))
         self.accounts = Accounts(first + len(entries), ledger, self._in_flight)
         written, self._offered = rows_of(first, verdicts, entries, self._offered)
-        events = {
-            first + n: json.dumps(entry.injected) for n, entry in enumerate(entries) if entry.injected is not None
-        }
+        events = {first + n: entry.injected for n, entry in enumerate(entries) if entry.injected is not None}
+        transport, self._transport = self._transport, {}
         with system_errors.about(self._path):
-            self._stream.write(self._table(written, events), self.accounts)
+            beside = {"event": _beside(written, events), "transport": _beside(written, transport)}
+            self._stream.write(self._table(written) | beside, self.accounts)
 
-    def _table(self, written: Rows, events: dict[int, str]) -> dict[str, Any]:
-        event = np.full(len(written.tick), None, dtype=object)
-        event[np.searchsorted(written.tick, list(events))] = list(events.values())
+    def _table(self, written: Rows) -> dict[str, Any]:
         return {
             "tick": written.tick,
             "src": self._links.src[written.link],
@@ -131,8 +141,14 @@ class Writer:
             "reason": named(written.kind, _REASON, written.kind < Verdict.DEAD),
             "deliver_tick": pa.array(written.deliver_tick, pa.int32(), mask=written.deliver_tick < 0),
             "mark": named(written.mark, _MARK, written.mark == Mark.NONE),
-            "event": event,
         }
+
+
+def _beside(written: Rows, said: Mapping[int, Any]) -> Any:
+    """A column that says something of ticks, in the first row of each."""
+    column = np.full(len(written.tick), None, dtype=object)
+    column[np.searchsorted(written.tick, list(said))] = [json.dumps(of_tick) for of_tick in said.values()]
+    return column
 
 
 def _ledger(verdicts: VerdictCodes, entries: Sequence[Entry]) -> Ledger:
@@ -196,6 +212,20 @@ def told(path: Path) -> Told:
     with _refusing("faults"):
         faults = () if injected is None else tuple(from_plain(Fault, fault) for fault in json.loads(injected))
     return Told(booked, faults)
+
+
+def lost(table: Any) -> dict[int, dict[str, int]]:
+    """Messages that the transport lost between machines, and that were had again: by tick, and by key.
+
+    Raises
+    ------
+    JournalError
+        When they are none.
+    """
+    said = table.select(["tick", "transport"]).filter(table["transport"].is_valid())
+    with _refusing("losses"):
+        counts = [json.loads(counts) for counts in said["transport"].to_pylist()]
+        return dict(zip(said["tick"].to_pylist(), counts, strict=True))
 
 
 @contextmanager

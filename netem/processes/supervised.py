@@ -19,8 +19,9 @@ import struct
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
@@ -38,6 +39,7 @@ _PR_SET_PDEATHSIG = 1
 _LAST_RESORT_S = 2.0
 
 BEAT_S = 0.5
+LOST = "lost"  # an order that tells of messages: their key, and how many
 LAUNCHER = "launcher"  # as one who is waited for
 
 
@@ -69,6 +71,7 @@ class Supervisor:
         self._speaking = threading.Lock()
         self._doing = _Doing(0, "", tuple)
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._lost: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
         go_on_without_a_launcher()
 
@@ -86,6 +89,19 @@ class Supervisor:
         with self._speaking:
             while line:
                 line = line[os.write(self._events, line) :]
+
+    def lost(self, key: str, count: int) -> None:
+        """Report messages that the transport lost, and that were had again."""
+        self.tell("lost", key=key, count=count)
+
+    def lost_anywhere(self) -> dict[str, int]:
+        """Messages that any process has reported so since this was asked last, by key, as the launcher tells the medium."""
+        counts = Counter[str]()
+        with suppress(queue.Empty):
+            while True:
+                key, count = self._lost.get_nowait()
+                counts[key] += count
+        return dict(counts)
 
     def works(self, tick: int) -> None:
         """From now on the child waits for nobody: what comes of this tick is up to it."""
@@ -142,11 +158,19 @@ class Supervisor:
         while chunk := os.read(_STDIN, 4096):
             *lines, pending = (pending + chunk).split(b"\n")
             for line in lines:
-                self._orders.put(line.decode())
+                self._obey(line.decode())
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(_LAST_RESORT_S)
         # A library call, like one that waits for a router that is gone, keeps the main thread from hearing a signal.
         os.kill(os.getpid(), signal.SIGKILL)
+
+    def _obey(self, line: str) -> None:
+        word, *facts = line.split()
+        if word == LOST:
+            key, count = facts
+            self._lost.put((key, int(count)))
+        else:
+            self._orders.put(line)
 
 
 def go_on_without_a_launcher() -> None:

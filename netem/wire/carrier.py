@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import json
 import queue
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any
 
 import zenoh
 
+from netem.wire.session import Login, client, identity
+
 _WAITING_CHANGES = 4
+_WAITING_ENTRANTS = 1024
 
 
 class NotCarried(RuntimeError):
     """Nobody can be reached, or nobody answers: why."""
+
+
+class StrangerEntered(RuntimeError):
+    """Somebody has opened a session by the proof of a process of the run, and is not it: who."""
 
 
 class Arrived:
@@ -32,6 +39,11 @@ class Arrived:
     def data(self) -> bytes:
         """The bytes."""
         return self._sample.payload.to_bytes()
+
+    @property
+    def note(self) -> bytes:
+        """What came beside them."""
+        return b"" if self._sample.attachment is None else self._sample.attachment.to_bytes()
 
 
 class Ear:
@@ -74,16 +86,20 @@ class Voice:
     """Says something on a key."""
 
     def __init__(self, publisher: zenoh.Publisher) -> None:
-        self._publisher = publisher
+        self.publisher = publisher
 
     def say(self, data: bytes) -> None:
         """Say it to whoever hears the key."""
-        self._publisher.put(data)
+        self.publisher.put(data)
+
+    def put(self, data: bytes, note: bytes) -> None:
+        """Say it, with a note beside it."""
+        self.publisher.put(data, attachment=note)
 
     def await_heard(self) -> None:
         """Wait until somebody hears: what is said from then on is not lost at the start."""
-        changes = self._publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
-        matching: Any = self._publisher.matching_status
+        changes = self.publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
+        matching: Any = self.publisher.matching_status
         while not matching.matching:
             matching = changes.recv()
         changes.undeclare()  # type: ignore[no-untyped-call]
@@ -130,6 +146,39 @@ class Questions:
         return None if query is None else Question(self._key, query)
 
 
+class Doorway:
+    """Who enters at the hub."""
+
+    def __init__(self, session: zenoh.Session, names: Iterable[str]) -> None:
+        self._known = {identity(name): name for name in names}
+        self._session = session
+        self._events = session.info.declare_transport_events_listener(zenoh.handlers.RingChannel(_WAITING_ENTRANTS))
+
+    def refuse_strangers(self) -> None:
+        """Go on if each session that was opened is that of a process of the run.
+
+        Raises
+        ------
+        StrangerEntered
+            When one is not: as whom it entered, where that is known.
+        """
+        while (event := self._events.try_recv()) is not None:
+            if event.kind != zenoh.SampleKind.PUT:
+                continue
+            called = str(event.transport.zid)
+            proven, expected = self._proven(called), self._known.get(called)
+            if expected is None or proven not in (None, expected):
+                raise StrangerEntered(
+                    f"{proven or 'somebody who has a password of this run'} opened a session called {called}: a process "
+                    "has one, called by the id of its login (docs/protocol.md)"
+                )
+
+    def _proven(self, called: str) -> str | None:
+        """Of whom the certificate is by which a session entered; None where it did by a password."""
+        links = [link for link in self._session.info.links() if str(link.zid) == called]
+        return next((link.auth_identifier for link in links if link.auth_identifier), None)
+
+
 class Session:
     """One process on the network; a block leaves it.
 
@@ -149,6 +198,7 @@ class Session:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
+        self._tokens: list[zenoh.LivelinessToken] = []
 
     def __enter__(self) -> Session:
         self._session.__enter__()
@@ -170,13 +220,53 @@ class Session:
             self._session.declare_subscriber(key, zenoh.handlers.Callback(ears.take, indirect=False))
         return ears
 
+    def hands(self, key: str, take: Callable[[Arrived], None]) -> None:
+        """Hand over what is said on a key, in a thread of the session's, where nothing may be said or asked."""
+        self._session.declare_subscriber(key, lambda sample: take(Arrived(sample)))
+
     def says(self, key: str) -> Voice:
         """Say something on a key."""
+        return self.says_once(key)
+
+    def says_once(self, key: str) -> Voice:
+        """Say something on a key that may be lost where links break."""
         return Voice(self._session.declare_publisher(key))
+
+    def is_here(self, key: str) -> None:
+        """Have it known by a key for as long as the session lasts."""
+        self._tokens.append(self._session.liveliness().declare_token(key))  # one that is forgotten is taken back
+
+    def sees(self, key: str, take: Callable[[str, bool], None]) -> None:
+        """Hand over who comes, and who goes, by their keys, in a thread of the session's."""
+        self._session.liveliness().declare_subscriber(
+            key, lambda sample: take(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT), history=True
+        )
 
     def answers(self, key: str, room: int) -> Questions:
         """Answer questions on a key; so many may wait."""
         return Questions(key, self._session.declare_queryable(key, zenoh.handlers.FifoChannel(room)))
+
+    def asks(self, key: str, take: Callable[[Question], None]) -> None:
+        """Hand over what is asked on a key, in a thread of the session's; whoever takes it answers in another."""
+        self._session.declare_queryable(key, lambda query: take(Question(key, query)))
+
+    def ask_all(self, key: str, data: bytes, patience_s: float) -> list[bytes]:
+        """What all those answer within so many seconds who answer on a key."""
+        try:
+            answers = self._session.get(
+                key,
+                payload=data,
+                timeout=patience_s,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )
+        except zenoh.ZError as error:
+            raise NotCarried(str(error)) from error
+        return [reply.ok.payload.to_bytes() for reply in answers if reply.ok is not None]
+
+    def doorway(self, names: Iterable[str]) -> Doorway:
+        """Watch who enters from now on, when these are expected."""
+        return Doorway(self._session, names)
 
     def ask(self, key: str, data: bytes, patience_s: float) -> bytes:
         """Ask whoever answers on a key.
@@ -192,6 +282,22 @@ class Session:
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         raise NotCarried(f"no answer within {patience_s:g} s")
+
+
+def joined(login: Login, patience_s: float | None = None) -> Session:
+    """A session of a client of the hub, which is tried for as long as `patience_s`; None for ever.
+
+    Raises
+    ------
+    NotCarried
+        When it is not let in: why.
+    NotTrusted
+        When it has no proof of who it is that will do there.
+    """
+    try:
+        return Session(client(login, patience_s))
+    except NotCarried as error:
+        raise NotCarried(login.why_refused() or str(error)) from error
 
 
 def await_heard(voices: Iterable[Voice]) -> None:

@@ -14,6 +14,11 @@ def fresh() -> str:
     return secrets.token_hex(8)
 
 
+def again(key: str) -> str:
+    """Queryable: what was said on a key last (between machines)."""
+    return f"{key}/again"
+
+
 @dataclass(frozen=True)
 class Keys:
     """The keys of one run; `agent` is an agent's number, or "*" for all of them."""

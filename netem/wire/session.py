@@ -1,25 +1,29 @@
-"""The network of a run as Zenoh is told of it: a hermetic star on loopback, with a name and a password for each process.
+"""The network of a run as Zenoh is told of it: a hermetic star, with a name for each process, and a proof of it.
 
-The medium is the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's
-messages to any other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
+On one machine the proof is a password, and nothing listens beyond loopback; beyond it a certificate, over TLS. The medium is
+the only router; everybody else is a client of it and of nothing else. A Zenoh router would carry one agent's messages to any
+other that subscribes, so access control at the hub says, by default deny, who may publish and receive what.
 """
 
 from __future__ import annotations
 
 import os
-import re
-import tempfile
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 from netem.core.channels import INPUT, MEASUREMENT
-from netem.wire.keys import Keys
+from netem.wire import endpoints
+from netem.wire.certificates import Certificates
+from netem.wire.keys import Keys, again
 
 HUB = "netem"
 WORLD = "world"
 CONTROL = "control"
+COORDINATOR = "coordinator"
 CENTRE = "centre"
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
 _RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
@@ -40,30 +44,11 @@ _PENDING = 10_000
 # A paused process must not lose its session: who is silent too long is for the run to notice, not for Zenoh. Nor must a hundred
 # that log in at once on two cores.
 _LEASE_MS = 3_600_000
-
-
-_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # where the user's own temporary folder will not do
-_PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+-]+")  # an endpoint is a grammar of its own, in which '?' and '#' part it
-_LONGEST_SOCKET, _SOCKET = 107, "/affinet-12345678/z.sock"
-
-
-def socket_folder() -> str:
-    """A temporary folder in which the path of a socket is short enough for the system and plain enough for an endpoint.
-
-    Raises
-    ------
-    OSError
-        When there is none.
-    """
-    own = tempfile.gettempdir()
-    for folder in (own, *_PLACES):
-        fits = len(folder) + len(_SOCKET) <= _LONGEST_SOCKET and _PLAIN_PATH.fullmatch(folder)
-        if fits and os.access(folder, os.W_OK | os.X_OK):
-            return folder
-    raise OSError(
-        f"{own!r} is too long or too odd a path for the run's socket, and {', '.join(_PLACES)} cannot be written to; "
-        f"set TMPDIR to a plain path of at most {_LONGEST_SOCKET - len(_SOCKET)} characters"
-    )
+# Between machines a link breaks: it has to be noticed before TCP, which waits twice as long from try to try, comes to look only
+# after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
+_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
+LARGEST = 2**20  # bytes that an agent may say at once; what is longer the hub drops before anybody reads it
+_LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
 
 def agent_name(agent: int) -> str:
@@ -76,20 +61,86 @@ def host_name(host: int) -> str:
     return f"host-{host}"
 
 
+def seat_name(role: str, number: int | None) -> str:
+    """The name under which a process of a role logs in."""
+    return role if number is None else f"{role}-{number}"
+
+
+def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[str]:
+    """The names of all who log in at the hub; agents that a host carries do not."""
+    carried = {agent for of_host in hosts.values() for agent in of_host}
+    lone = [agent for agent in agents if agent not in carried]
+    return [WORLD, CENTRE, CONTROL, *map(host_name, hosts), *map(agent_name, lone)]
+
+
+def identity(name: str) -> str:
+    """Which Zenoh session is that of a process: another that logs in as it may do nothing, and so each has one."""
+    return name.encode().hex()
+
+
 @dataclass(frozen=True)
 class Login:
-    """Where a process connects, and as whom."""
+    """Where a process connects, as whom, and how it proves that: by a password, or a certificate.
+
+    Parameters
+    ----------
+    endpoint
+        As Zenoh has it: "unixsock-stream/PATH", "tcp/ADDRESS:PORT" on loopback, or "tls/ADDRESS:PORT".
+    name
+        Who it is.
+    password
+        On this machine alone.
+    keys
+        For TLS the folder that `affinet keys` made, with a certificate of this name.
+    """
 
     endpoint: str
     name: str
-    password: str
+    password: str = field(default="", repr=False)  # what is printed of a brief goes to a log
+    keys: str | None = None
+
+    @property
+    def certificates(self) -> Certificates | None:
+        """The files by which it proves who it is, if it does by files."""
+        return None if self.keys is None else Certificates(self.keys, self.name)
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it connects within one machine."""
+        return self.keys is None
+
+    def why_refused(self) -> str | None:
+        """In one line why the hub does not let it in, where TLS knows more than Zenoh says."""
+        where = endpoints.address(self.endpoint)
+        if self.certificates is None or where is None:
+            return None
+        return self.certificates.why_refused(*where)
+
+    def check(self) -> None:
+        """Go on if this may connect or listen, and will do as a proof.
+
+        Raises
+        ------
+        NotTrusted
+            When it would be heard beyond this machine without certificates, or these will not do.
+        """
+        endpoints.refuse(self.endpoint, certified=self.keys is not None)
+        if (certificates := self.certificates) is not None:
+            certificates.check()
 
 
 def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
     """Configuration of an agent or the world: connects to the hub, and to nobody else.
 
     It tries for as long as `patience_s`; None for ever, where a launcher watches.
+
+    Raises
+    ------
+    NotTrusted
+        When it has no proof of who it is that will do there.
     """
+    login.check()
+    certificates = login.certificates
     return _config(
         {
             "mode": "client",
@@ -101,68 +152,132 @@ def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
             },
         },
         login,
+        auth=_by_password(login) if certificates is None else {},
+        tls={} if certificates is None else certificates.connecting(),
     )
 
 
 def hub(
-    login: Login, dictionary_file: str, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+    login: Login, dictionary_file: str | None, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
 ) -> dict[str, Any]:
-    """Configuration of the medium: listens on one endpoint, knows the logins and what each of them may do.
+    """Configuration of the medium: listens on one endpoint, knows who logs in and what each of them may do.
 
     Parameters
     ----------
     login, dictionary_file
-        Its own, and the file with everybody's password.
+        Its own, and the file with everybody's password; None where certificates prove who they are.
     keys
         Those of the run.
     agents
         All agents.
     hosts
         For each process that carries several of them, which.
+
+    Raises
+    ------
+    NotTrusted
+        When it would listen beyond this machine without certificates, or these will not do.
     """
+    limited = [keys.broadcast("*", "**"), keys.act("*"), keys.control]
+    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts), limited)
+
+
+def listening(
+    login: Login, dictionary_file: str | None, rights: Mapping[str, list[dict[str, Any]]], limited: list[str]
+) -> dict[str, Any]:
+    """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone.
+
+    Nobody may say more than a mebibyte at once on the keys that are `limited`.
+    """
+    login.check()
+    certificates = login.certificates
     return _config(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "access_control": _access(keys, agents, hosts),
+            "low_pass_filter": [_no_longer_than(LARGEST, limited)],
+            "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
-        dictionary_file=dictionary_file,
+        auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
+        tls={} if certificates is None else certificates.listening(),
+        max_sessions=len(rights),
     )
 
 
-def _config(base: dict[str, Any], login: Login, **auth: str) -> dict[str, Any]:
+@contextmanager
+def dictionary(passwords: Mapping[str, str]) -> Iterator[str | None]:
+    """A file with these passwords as Zenoh reads it, that lies on no disk, and is gone with the block; None for none."""
+    if not passwords:
+        yield None
+        return
+    with open(os.memfd_create("passwords"), "wb") as file:
+        file.write("".join(f"{name}:{password}\n" for name, password in passwords.items()).encode())
+        file.flush()
+        yield f"/proc/self/fd/{file.fileno()}"
+
+
+def _by_password(login: Login, **known: str | None) -> dict[str, Any]:
+    return {"usrpwd": {"user": login.name, "password": login.password} | known}
+
+
+def _config(
+    base: dict[str, Any],
+    login: Login,
+    auth: dict[str, Any],
+    tls: dict[str, Any],
+    **unicast: int,
+) -> dict[str, Any]:
+    lease_ms, open_ms = (_LEASE_MS, _LEASE_MS) if login.is_local else (_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS)
+    times = {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING}
     return base | {
+        "id": identity(login.name),
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
-            "unicast": {"open_timeout": _LEASE_MS, "accept_timeout": _LEASE_MS, "accept_pending": _PENDING},
-            "link": {"tx": {"lease": _LEASE_MS, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}}},
-            "auth": {"usrpwd": {"user": login.name, "password": login.password} | auth},
+            "unicast": times | unicast,
+            "link": {
+                "protocols": [login.endpoint.partition("/")[0]],
+                "rx": {"max_message_size": _LARGEST_OF_ALL},
+                "tx": {"lease": lease_ms, "queue": {"size": dict.fromkeys(_PRIORITIES, _LONGEST_QUEUE)}},
+                "tls": tls,
+            },
+            "auth": auth,
         },
     }
 
 
-def _access(keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> dict[str, Any]:
+def _no_longer_than(size: int, keys: list[str]) -> dict[str, Any]:
+    return {"id": "size", "flows": ["ingress"], "messages": ["put", "query"], "key_exprs": keys, "size_limit": size}
+
+
+def _rights_of_all(
+    keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+) -> dict[str, list[dict[str, Any]]]:
     carried = {agent for of_host in hosts.values() for agent in of_host}
-    rights = [
-        _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
-        *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
-        *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
-        _rights(
-            CENTRE,
-            says=[keys.told("*")],
-            hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
-            learns=[keys.told("*")],
-        ),
-        _controls(keys),
-    ]
+    return dict(
+        [
+            _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+            *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
+            *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
+            _rights(
+                CENTRE,
+                says=[keys.told("*")],
+                hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
+                learns=[keys.told("*")],
+            ),
+            _controls(keys),
+        ]
+    )
+
+
+def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str, Any]:
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule for _, rules in rights for rule in rules],
-        "subjects": [{"id": name, "usernames": [name]} for name, _ in rights],
-        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights],
+        "rules": [rule for rules in rights.values() for rule in rules],
+        "subjects": [{"id": name, proof: [name], "zids": [identity(name)]} for name in rights],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights.items()],
     }
 
 
@@ -182,14 +297,30 @@ def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) 
         _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
         # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
         _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
+        *_repeats(f"{name}-again", hears, says, learns),
+    ]
+
+
+def _repeats(name: str, hears: list[str], says: list[str], learns: list[str]) -> list[dict[str, Any]]:
+    """Between machines, a message that was lost is asked for again: in one question of all who speak on such a key."""
+    answered = [again(key) for key in says]
+    return [
+        *_asks(name, [again(key) for key in hears]),
+        _allow(f"{name}-asked", "query", "egress", [again(key) for key in learns]),
+        _allow(f"{name}-answers", "reply", "ingress", answered),
+        _allow(f"{name}-can", "declare_queryable", "ingress", answered),
     ]
 
 
 def _controls(keys: Keys) -> tuple[str, list[dict[str, Any]]]:
-    return CONTROL, [
-        _allow("control-asks", "query", "ingress", [keys.control]),
-        _allow("control-hears", "reply", "egress", [keys.control]),
-        _allow("control-learns", "declare_queryable", "egress", [keys.control]),
+    return CONTROL, _asks(CONTROL, [keys.control])
+
+
+def _asks(name: str, keys: list[str]) -> list[dict[str, Any]]:
+    return [
+        _allow(f"{name}-asks", "query", "ingress", keys),
+        _allow(f"{name}-hears", "reply", "egress", keys),
+        _allow(f"{name}-learns", "declare_queryable", "egress", keys),
     ]
 
 

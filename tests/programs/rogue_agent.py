@@ -18,8 +18,8 @@ def main() -> None:
     supervisor = Supervisor()
     brief = supervisor.brief(AgentBrief)
     keys = Keys(brief.run)
-    aside = zenoh.Config.from_json5(json.dumps(client(brief.login)))
-    with Session(client(brief.login)) as session, zenoh.open(aside) as side:
+    with Session(client(brief.login)) as session:
+        side = session._session
         node = AgentsNode(session, supervisor, [brief])
         overheard = side.declare_subscriber("**", zenoh.handlers.FifoChannel(100_000))
         private = [key for peer in PEERS for key in (keys.inbox(peer), keys.told(peer))]
@@ -41,9 +41,11 @@ def main() -> None:
         node.run()
         supervisor.tell("done")
         heard = set()
+        said = [keys.act(brief.agent), *(keys.broadcast(brief.agent, channel) for channel in ("input", "measurement"))]
         for subscriber in (overheard, *inboxes):
             while (sample := subscriber.try_recv()) is not None:
-                heard.add(str(sample.key_expr).removeprefix(f"affinet/{brief.run}/"))
+                if str(sample.key_expr) not in said:  # a session hears itself, without the hub
+                    heard.add(str(sample.key_expr).removeprefix(f"affinet/{brief.run}/"))
         with open(sys.argv[1], "w") as file:
             json.dump({"heard": sorted(heard), "lies": lies}, file)
 

@@ -7,6 +7,7 @@ import pytest
 from flying import PROCESSES, digest_of, plan_of
 
 from affinet.runtimes import launcher
+from affinet.runtimes.machines import seats
 from affinet.runtimes.run import fly
 
 pytestmark = PROCESSES
@@ -36,9 +37,9 @@ def test_the_bits_do_not_change(flown, out):
 
 def test_so_many_go_together_and_who_is_left_over_flies_alone():
     plan = plan_of("corridor", "agents.per_process=3")
-    assert launcher.hosts_of(plan, programs=()) == {1: (1, 2, 3), 2: (4, 5, 6)}
-    assert launcher.hosts_of(plan, programs=(2, 3)) == {1: (1, 4, 5), 2: (6, 7)}
-    assert launcher.hosts_of(plan_of("corridor"), programs=()) == {}
+    assert seats.hosts_of(plan, programs=()) == {1: (1, 2, 3), 2: (4, 5, 6)}
+    assert seats.hosts_of(plan, programs=(2, 3)) == {1: (1, 4, 5), 2: (6, 7)}
+    assert seats.hosts_of(plan_of("corridor"), programs=()) == {}
 
 
 def ended(out, number):

@@ -1,15 +1,30 @@
 """An agent hears a peer only through the medium, speaks only as itself, and needs nothing of ours to do so."""
 
 import json
+import socket
 import sys
+from datetime import timedelta
 
 from flying import PROCESSES, digest_of, plan_of
 from paths import PROGRAMS
 
 from affinet.runtimes.launcher import Launcher
+from netem.wire import authority
+from netem.wire.carrier import NotCarried, Session
+from netem.wire.session import HUB, Login, client, clients
 from world.books import history
 
 pytestmark = PROCESSES
+
+
+class Watched(Launcher):
+    """Keeps everybody's logins where the test finds them, and makes them anew with `login`."""
+
+    login = staticmethod(lambda login: login)
+
+    def _make_logins(self, private):
+        self.logins = {name: self.login(made) for name, made in super()._make_logins(private).items()}
+        return self.logins
 
 
 def fly(plan, out, **programs):
@@ -36,31 +51,55 @@ def test_a_rogue_gets_nothing_through(out, tmp_path):
 
 
 def test_a_wrong_password_is_refused(out):
-    from netem.wire.carrier import NotCarried, Session
-    from netem.wire.session import Login, client
-
     plan = plan_of("corridor", "time.duration=2")
     refused = []
-
-    class Intruding(Launcher):
-        def _make_logins(self, private):
-            logins = super()._make_logins(private)
-            self.endpoint = logins["netem"].endpoint
-            return logins
 
     def intrude(_tick, _error):
         if not refused:
             try:
-                with Session(client(Login(launcher.endpoint, "agent-1", "guess"), patience_s=2.0)):
+                # Whose session is not open: another of one that is would be refused for that.
+                with Session(client(Login(launcher.logins["control"].endpoint, "control", "guess"), patience_s=2.0)):
                     pass
                 refused.append(False)
             except NotCarried:
                 refused.append(True)
 
     out.mkdir()
-    launcher = Intruding(plan, out, watch=intrude)
+    launcher = Watched(plan, out, watch=intrude)
     launcher.fly()
     assert refused == [True]
+
+
+def test_a_second_session_of_a_login_ends_the_run(out):
+    intruding = []
+
+    def intrude(_tick, _error):
+        if not intruding:
+            intruding.append(Session(client(launcher.logins["agent-1"], patience_s=5.0) | {"id": "5ec0d"}))
+
+    out.mkdir()
+    launcher = Watched(plan_of("corridor", "time.duration=20"), out, watch=intrude)
+    flight = launcher.fly()
+    intruding[0].__exit__(None, None, None)
+    assert flight.failure == (
+        "netem: StrangerEntered: somebody who has a password of this run opened a session called 5ec0d: "
+        "a process has one, called by the id of its login (docs/protocol.md)"
+    )
+
+
+def test_over_tls_a_swarm_flies_the_same_bits(out, tmp_path):
+    plan = plan_of("corridor", "time.duration=2")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        endpoint = f"tls/127.0.0.1:{taken.getsockname()[1]}"
+    names = [HUB, *clients(range(1, 8), {})]
+    authority.make(tmp_path / "keys", names, [], timedelta(days=1))
+    out.mkdir()
+    launcher = Watched(plan, out, watch=lambda *_: None)
+    launcher.login = lambda login: Login(endpoint, login.name, keys=str(tmp_path / "keys"))
+    flight = launcher.fly()
+    assert flight.failure is None
+    assert history.digest(history.load(out / "arrays.npz")) == digest_of("corridor", "time.duration=2")
 
 
 def test_a_foreign_agent_flies_with_zenoh_and_messagepack_alone(out):

@@ -16,11 +16,11 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from affinet.cli import progress, show
-from affinet.runtimes import directories, forked
+from affinet.runtimes import directories, forked, private
 from affinet.runtimes.run import fly
 from analysis.figures import curves
 from analysis.models.finding import Finding
-from netem.wire import keys, session
+from netem.wire import keys
 from netem.wire.keys import Keys
 
 pytestmark = PROCESSES
@@ -81,25 +81,25 @@ def test_a_socket_lies_where_its_path_is_short_and_plain(odd, tmp_path, monkeypa
     folder = tmp_path / odd
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    assert session.socket_folder() == "/tmp"
+    assert private.socket_folder() == "/tmp"
 
 
 def test_a_short_and_plain_temporary_folder_is_taken(monkeypatch):
     with tempfile.TemporaryDirectory(dir="/tmp", prefix="plain-") as folder:
         monkeypatch.setattr(tempfile, "tempdir", folder)
-        assert session.socket_folder() == folder
+        assert private.socket_folder() == folder
 
 
 def test_where_no_folder_will_do_it_is_said_what_would(monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", "/" + "x" * 90)
-    monkeypatch.setattr(session, "_PLACES", ("/nowhere",))
+    monkeypatch.setattr(private, "_PLACES", ("/nowhere",))
     with pytest.raises(OSError, match="set TMPDIR to a plain path of at most 83 characters"):
-        session.socket_folder()
+        private.socket_folder()
 
 
 def test_a_child_searches_where_its_launcher_does(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path / "a:b"), ""])
-    *_, path, dash_m, package, _ = forked.program()
+    *_, path, dash_m, package, _, _ = forked.program(tmp_path)
     assert (dash_m, package) == ("-m", "affinet.runtimes.nursery")
     assert json.loads(path) == [os.path.abspath(entry) for entry in sys.path if entry]
 

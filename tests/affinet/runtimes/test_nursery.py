@@ -8,6 +8,7 @@ import socket
 import sys
 import threading
 from contextlib import contextmanager
+from pathlib import Path
 
 import psutil
 import pytest
@@ -19,13 +20,14 @@ from affinet.runtimes.child import RunFailed
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.supervision import ProcessGroup
 
+NOWHERE = Path("/nowhere")
 READY = """os.write(1, b'{"event": "ready"}\\n')\n"""
 HONEST = forked.program
 WAITS = READY + "import time\ntime.sleep(600)"
 
 
 def program(first="pass"):
-    return [sys.executable, "-P", str(PROGRAMS / "scripted_nursery.py"), first, "{}"]
+    return [sys.executable, "-P", str(PROGRAMS / "scripted_nursery.py"), first, "/nowhere", "{}"]
 
 
 @pytest.fixture
@@ -34,9 +36,9 @@ def crew(tmp_path, monkeypatch):
 
     @contextmanager
     def make(first="pass", patience=3.0):
-        monkeypatch.setattr(forked, "program", lambda: program(first))
+        monkeypatch.setattr(forked, "program", lambda _: program(first))
         with ProcessGroup(tmp_path, patience, Interruption()) as group:
-            group.start_nursery()
+            group.start_nursery(NOWHERE)
             yield group
 
     return make
@@ -48,10 +50,10 @@ def shared(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # As some parents leave it to their children: then nobody is told of the end of theirs.
         patch.setattr(
-            forked, "program", lambda: program("import signal; signal.signal(signal.SIGCHLD, signal.SIG_IGN)")
+            forked, "program", lambda _: program("import signal; signal.signal(signal.SIGCHLD, signal.SIG_IGN)")
         )
         with ProcessGroup(tmp_path_factory.mktemp("logs"), 3.0, Interruption()) as group:
-            group.start_nursery()
+            group.start_nursery(NOWHERE)
             yield group
 
 
@@ -199,7 +201,7 @@ def test_there_is_none_where_nothing_is_forked(tmp_path, monkeypatch):
     with ProcessGroup(tmp_path, 3.0, Interruption()) as group:
         monkeypatch.setattr(forked.sys, "platform", "darwin")
         with pytest.raises(RunFailed, match=r"fly in one process \(runtime inprocess\)$"):
-            group.start_nursery()
+            group.start_nursery(NOWHERE)
 
 
 # ---- how the nursery ends
@@ -258,4 +260,4 @@ def test_a_nursery_that_cannot_import_says_what(tmp_path, monkeypatch):
         ProcessGroup(tmp_path, 3.0, Interruption()) as group,
         pytest.raises(RunFailed, match=r"(?s)^nursery \(pid \d+\) was ended with exit status 1\..*no_such_nursery"),
     ):
-        group.start_nursery()
+        group.start_nursery(NOWHERE)

@@ -195,7 +195,7 @@ def test_a_book_of_inputs_that_no_run_wrote_is_named(text, why, verb, run, tmp_p
     "text",
     [
         "{}", "[]", "null", "7", "", "[" * 100_000, '{"run": 1, "login": {}}', '{"run": "r", "login": 3}', '{"run": "r"}',
-        '{"run": "r", "login": {"endpoint": "e", "name": "n"}}', '{"run": "r", "login": {"endpoint": 1, "name": "n"}}',
+        '{"run": "r", "login": {"endpoint": "e"}}', '{"run": "r", "login": {"endpoint": 1, "name": "n"}}',
     ],
     ids=lambda text: text[:40],
 )  # fmt: skip

@@ -343,8 +343,11 @@ def test_a_logbook_that_cannot_be_closed_does_not_hide_what_ended_the_run(out, m
 
 
 def test_access_that_is_gone_does_not_hide_what_ended_the_run(tmp_path):
+    private = tmp_path / "private"
+    private.mkdir()
+
     def interrupted():
-        with Access("run", Login("", "", "")).granted(tmp_path):
+        with Access("run", Login("", "", "")).granted(tmp_path, private):
             (tmp_path / "control.json").unlink()
             raise KeyError("first")
 

@@ -406,7 +406,7 @@ DEGRADED = mixture(4, frozenset({"delays", "listed"}), LINKS, ("sense", "theta")
 MEDIUM = MediumBrief(
     run="r1",
     login=Login("tcp/127.0.0.1:7447", "netem", "secret"),
-    dictionary_file="/tmp/users",
+    passwords={"netem": "secret"},
     seed=2**64 - 1,
     links=LINKS,
     channels=("sense", "theta"),
@@ -529,7 +529,7 @@ def test_nested_records_enums_and_tuples_of_a_brief_come_back_as_they_were():
     [
         ({"seed": "1"}, "seed: expected `int`, got `str`"),
         ({"login": 3}, "login: expected `object`, got `int`"),
-        ({"login": {"endpoint": "tcp/x", "name": "netem"}}, "login: object missing required field `password`"),
+        ({"login": {"endpoint": "tcp/x"}}, "login: object missing required field `name`"),
         ({"channels": ["sense", 3]}, "channels[1]: expected `str`, got `int`"),
         (links(src=[[1], [2, 3]]), "links.src: expected a rectangular list of int64, got [[1], [2, 3]]"),
         (links(src={}), "links.src: expected a nested list of int64, or one, got {}"),
