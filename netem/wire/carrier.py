@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -53,6 +53,12 @@ class Voice:
     def say(self, data: bytes) -> None:
         """Say it to whoever hears the key."""
         self._publisher.put(data)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody hears the key now."""
+        matching: Any = self._publisher.matching_status
+        return bool(matching.matching)
 
     def await_heard(self) -> None:
         """Wait until somebody hears: what is said from then on is not lost at the start."""
@@ -123,6 +129,7 @@ class Session:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
+        self._handing: list[Any] = []  # hand over for as long as somebody has them
 
     def __enter__(self) -> Session:
         self._session.__enter__()
@@ -136,6 +143,10 @@ class Session:
     def hears(self, key: str, room: int) -> Ear:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
+
+    def hands(self, key: str, to: Callable[[Arrived], None]) -> None:
+        """Hand over what is said on a key as it arrives, from a thread of the network's."""
+        self._handing.append(self._session.declare_subscriber(key, lambda sample: to(Arrived(sample))))
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""
