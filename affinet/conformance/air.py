@@ -34,7 +34,7 @@ class Air:
         medium = Medium(plan.world.seed, plan.channels, plan.profiles, plan.timeline, plan.recorded())
         self._relay = Relay[None](medium)
         self._forms = forms_of(plan.agents.channels())
-        self._mine = self._links.dst == self._row
+        self._mine = self._links.dst == agent
 
     @property
     def timeline(self) -> Timeline:
@@ -56,7 +56,7 @@ class Air:
             src=HUB,
             seq=seq,
             clock=int(self.timeline.clock(relayed.tick)[self._row]),
-            neighbours=(self._links.src[arrived] + 1).tolist(),
+            neighbours=self._links.src[arrived].tolist(),
             measured=packed(measured[arrived]),
             position=packed(scene.position[self._row]) if self._plan.positioned[self._row] else None,
             motion=None if motion is None else packed(motion[self._row]),
@@ -67,7 +67,7 @@ class Air:
         """The broadcasts that arrive, in order."""
         rows = [row for row in relayed.arriving.tolist() if self._mine[row[1]]]
         return [
-            Handed(tick, int(self._links.src[link]) + 1, self._plan.channels[channel]) for tick, link, channel, _ in rows
+            Handed(tick, int(self._links.src[link]), self._plan.channels[channel]) for tick, link, channel, _ in rows
         ]
 
     def said(self, handed: Handed) -> bytes:

@@ -31,6 +31,8 @@ class Case:
         What shows it.
     check
         Says what came instead; nothing where it does what it has to.
+    shown_early
+        Whether nothing that happens later in the flight could show otherwise.
     """
 
     name: str
@@ -38,3 +40,4 @@ class Case:
     section: str
     flight: Flight
     check: Check
+    shown_early: bool = False

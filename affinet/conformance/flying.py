@@ -177,7 +177,7 @@ class Conversation:
 
     def _brief(self, *, remembers: bool) -> AgentBrief:
         plan, agent = self._record.plan, self._record.agent
-        checkpoint = str(self._folder / "memory") if agent in plan.timeline.warm else None
+        checkpoint = str(self._folder / "memory.npz") if agent in plan.timeline.warm else None
         return agent_brief(plan, self._star.run, self._star.login, agent, checkpoint=checkpoint, remembers=remembers)
 
     def _start(self, *, remembers: bool) -> None:

@@ -12,6 +12,7 @@ from affinet.conformance.flights import PLAIN
 from affinet.conformance.flying import Patience, flown
 from affinet.conformance.record import Record
 from affinet.planning.plan import PlanError
+from affinet.scenario.sections import ScenarioError
 
 Verdict = Literal["pass", "fail", "not applicable", "not reached"]
 
@@ -58,20 +59,21 @@ def findings(command: list[str], estimator: str, patience: Patience) -> Iterator
 
     Raises
     ------
-    ScenarioError
-        When there is no such estimator.
+    ScenarioError, PlanError
+        When there is no such estimator, or it cannot fly the corridor.
     OSError
         When nothing can be started by that command line.
     """
     absent: str | None = None
+    first = PLAIN.plan(estimator)
     for flight in dict.fromkeys(case.flight for case in CASES):
         cases = [case for case in CASES if case.flight is flight]
         if absent is not None:
             yield from (Finding(case, "not reached", (absent,)) for case in cases)
             continue
         try:
-            plan = flight.plan(estimator)
-        except PlanError as error:
+            plan = first if flight is PLAIN else flight.plan(estimator)
+        except (PlanError, ScenarioError) as error:
             yield from (Finding(case, "not applicable", (f"{estimator} cannot fly it: {error}",)) for case in cases)
             continue
         record = flown(flight, plan, command, patience)
@@ -88,4 +90,6 @@ def judged(case: Case, record: Record) -> Finding:
         return Finding(case, "not applicable", (str(why),))
     if instead:
         return Finding(case, "fail", instead)
-    return Finding(case, "not reached", (record.stopped,)) if record.stopped else Finding(case, "pass")
+    if record.stopped and not case.shown_early:
+        return Finding(case, "not reached", (record.stopped,))
+    return Finding(case, "pass")

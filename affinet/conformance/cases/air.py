@@ -6,27 +6,27 @@ from collections.abc import Iterator
 
 from affinet.conformance import flights
 from affinet.conformance.case import Case
-from affinet.conformance.cases.answering import silences
+from affinet.conformance.cases.answering import unanswered
 from affinet.conformance.cases.forms import acts, broadcasts, miscounted
-from affinet.conformance.record import ACT, Record
+from affinet.conformance.record import Record
 
 _STAR, _SENSE, _EXCHANGE = "The star", "An agent's life, 3. Sense", "An agent's life, 4. Exchange"
 
 
 def goes_on(record: Record) -> Iterator[str]:
     """Whatever it leaves unanswered, or answers in another form than is promised."""
-    yield from silences(record, {ACT, *record.channels})
+    yield from unanswered(record)
     yield from broadcasts(record)
     yield from acts(record)
 
 
 def _counts(record: Record) -> Iterator[str]:
-    yield from silences(record, {ACT})
+    yield from unanswered(record)
     yield from (said for _, said in miscounted(record))
 
 
 def _of_its_inbox(record: Record) -> Iterator[str]:
-    yield from silences(record, {ACT, *record.channels})
+    yield from unanswered(record)
     for asked, stream, said in record.answers:
         if asked.phase == "sense" and asked.clock != asked.tick and said.fields.get("k") == asked.clock:
             yield f"{asked}: on {stream!r} it takes what its clock says, {asked.clock}, for the tick"

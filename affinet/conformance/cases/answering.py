@@ -14,21 +14,27 @@ from netem.core.plain import shown
 _STAR, _SENSE, _EXCHANGE = "The star", "An agent's life, 3. Sense", "An agent's life, 4. Exchange"
 
 
-def silences(record: Record, streams: set[str]) -> Iterator[str]:
-    """Inboxes that were not answered on all of these."""
-    for number, unanswered in record.unanswered.items():
-        if mute := sorted(streams.intersection(unanswered)):
-            yield f"{record.asked[number]}: nothing came on {listed(mute)}"
-    if record.stopped:
+def unanswered(record: Record) -> Iterator[str]:
+    """Whatever was not answered, and why the flight did not get to its end."""
+    yield from _silences(record, {ACT, *record.channels})
+    if record.stopped and len(record.asked) - 1 not in record.unanswered:
         yield record.stopped
 
 
+def _silences(record: Record, streams: set[str]) -> Iterator[str]:
+    for number, silent in record.unanswered.items():
+        if not (mute := sorted(streams.intersection(silent))):
+            continue
+        stopped = record.stopped if record.asked[number] is record.asked[-1] else None
+        yield stopped or f"{record.asked[number]}: nothing came on {listed(mute)}"
+
+
 def _all_channels(record: Record) -> Iterator[str]:
-    yield from silences(record, set(record.channels))
+    yield from _silences(record, set(record.channels))
 
 
 def _acts(record: Record) -> Iterator[str]:
-    yield from silences(record, {ACT})
+    yield from _silences(record, {ACT})
 
 
 def _once(record: Record) -> Iterator[str]:

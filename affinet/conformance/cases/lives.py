@@ -6,15 +6,15 @@ from collections.abc import Iterator
 
 from affinet.conformance import flights
 from affinet.conformance.case import Case
-from affinet.conformance.cases.answering import numbering, silences
+from affinet.conformance.cases.answering import numbering, unanswered
 from affinet.conformance.cases.forms import miscounted, told_input
-from affinet.conformance.record import ACT, Record
+from affinet.conformance.record import Record
 
 _RESTART, _PAUSE = "Killed, restarted, paused", "Killed, restarted, paused"
 
 
 def _begins_anew(record: Record) -> Iterator[str]:
-    yield from silences(record, {ACT, *record.channels})
+    yield from unanswered(record)
     yield from numbering(record, 1)
 
 
@@ -27,7 +27,7 @@ def _flies_nothing(record: Record) -> Iterator[str]:
 
 
 def _goes_on(record: Record) -> Iterator[str]:
-    yield from silences(record, {ACT, *record.channels})
+    yield from unanswered(record)
     yield from numbering(record, 0)
 
 
