@@ -310,6 +310,12 @@ def _inject(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _conformance(parsed: argparse.Namespace) -> int:
+    from affinet.cli import conforming  # large swarms and what designs them take a while to import
+
+    return PASS if conforming.judge_and_report(parsed) else FAIL
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -320,4 +326,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "design": _design,
     "fit": _fit,
     "inject": _inject,
+    "conformance": _conformance,
 }

@@ -1,4 +1,4 @@
-"""The medium of a flight against one agent: the air is the run's, and all others say what has the right form and nothing more."""
+"""The medium of a flight against one agent: the air is the run's, and others say what has the right form, no more."""
 
 from __future__ import annotations
 

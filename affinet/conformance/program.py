@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import signal
 import subprocess
 import threading
@@ -21,27 +20,6 @@ class Told(NamedTuple):
 
     life: int
     line: bytes
-
-
-class NoProgram(ValueError):
-    """A command line that starts nothing: why."""
-
-
-def words(command: str) -> list[str]:
-    """The words of a command line.
-
-    Raises
-    ------
-    NoProgram
-        When it has none, or a quote in it does not end.
-    """
-    try:
-        read = shlex.split(command)
-    except ValueError as error:
-        raise NoProgram(f"{command!r}: {error}") from error
-    if not read:
-        raise NoProgram("the command line of the agent is empty: say what starts it, like 'python my_agent.py'")
-    return read
 
 
 class Program:

@@ -16,9 +16,7 @@ from affinet.scenario.sections import ScenarioError
 
 Verdict = Literal["pass", "fail", "not applicable", "not reached"]
 
-CASES = tuple(
-    case for matter in (leaving, answering, forms, air, lives, garbage, swarms) for case in matter.CASES
-)
+CASES = tuple(case for matter in (leaving, answering, forms, air, lives, garbage, swarms) for case in matter.CASES)
 
 
 @dataclass(frozen=True)

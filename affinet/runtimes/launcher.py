@@ -86,7 +86,7 @@ class Launcher:
         viewer
             URL of a Rerun viewer that is listening.
         programs
-            Command lines of programs that fly some agents in place of ours (docs/protocol.md).
+            Command lines of programs that fly some agents in place of ours (docs/agents.md), on top of those of the plan.
         interruption
             What may ask the run to end.
         """
@@ -94,7 +94,7 @@ class Launcher:
         self._out = out
         self._viewer = viewer
         self._watch = watch
-        self._programs = programs or {}
+        self._programs = {**plan.programs, **(programs or {})}
         self._interruption = interruption or Interruption()
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, cast, get_args
 
 from affinet.planning.plan import Plan
+from affinet.planning.programs import refuse_in_process
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
@@ -64,6 +65,8 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
     ------
     FileExistsError
         When `out` holds a run already.
+    PlanError
+        When programs of a user's own are to fly some of it in this process.
     ValueError
         When there is no such runtime.
     OSError
@@ -72,6 +75,8 @@ def fly(plan: Plan, runtime: Runtime, out: Path, watch: Watch, viewer: str | Non
         When a signal asked the run to end; its outcome is written down all the same.
     """
     fly_in = _RUNTIMES[runtime_of(runtime)]
+    if runtime == "inprocess":
+        refuse_in_process(plan)
     outcome.prepare(plan, out)
     with interruptible() as interruption:
         done = fly_in(plan, out, watch, viewer, interruption)

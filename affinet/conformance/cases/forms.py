@@ -116,7 +116,13 @@ def _limited(record: Record) -> Iterator[str]:
 
 CASES = (
     Case("broadcast-forms", "broadcast what each channel promises, in the shapes", _SENSE, flights.PLAIN, broadcasts),
-    Case("act-forms", "act with the fields and shapes that are promised; its input is finite", _EXCHANGE, flights.PLAIN, acts),
+    Case(
+        "act-forms",
+        "act with the fields and shapes that are promised; its input is finite",
+        _EXCHANGE,
+        flights.PLAIN,
+        acts,
+    ),
     Case("heard", "count in `heard` all broadcasts it received", _EXCHANGE, flights.PLAIN, _counts),
     Case("input", "tell on `input` the input that flies: that of its last act", _SENSE, flights.PLAIN, _flies),
     Case("limit", "command no input longer than `limit`", _BRIEF, flights.LIMITED, _limited),

@@ -48,9 +48,17 @@ def _ended(record: Record) -> Iterator[str]:
 
 
 CASES = (
-    Case("ready", "say that it is ready, and hear its inbox by then", _CONNECT, flights.PLAIN, _ready, shown_early=True),
+    Case(
+        "ready", "say that it is ready, and hear its inbox by then", _CONNECT, flights.PLAIN, _ready, shown_early=True
+    ),
     Case("unasked", "publish nothing before its first inbox", _CONNECT, flights.UNASKED, _unasked),
-    Case("lines", "write to standard output the lines that are named, and nothing else", _CONNECT, flights.PLAIN, _plain_lines),
+    Case(
+        "lines",
+        "write to standard output the lines that are named, and nothing else",
+        _CONNECT,
+        flights.PLAIN,
+        _plain_lines,
+    ),
     Case("done", "say that it is done when its inbox says that the run is over", _END, flights.PLAIN, _done),
     Case("exit", "leave then, with exit status 0", _END, flights.PLAIN, _left_with_0),
     Case("end-first", "do the same where that is its first inbox", _END, flights.UNASKED, _ended),

@@ -41,6 +41,12 @@ CASES = (
     Case("restart-heard", "as a new process count `heard` from 0", _RESTART, flights.KILLED, _counts_anew),
     Case("restart-input", "as a new process tell that nothing flies", _RESTART, flights.KILLED, _flies_nothing),
     Case("restart-warm", "do so with a `checkpoint` to go on from, too", _RESTART, flights.REMEMBERS, _begins_anew),
-    Case("pause-numbers", "go on with its numbers after a pause, at the tick of its inbox", _PAUSE, flights.PAUSED, _goes_on),
+    Case(
+        "pause-numbers",
+        "go on with its numbers after a pause, at the tick of its inbox",
+        _PAUSE,
+        flights.PAUSED,
+        _goes_on,
+    ),
     Case("pause-input", "tell after a pause that its last input flies", _PAUSE, flights.PAUSED, _flies_on),
 )
