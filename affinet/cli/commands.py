@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, NoReturn
 from affinet.cli import options, show, terminal
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
+from affinet.planning.programs import refuse_in_process
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.interruption import Interrupted
@@ -275,6 +276,8 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace) -> int:
+    if parsed.runtime == "inprocess":
+        refuse_in_process(plan)
     if parsed.out:
         refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None

@@ -50,14 +50,14 @@ def judge_and_report(parsed: argparse.Namespace) -> bool:
 
 
 def _print(found: Sequence[Finding]) -> None:
-    console, table = Console(), Table("case", "it has to", "docs/protocol.md", "")
+    console, table = Console(), Table("case", "docs/protocol.md", "")
     for finding in found:
         case = finding.case
         said = Text(finding.verdict, style=_STYLES[finding.verdict])
         if finding.instead:
             more = f" (and {len(finding.instead) - 1} more)" if len(finding.instead) > 1 else ""
-            said.append(f": {finding.instead[0]}{more}", style="default")
-        table.add_row(case.name, case.demand, case.section, said)
+            said.append(f"\nit has to {case.demand}\n{finding.instead[0]}{more}", style="default")
+        table.add_row(case.name, case.section, said)
     console.print(table)
     counts = {verdict: sum(finding.verdict == verdict for finding in found) for verdict in _STYLES}
     console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count))

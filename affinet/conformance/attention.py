@@ -16,7 +16,7 @@ from affinet.runtimes.told import NotItsOwn, printable, read
 from netem.processes.supervised import BEAT_S
 
 _MOST = 100_000  # messages and lines of one flight: a flood would never end
-_DRAINING_S = 0.2  # in which what a process has said before its end arrives
+_DRAINING_S = 0.1  # in which what a process has said before its end arrives
 
 
 class Attention:

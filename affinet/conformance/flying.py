@@ -118,8 +118,9 @@ class Conversation:
             return
         self._start(remembers=False)
         if flight.ticks:
-            for _ in fly(self._record.plan.world, Lockstep(flight.ticks), self):
-                pass
+            with np.errstate(over="ignore", invalid="ignore"):  # what it steers is up to it
+                for _ in fly(self._record.plan.world, Lockstep(flight.ticks), self):
+                    pass
         match flight.ending:
             case "end":
                 self._hand(messages.pack(messages.EndInbox(k=flight.ticks, src=HUB, seq=self._inboxes)))

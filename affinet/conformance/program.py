@@ -22,6 +22,9 @@ class Told(NamedTuple):
     line: bytes
 
 
+GONE = object()  # a process has ended
+
+
 class Program:
     """One process of the agent under test.
 
@@ -86,3 +89,5 @@ class Program:
         with stdout:
             for line in stdout:
                 self._happened.put(Told(self._life, line.rstrip(b"\n")))
+        self.child.process.wait()
+        self._happened.put(GONE)

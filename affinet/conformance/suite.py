@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,7 +43,9 @@ class Finding:
         return self.verdict in ("pass", "not applicable")
 
 
-def findings(command: list[str], estimator: str, patience: Patience) -> Iterator[Finding]:
+def findings(
+    command: list[str], estimator: str, patience: Patience, cases: Sequence[Case] = CASES
+) -> Iterator[Finding]:
     """What the suite finds of the agent that a command line starts, case by case.
 
     Parameters
@@ -54,6 +56,8 @@ def findings(command: list[str], estimator: str, patience: Patience) -> Iterator
         Of the scenarios: on which channels it has to broadcast, and what it may report.
     patience
         How long it may do nothing.
+    cases
+        Which.
 
     Raises
     ------
@@ -64,20 +68,20 @@ def findings(command: list[str], estimator: str, patience: Patience) -> Iterator
     """
     absent: str | None = None
     first = PLAIN.plan(estimator)
-    for flight in dict.fromkeys(case.flight for case in CASES):
-        cases = [case for case in CASES if case.flight is flight]
+    for flight in dict.fromkeys(case.flight for case in cases):
+        of_flight = [case for case in cases if case.flight is flight]
         if absent is not None:
-            yield from (Finding(case, "not reached", (absent,)) for case in cases)
+            yield from (Finding(case, "not reached", (absent,)) for case in of_flight)
             continue
         try:
             plan = first if flight is PLAIN else flight.plan(estimator)
         except (PlanError, ScenarioError) as error:
-            yield from (Finding(case, "not applicable", (f"{estimator} cannot fly it: {error}",)) for case in cases)
+            yield from (Finding(case, "not applicable", (f"{estimator} cannot fly it: {error}",)) for case in of_flight)
             continue
         record = flown(flight, plan, command, patience)
         if flight is PLAIN and not record.asked:
             absent = "it was not ready in the first flight"
-        yield from (judged(case, record) for case in cases)
+        yield from (judged(case, record) for case in of_flight)
 
 
 def judged(case: Case, record: Record) -> Finding:
