@@ -34,7 +34,7 @@ class Flight:
         Which one is under test.
     ending
         How it ends: by the phase `end`; by standard input closing, in flight or within the brief; or because, in place of the
-        next inbox, there comes what is no MessagePack, has no phase, or a number too high.
+        next inbox, there comes what is no MessagePack, of no known phase, or has a number too high.
     large
         Whether it is one of two hundred agents, in place of the corridor's seven.
     """
@@ -86,7 +86,7 @@ UNASKED = Flight("ended before its first tick", 0)
 ORPHANED = Flight("orphaned", 2, ending="orphaned")
 ORPHANED_EARLY = Flight("orphaned within the brief", 0, ending="orphaned early")
 GARBAGE = Flight("an inbox that is no MessagePack", 2, ending="garbage")
-NO_PHASE = Flight("an inbox without its phase", 2, ending="no phase")
+NO_PHASE = Flight("an inbox of no known phase", 2, ending="no phase")
 GAP = Flight("an inbox that is one too far", 2, ending="gap")
 LIMITED = Flight("an input limited", 3, ("agents.limit=0.01", "formation.spread=1"))
 SILENT = Flight("nothing heard", 4, (_timeline(f'verb="cut",at={_at(1)},until={_at(3)},links=["all"]'),))

@@ -250,8 +250,8 @@ class Conversation:
             sighting=None,
         )
         whole = messages.pack(further)
-        without = msgspec.msgpack.encode({"k": tick, "src": HUB, "seq": self._inboxes})
-        self._star.hand({"garbage": b"\xc1" + whole, "no phase": without, "gap": whole}[how])
+        strange = msgspec.msgpack.encode({"k": tick, "src": HUB, "seq": self._inboxes, "phase": "rest"})
+        self._star.hand({"garbage": b"\xc1" + whole, "no phase": strange, "gap": whole}[how])
 
     def _await_leaving(self) -> None:
         if self._attention.leaves(self._program, self._patience.answer_s):

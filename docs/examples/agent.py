@@ -75,6 +75,8 @@ with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
             heard += len(inbox["messages"])
             unsaid = {"estimate": [], "known": [], "covariance": [], "psi": math.nan, "feasible": None, "reports": {}}
             voices["act"].put(msgpack.packb({**envelope, "input": flying, "heard": heard, **unsaid}))
-        else:
+        elif inbox["phase"] == "end":
             break
+        else:
+            sys.exit(f"an inbox of phase {inbox['phase']!r}")
 print('{"event": "done"}', flush=True)

@@ -61,12 +61,3 @@ def test_a_wrong_password_is_refused(out):
     launcher = Intruding(plan, out, watch=intrude)
     launcher.fly()
     assert refused == [True]
-
-
-def test_a_foreign_agent_flies_with_zenoh_and_messagepack_alone(out):
-    plan = plan_of("corridor", "time.duration=2", 'agents.estimator="none"')
-    foreign = [sys.executable, str(PROGRAMS / "foreign_agent.py")]
-    arrays = fly(plan, out, agent_6=foreign)
-    assert (arrays["input"][:, 5] == 0.0).all()
-    assert (arrays["position"][0, 5] == arrays["position"][-1, 5]).all()
-    assert (arrays["input"][1:, 4] != 0.0).all()
