@@ -52,13 +52,14 @@ def judge_and_report(parsed: argparse.Namespace) -> bool:
 def _print(found: Sequence[Finding]) -> None:
     console, table = Console(), Table("case", "docs/protocol.md", "")
     for finding in found:
-        case = finding.case
-        said = Text(finding.verdict, style=_STYLES[finding.verdict])
+        verdict = Text(finding.verdict, style=_STYLES[finding.verdict])
+        table.add_row(finding.case.name, finding.case.section, verdict)
+    console.print(table)
+    for finding in found:
         if finding.instead:
             more = f" (and {len(finding.instead) - 1} more)" if len(finding.instead) > 1 else ""
-            said.append(f"\nit has to {case.demand}\n{finding.instead[0]}{more}", style="default")
-        table.add_row(case.name, case.section, said)
-    console.print(table)
+            says = f"{finding.case.name}: it has to {finding.case.demand}\n    {finding.instead[0]}{more}"
+            console.print(Text(says), soft_wrap=True)
     counts = {verdict: sum(finding.verdict == verdict for finding in found) for verdict in _STYLES}
     console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count))
 

@@ -161,6 +161,6 @@ class Record:
         return [answer.said for answer in self.answers if answer.asked is asked and answer.stream == stream]
 
     def _answered_by(self, said: Said) -> Asked | None:
-        phase = "exchange" if said.stream == ACT else "sense"
+        phase: Phase = "exchange" if said.stream == ACT else "sense"
         before = [asked for asked in self.asked[: said.after] if asked.phase == phase]
         return before[-1] if before else next(iter(self.asks(phase)), None)

@@ -153,6 +153,8 @@ def live(flying, heard):
         before, flying = flying, [0.001 * (k + 1)] * D
         if WRONG == "goes too fast":
             flying = [1.0] * D
+        if WRONG == "holds still":
+            flying = [0.0] * D
         if WRONG == "diverges" and k == TICK:
             flying = [math.inf] * D
         beliefs = {"estimate": [], "known": [], "covariance": [], "psi": math.nan, "feasible": None, "reports": {}}

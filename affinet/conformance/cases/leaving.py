@@ -61,7 +61,7 @@ CASES = (
     ),
     Case("done", "say that it is done when its inbox says that the run is over", _END, flights.PLAIN, _done),
     Case("exit", "leave then, with exit status 0", _END, flights.PLAIN, _left_with_0),
-    Case("end-first", "do the same where that is its first inbox", _END, flights.UNASKED, _ended),
+    Case("end-first", "say so and leave where that is its first inbox", _END, flights.UNASKED, _ended),
     Case("orphaned", "leave when standard input closes", _CONNECT, flights.ORPHANED, _left),
     Case("orphaned-early", "leave when standard input closes within the brief", _BRIEF, flights.ORPHANED_EARLY, _left),
 )

@@ -10,7 +10,7 @@ from affinet.conformance.cases.answering import numbering, unanswered
 from affinet.conformance.cases.forms import miscounted, told_input
 from affinet.conformance.record import Record
 
-_RESTART, _PAUSE = "Killed, restarted, paused", "Killed, restarted, paused"
+_SECTION = "Killed, restarted, paused"
 
 
 def _begins_anew(record: Record) -> Iterator[str]:
@@ -37,16 +37,22 @@ def _flies_on(record: Record) -> Iterator[str]:
 
 
 CASES = (
-    Case("restart-numbers", "as a new process number its messages from 0", _RESTART, flights.KILLED, _begins_anew),
-    Case("restart-heard", "as a new process count `heard` from 0", _RESTART, flights.KILLED, _counts_anew),
-    Case("restart-input", "as a new process tell that nothing flies", _RESTART, flights.KILLED, _flies_nothing),
-    Case("restart-warm", "do so with a `checkpoint` to go on from, too", _RESTART, flights.REMEMBERS, _begins_anew),
+    Case("restart-numbers", "number its messages from 0 as a new process", _SECTION, flights.KILLED, _begins_anew),
+    Case("restart-heard", "count `heard` from 0 as a new process", _SECTION, flights.KILLED, _counts_anew),
+    Case("restart-input", "tell that nothing flies as a new process", _SECTION, flights.KILLED, _flies_nothing),
+    Case(
+        "restart-warm",
+        "number its messages from 0 as one that `remembers`, too",
+        _SECTION,
+        flights.REMEMBERS,
+        _begins_anew,
+    ),
     Case(
         "pause-numbers",
         "go on with its numbers after a pause, at the tick of its inbox",
-        _PAUSE,
+        _SECTION,
         flights.PAUSED,
         _goes_on,
     ),
-    Case("pause-input", "tell after a pause that its last input flies", _PAUSE, flights.PAUSED, _flies_on),
+    Case("pause-input", "tell after a pause that its last input flies", _SECTION, flights.PAUSED, _flies_on),
 )

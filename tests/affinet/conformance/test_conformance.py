@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import sys
 
 import pytest
@@ -18,7 +19,7 @@ OURS = [sys.executable, "-c", "from agents.process import main; main()"]
 EXAMPLE = [sys.executable, str(DOCS / "examples" / "agent.py")]
 BRISK = Patience(ready_s=2.0, answer_s=0.6)
 
-# What a planted fault has to show, and nothing else. Who speaks before it is asked has its first answer doubled by that, and so on.
+# What a planted fault has to show, and nothing else.
 PLANTED = {
     "is never ready": {"ready"},
     "deaf": {"ready"},
@@ -93,3 +94,93 @@ def test_a_planted_fault_shows_nowhere_else(wrong):
 def test_every_case_has_a_fault_that_it_finds():
     assert {case.name for case in CASES} == set().union(*PLANTED.values())
     assert len({case.name for case in CASES}) == len(CASES)
+
+
+def test_our_own_agent_conforms():
+    verdicts = {finding.case.name: finding.verdict for finding in findings(OURS, "ga-rkf", Patience())}
+    assert set(verdicts.values()) == {"pass"}, verdicts
+
+
+def test_what_an_estimator_cannot_fly_is_not_asked_of_its_agent():
+    cases = [case for case in CASES if case.name in ("restart-numbers", "clock")]
+    verdicts = {
+        finding.case.name: (finding.verdict, finding.instead) for finding in findings(OURS, "crkf", Patience(), cases)
+    }
+    assert verdicts["clock"] == ("pass", ())
+    verdict, (why,) = verdicts["restart-numbers"]
+    assert verdict == "not applicable"
+    assert why.startswith("crkf cannot fly it: ")
+
+
+def test_an_agent_that_steers_nowhere_keeps_no_limit():
+    (limit,) = (case for case in CASES if case.name == "limit")
+    (finding,) = findings(deviant("holds still"), "none", BRISK, [limit])
+    assert (finding.verdict, finding.instead) == ("not applicable", ("it steered nowhere",))
+
+
+def test_a_flight_that_breaks_off_shows_nothing_of_what_was_to_come():
+    cases = [case for case in CASES if case.name in ("ready", "tick", "done", "acts")]
+    found = {finding.case.name: finding for finding in findings(deviant("is mute"), "none", BRISK, cases)}
+    assert {name: finding.verdict for name, finding in found.items()} == {
+        "ready": "pass",
+        "tick": "not reached",
+        "done": "not reached",
+        "acts": "not reached",
+    }
+    assert found["tick"].instead[0].startswith("tick 4, sense: nothing came on input, measurement, and it sleeps")
+
+
+def test_the_end_of_a_log_is_told_of_who_dies():
+    cases = [case for case in CASES if case.name == "silence"]
+    (finding,) = findings(deviant("dies of silence"), "none", BRISK, cases)
+    assert "ended with exit status 1. Its last lines:\n    nothing measured" in finding.instead[0]
+
+
+def test_of_an_agent_that_never_comes_no_further_flight_is_flown():
+    found = list(findings(deviant("is never ready"), "none", BRISK))
+    assert [finding.case.name for finding in found] == sorted([case.name for case in CASES], key=of_flights())
+    assert {finding.verdict for finding in found if finding.case.name != "ready"} == {"not reached"}
+
+
+def of_flights():
+    in_order = [*dict.fromkeys(case.flight for case in CASES)]
+    return lambda name: next(in_order.index(case.flight) for case in CASES if case.name == name)
+
+
+def test_the_command_says_what_was_found_and_writes_it_down(tmp_path, capsys):
+    report = tmp_path / "report.json"
+    status = commands.main(["conformance", shlex.join(deviant("leaves with an error")), "--out", str(report)])
+    assert status == commands.FAIL
+    said = capsys.readouterr().out
+    assert "34 pass, 2 fail" in said
+    assert "exit: it has to leave then, with exit status 0\n    agent 5 (pid " in said
+    told = json.loads(report.read_text())
+    assert (told["estimator"], told["conforms"]) == ("none", False)
+    (case,) = (case for case in told["cases"] if case["case"] == "exit")
+    assert (case["verdict"], case["section"], case["flight"]) == ("fail", "An agent's life, 5. End", "plain")
+    assert "ended with exit status 3" in case["instead"][0]
+
+
+def test_a_command_that_starts_nothing_is_bad_input(capsys):
+    assert commands.main(["conformance", "no-such-program"]) == commands.BAD_INPUT
+    assert "no-such-program" in capsys.readouterr().err
+    assert commands.main(["conformance", "true", "--estimator", "nonsense"]) == commands.BAD_INPUT
+    assert "agents.estimator" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["", "python 'agent.py"])
+def test_a_command_line_is_one(command, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        commands.main(["conformance", command])
+    assert "argument COMMAND" in capsys.readouterr().err
+
+
+PROTOCOL = (DOCS / "protocol.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("section", sorted({case.section for case in CASES}))
+def test_a_case_names_a_section_that_there_is(section):
+    title, _, step = section.partition(", ") if section.startswith("An agent's life") else (section, "", "")
+    (text,) = re.findall(rf"^## {title}$(.*?)(?=^## |\Z)", PROTOCOL, flags=re.MULTILINE | re.DOTALL)
+    number, _, word = step.partition(". ")
+    assert re.search(rf"^{number}\. \*\*{word}\b", text, flags=re.MULTILINE) if step else text.strip()
