@@ -74,7 +74,9 @@ class Air:
         """A broadcast as it travels."""
         payload = {name: _plausible(form) for name, form in self._forms.get(handed.channel, {}).items()}
         if handed.channel == channels.MEASUREMENT:
-            payload = {"neighbours": [], "measured": b""}
+            seen = self._links.src[self._links.dst == handed.agent].tolist()
+            dimension = self._plan.world.formation.dimension
+            payload = {"neighbours": seen, "measured": packed(np.zeros((len(seen), dimension)))}
         said = messages.Broadcast(
             k=handed.tick, src=handed.agent, channel=handed.channel, seq=handed.tick, payload=payload
         )

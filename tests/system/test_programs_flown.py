@@ -1,5 +1,6 @@
 """The examples of docs/agents.md in a swarm, over processes: they fly, through losses, a kill and a pause."""
 
+import shutil
 import sys
 
 import numpy as np
@@ -12,12 +13,16 @@ from world.books import history
 
 pytestmark = PROCESSES
 
-EXAMPLES = DOCS / "examples"
-PYTHON = f'"5" = "{sys.executable} {EXAMPLES / "agent.py"}"'
+PYTHON = f'"5" = "{sys.executable} {DOCS / "examples" / "agent.py"}"'
+NODE = f'"5" = "node {DOCS / "examples" / "node" / "agent.mjs"}"'
+EXAMPLES = [
+    pytest.param(PYTHON, id="python"),
+    pytest.param(NODE, id="node", marks=pytest.mark.skipif(shutil.which("node") is None, reason="no node on the path")),
+]
 AIR = ("time.dt=0.05", "time.duration=5", 'agents.estimator="none"', "record.enabled=false", "manoeuvre.preset=hover")
 
 
-@pytest.mark.parametrize("example", [PYTHON])
+@pytest.mark.parametrize("example", EXAMPLES)
 def test_an_example_keeps_its_place_among_ours(example, out):
     plan = plan_of("corridor", *AIR, "network.availability=1", f"agents.programs={{ {example} }}", "agents.limit=0.5")
     outcome = fly(plan, "processes", out, lambda *_: None)
@@ -28,7 +33,7 @@ def test_an_example_keeps_its_place_among_ours(example, out):
     assert np.linalg.norm(arrays["input"][:, 4], axis=-1).max() <= 0.5 * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("example", [PYTHON])
+@pytest.mark.parametrize("example", EXAMPLES)
 def test_an_example_goes_on_through_losses_a_kill_and_a_pause(example, out):
     faults = (
         '{verb="kill",at=1.0,agents=[5]},{verb="restart",at=1.5,agents=[5]},'

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 import sys
 
 import pytest
@@ -10,13 +11,14 @@ from flying import PROCESSES
 from paths import DOCS, PROGRAMS
 
 from affinet.cli import commands
+from affinet.conformance.air import Air
 from affinet.conformance.flying import Patience
 from affinet.conformance.suite import CASES, findings
+from netem.wire import messages
 
 pytestmark = PROCESSES
 
 OURS = [sys.executable, "-c", "from agents.process import main; main()"]
-EXAMPLE = [sys.executable, str(DOCS / "examples" / "agent.py")]
 BRISK = Patience(ready_s=2.0, answer_s=0.6)
 
 # What a planted fault has to show, and nothing else.
@@ -96,6 +98,31 @@ def test_every_case_has_a_fault_that_it_finds():
     assert len({case.name for case in CASES}) == len(CASES)
 
 
+EXAMPLES = [
+    pytest.param([sys.executable, str(DOCS / "examples" / "agent.py")], id="python"),
+    pytest.param(
+        ["node", str(DOCS / "examples" / "node" / "agent.mjs")],
+        id="node",
+        marks=pytest.mark.skipif(shutil.which("node") is None, reason="there is no node on the path"),
+    ),
+]
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_an_example_of_the_docs_conforms(example):
+    verdicts = {finding.case.name: finding.verdict for finding in findings(example, "none", Patience())}
+    assert set(verdicts.values()) == {"pass"}, verdicts
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_an_example_of_the_docs_hears_what_comes_in_fragments(example, monkeypatch):
+    long = messages.pack(messages.Broadcast(k=0, src=2, channel="input", seq=0, payload={"velocity": bytes(100_000)}))
+    monkeypatch.setattr(Air, "said", lambda *_: long)
+    cases = [case for case in CASES if case.name in ("acts", "heard")]
+    assert [finding.verdict for finding in findings(example, "none", Patience(), cases)] == ["pass", "pass"]
+
+
+@pytest.mark.slow
 def test_our_own_agent_conforms():
     verdicts = {finding.case.name: finding.verdict for finding in findings(OURS, "ga-rkf", Patience())}
     assert set(verdicts.values()) == {"pass"}, verdicts
