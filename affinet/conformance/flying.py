@@ -54,6 +54,15 @@ class Stopped(Exception):
 def flown(flight: Flight, plan: Plan, command: list[str], patience: Patience) -> Record:
     """What came of a flight against the agent that a command line starts.
 
+    Parameters
+    ----------
+    flight, plan
+        How it goes, and what is flown.
+    command
+        What starts the agent.
+    patience
+        How long it may do nothing.
+
     Raises
     ------
     OSError
