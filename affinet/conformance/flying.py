@@ -70,7 +70,8 @@ def flown(flight: Flight, plan: Plan, command: list[str], patience: Patience) ->
     """
     record = Record(plan, flight.agent)
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder())))
+        private = tempfile.TemporaryDirectory(prefix="affinet-", dir=socket_folder(), ignore_cleanup_errors=True)
+        folder = Path(stack.enter_context(private))
         happened = SimpleQueue[Any]()
         star = stack.enter_context(Star(folder, flight.agent, happened))
         conversation = Conversation(record, star, Attention(record, happened), command, folder, patience)
@@ -193,8 +194,7 @@ class Conversation:
     def _start(self, *, remembers: bool) -> None:
         program, life = self._begin(), self._life
         program.brief(self._brief(remembers=remembers))
-        ready_s = self._patience.ready_s
-        if not self._attention.waits(program, lambda: life.ready, ready_s):
+        if not self._attention.waits(program, lambda: life.ready, self._patience.ready_s):
             self._stop("it is not ready")
         if not self._attention.waits(program, lambda: self._star.is_heard, self._patience.answer_s):
             self._stop("it said that it is ready, and does not subscribe to its inbox")

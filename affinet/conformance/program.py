@@ -12,6 +12,7 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 from affinet.runtimes.child import Child, started
+from affinet.runtimes.told import LONGEST_LINE
 from netem.processes.supervised import brief_bytes
 
 
@@ -87,7 +88,7 @@ class Program:
         stdout = self.child.process.stdout
         assert stdout is not None
         with stdout:
-            for line in stdout:
+            while line := stdout.readline(LONGEST_LINE):
                 self._happened.put(Told(self._life, line.rstrip(b"\n")))
         self.child.process.wait()
         self._happened.put(GONE)

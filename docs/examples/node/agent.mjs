@@ -3,6 +3,8 @@
 import { float, pack, unpack } from "./msgpack.mjs";
 import { Session } from "./zenoh.mjs";
 
+const DERIVATIVES = ["velocity", "acceleration", "jerk", "snap"];
+
 const tell = (event) => process.stdout.write(JSON.stringify(event) + "\n");
 
 function fail(reason) {
@@ -61,7 +63,7 @@ async function fly() {
     const envelope = { k: inbox.k, src: brief.agent, seq: due++ >> 1 }; // two inboxes a tick, one message on each key
     if (inbox.phase === "sense") {
       const motion = rows(inbox.motion ?? Buffer.alloc(0), width);
-      const derivatives = [...motion, flying].map((values, order) => [["velocity", "acceleration", "jerk", "snap"][order], packed(values)]);
+      const derivatives = [...motion, flying].map((values, order) => [DERIVATIVES[order], packed(values)]);
       const { neighbours, measured } = inbox;
       say("tx/input", { ...envelope, channel: "input", payload: Object.fromEntries(derivatives) });
       say("tx/measurement", { ...envelope, channel: "measurement", payload: { neighbours, measured } });

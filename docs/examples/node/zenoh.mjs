@@ -1,4 +1,4 @@
-// As much of a Zenoh 1.x client as an agent needs, over a stream: log in, subscribe, publish, know that somebody listens.
+// As much of a Zenoh 1.x client as an agent needs, over a stream: log in, subscribe, publish, know who listens.
 // Wire format: https://github.com/eclipse-zenoh/zenoh/tree/main/commons/zenoh-protocol
 
 import { createHmac, randomBytes } from "node:crypto";
@@ -98,7 +98,7 @@ export class Session {
     const wanted = block(AUTH, Buffer.from([USER_AND_PASSWORD]));
     this.write(Buffer.from([INIT | EXTENDED, VERSION, (15 << 4) | CLIENT]), randomBytes(16), wanted);
     const offered = await this.answer(INIT);
-    offered.header & 0x40 && offered.take(3); // sizes, which are ours or smaller
+    if (offered.header & 0x40) offered.take(3); // sizes, which are ours or smaller
     const cookie = offered.block();
     const challenge = new Reader(offered.extensions(offered.header).get(AUTH)).extensions(EXTENDED);
     const nonce = Buffer.alloc(8);
@@ -201,7 +201,7 @@ export class Session {
     reader.extensions(header);
     const body = reader.byte();
     if ((body & 31) !== 0x01) throw new Error("no put");
-    if (body & 0x20) (reader.count(), reader.block()); // when, by which clock
+    if (body & 0x20) reader.large(), reader.block(); // when, by which clock
     if (body & 0x40 && reader.count() & 1) reader.block(); // its encoding, and schema
     reader.extensions(body);
     const data = Buffer.from(reader.block());
