@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn
 from affinet.cli import machines, options, show, terminal
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
+from affinet.planning.programs import refuse_in_process
 from affinet.runtimes import directories
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.interruption import Interrupted
@@ -298,6 +299,8 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
+    if parsed.runtime == "inprocess":
+        refuse_in_process(plan)
     if parsed.out:
         refuse_taken(parsed.out)
     viewer = open_viewer() if parsed.view else None
@@ -344,6 +347,12 @@ def _keys(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _conformance(parsed: argparse.Namespace) -> int:
+    from affinet.cli import conforming  # large swarms and what designs them take a while to import
+
+    return PASS if conforming.judge_and_report(parsed) else FAIL
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -358,4 +367,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "hosts": _hosts,
     "world": _world,
     **dict.fromkeys(("agent", "host", "netem"), machines.hold),
+    "conformance": _conformance,
 }

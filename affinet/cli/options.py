@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from affinet.scenario import files, loading
+from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
 from world.formation.layouts import KINDS
 
@@ -49,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
     _add_keys(commands)
     _add_coordinators(commands)
     _add_seats(commands)
+    _add_conformance(commands)
     return whole
 
 
@@ -132,6 +134,36 @@ def _add_inject(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
         )
     verbs.add_parser("heal", help="end what was injected; what the scenario scripts stays")
     verbs.add_parser("show", help="what is imposed now")
+
+
+def _add_conformance(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    conformance = commands.add_parser(
+        "conformance",
+        help="whether an agent, in whatever language, speaks as docs/protocol.md says",
+        description="Fly one agent by a program of yours, in a score of short flights, and say case by case what it does "
+        "not do that it has to. Exit status 1 when there is such a case.",
+    )
+    conformance.add_argument(
+        "program", type=_command_line, metavar="COMMAND", help="what starts the agent, in quotes: 'python my_agent.py'"
+    )
+    conformance.add_argument(
+        "--estimator", default="none", metavar="NAME", help="whose channels it broadcasts on (default: %(default)s)"
+    )
+    conformance.add_argument(
+        "--patience",
+        type=_positive,
+        default=3.0,
+        metavar="S",
+        help="how long it may do nothing where an answer is due (default: %(default)g)",
+    )
+    conformance.add_argument("--out", type=_path, metavar="FILE", help="the report, as JSON")
+
+
+def _command_line(text: str) -> list[str]:
+    try:
+        return words(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _count(text: str) -> int:

@@ -28,6 +28,7 @@ from affinet.planning import (
 )
 from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swarm_of, world_of
 from affinet.planning.plan import Plan, PlanError, agents_of
+from affinet.planning.programs import refuse_strangers
 from affinet.scenario import inputs, loading
 from affinet.scenario.sections import Scenario, ScenarioError
 from agents.centre.checked import centre_of
@@ -115,6 +116,7 @@ def _make(given: Scenario) -> Plan:
     estimator, law = algorithms.chosen(given)
     findings, L = _framework(given, formation, law.build())
     first = world_of(limits.first_tick(given), formation)
+    refuse_strangers(given.agents.programs, first.links.agents)
     memory = psutil.virtual_memory().total
     fits = limits.swarm(formation, first.links, memory)
     _refuse_fatal([*findings, fits])

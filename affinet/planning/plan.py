@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
+from affinet.scenario.programs import words
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
 from agents.agent import Agent
@@ -113,6 +114,11 @@ class Plan:
     def timeline(self) -> Timeline:
         """All faults over the links."""
         return Timeline(self.world.links, self.faults, self.triggers, self.injected)
+
+    @cached_property
+    def programs(self) -> Mapping[int, Sequence[str]]:
+        """Command lines of the programs that fly some agents in place of ours, by number of the agent."""
+        return {int(number): words(command) for number, command in self.scenario.agents.programs.items()}
 
     @cached_property
     def wants(self) -> Wants:

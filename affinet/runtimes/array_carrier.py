@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from affinet.planning.plan import Plan
+from affinet.planning.programs import refuse_in_process
 from agents.agent import AgentAction, AgentState
 from agents.batch import beside_others, come_back, put_back
 from agents.brief import DERIVATIVES, Reading
@@ -44,9 +45,15 @@ class ArrayCarrier:
     ----------
     plan
         What is flown.
+
+    Raises
+    ------
+    PlanError
+        When programs of a user's own are to fly some of it.
     """
 
     def __init__(self, plan: Plan) -> None:
+        refuse_in_process(plan)
         self._world = plan.world
         self._links = plan.world.links
         self._agents = plan.agents

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.plan import Plan
+from affinet.runtimes.briefs import agent_brief
 from affinet.runtimes.child import Child, RunFailed, UserCodeFailed
 from affinet.runtimes.forked import NURSERY
 from affinet.runtimes.inject import Access
@@ -25,7 +26,7 @@ from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
 from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
-from agents.node import AgentBrief, HostBrief
+from agents.node import HostBrief
 from analysis.metrics.errors import tracking_error
 from netem.brief import MediumBrief
 from netem.faults.fault import Fault, Verb
@@ -94,7 +95,7 @@ class Launcher:
         viewer
             URL of a Rerun viewer that is listening.
         programs
-            Command lines of programs that fly some agents in place of ours (docs/protocol.md).
+            Command lines of programs that fly some agents in place of ours (docs/agents.md), on top of those of the plan.
         interruption
             What may ask the run to end.
         spread
@@ -104,7 +105,7 @@ class Launcher:
         self._out = out
         self._viewer = viewer
         self._watch = watch
-        self._programs = programs or {}
+        self._programs = {**plan.programs, **(programs or {})}
         self._interruption = interruption or Interruption()
         self._run = keys.fresh()
         self._logins: dict[str, Login] = {}
@@ -235,13 +236,13 @@ class Launcher:
 
     def _host_brief(self, host: int, carried: Sequence[int]) -> HostBrief:
         login = self._logins[host_name(host)]
-        return HostBrief(host, tuple(self._agent_brief(number, login, checkpoint=None) for number in carried))
+        return HostBrief(host, tuple(agent_brief(self._plan, self._run, login, number) for number in carried))
 
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         warm = number in self._plan.timeline.warm
         checkpoint = str(self._folder(agent_name(number), self._private) / f"agent-{number}.npz") if warm else None
-        brief = self._agent_brief(number, login, checkpoint, remembers=remembers)
+        brief = agent_brief(self._plan, self._run, login, number, checkpoint=checkpoint, remembers=remembers)
         program = self._programs.get(number)
         child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
         self._agents[number] = child
@@ -288,27 +289,6 @@ class Launcher:
 
     def _centre_brief(self, login: Login) -> CentreBrief:
         return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm)
-
-    def _agent_brief(self, number: int, login: Login, checkpoint: str | None, *, remembers: bool = False) -> AgentBrief:
-        plan, row = self._plan, number - 1
-        links = plan.world.links
-        return AgentBrief(
-            run=self._run,
-            login=login,
-            agent=number,
-            neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
-            estimator=plan.estimator,
-            law=plan.law,
-            leaders=plan.scenario.agents.leaders,
-            leader_gain=plan.scenario.agents.leader_gain,
-            limit=plan.scenario.agents.limit,
-            reports=plan.reports,
-            brief=plan.brief_of(row),
-            hears_centre=plan.centre is not None,
-            checkpoint=checkpoint,
-            remembers=remembers,
-            timer=plan.timers[row] if plan.timers else None,
-        )
 
 
 def _prepare_kernels(world: World) -> None:

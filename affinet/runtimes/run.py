@@ -13,6 +13,7 @@ import psutil
 
 from affinet.planning import limits
 from affinet.planning.plan import Plan, PlanError
+from affinet.planning.programs import refuse_in_process
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
@@ -74,6 +75,8 @@ def fly(
     ------
     FileExistsError
         When `out` holds a run already.
+    PlanError
+        When programs of a user's own are to fly some of it in this process.
     ValueError
         When there is no such runtime.
     OSError
@@ -82,6 +85,8 @@ def fly(
         When a signal asked the run to end; its outcome is written down all the same.
     """
     fly_in = _RUNTIMES[runtime_of(runtime)] if spread is None else partial(_over_processes, spread=spread)
+    if runtime == "inprocess":
+        refuse_in_process(plan)
     outcome.prepare(plan, out)
     with interruptible() as interruption:
         done = fly_in(plan, out, watch, viewer, interruption)

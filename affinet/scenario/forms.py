@@ -35,6 +35,7 @@ EXAMPLES: Mapping[str, Any] = {
     "agents": {"estimator": "rkf", "law": "varying-velocity"},
     "agents.estimator": "rkf",
     "agents.law": "varying-velocity",
+    "agents.programs": {"3": "python my_agent.py"},
     "agents.parameters": {"rkf": {"sigma_w": 0.5}},
     "agents.parameters.*": {"sigma_w": 0.5},
     "formation": {"preset": "zhao7"},

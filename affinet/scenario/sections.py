@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from affinet.scenario.events import Links
 from affinet.scenario.profiles import LinkProfile, Section
+from affinet.scenario.programs import of_agents
 from affinet.scenario.real_time import RealTimeSection
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import IN_CODE, Source
@@ -249,7 +250,7 @@ class AgentsSection(Section):
     """What the agents run: names of estimator and law, and their parameters by name; leader_gain in 1/s.
 
     `limit` is the longest input they command, in m/s, or m/s2 of double integrators: longer ones are shortened. `per_process`
-    is how many of them a process carries.
+    is how many of them a process carries; `programs` are command lines of programs that fly some of them, by their numbers.
     """
 
     estimator: str
@@ -258,6 +259,7 @@ class AgentsSection(Section):
     leader_gain: NotNegative = 1.0
     limit: Positive | None = None
     per_process: Annotated[int, Field(ge=1, le=1000)] = 1
+    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = Field(default_factory=dict)
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 

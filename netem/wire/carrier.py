@@ -96,6 +96,12 @@ class Voice:
         """Say it, with a note beside it."""
         self.publisher.put(data, attachment=note)
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody hears the key now."""
+        matching: Any = self.publisher.matching_status
+        return bool(matching.matching)
+
     def await_heard(self) -> None:
         """Wait until somebody hears: what is said from then on is not lost at the start."""
         changes = self.publisher.declare_matching_listener(zenoh.handlers.FifoChannel(_WAITING_CHANGES))
@@ -199,6 +205,7 @@ class Session:
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
         self._tokens: list[zenoh.LivelinessToken] = []
+        self._handing: list[Any] = []  # hand over for as long as somebody has them
 
     def __enter__(self) -> Session:
         self._session.__enter__()
@@ -222,7 +229,7 @@ class Session:
 
     def hands(self, key: str, take: Callable[[Arrived], None]) -> None:
         """Hand over what is said on a key, in a thread of the session's, where nothing may be said or asked."""
-        self._session.declare_subscriber(key, lambda sample: take(Arrived(sample)))
+        self._handing.append(self._session.declare_subscriber(key, lambda sample: take(Arrived(sample))))
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""

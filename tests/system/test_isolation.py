@@ -100,12 +100,3 @@ def test_over_tls_a_swarm_flies_the_same_bits(out, tmp_path):
     flight = launcher.fly()
     assert flight.failure is None
     assert history.digest(history.load(out / "arrays.npz")) == digest_of("corridor", "time.duration=2")
-
-
-def test_a_foreign_agent_flies_with_zenoh_and_messagepack_alone(out):
-    plan = plan_of("corridor", "time.duration=2", 'agents.estimator="none"')
-    foreign = [sys.executable, str(PROGRAMS / "foreign_agent.py")]
-    arrays = fly(plan, out, agent_6=foreign)
-    assert (arrays["input"][:, 5] == 0.0).all()
-    assert (arrays["position"][0, 5] == arrays["position"][-1, 5]).all()
-    assert (arrays["input"][1:, 4] != 0.0).all()
