@@ -44,6 +44,7 @@ if WRONG == "flat":
     D = 2
 config = {
     "mode": "client",
+    "id": login["name"].encode().hex(),
     "connect": {"endpoints": [login["endpoint"]], "timeout_ms": 10000, "retry": {"period_init_ms": 20}},
     "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
     "transport": {"auth": {"usrpwd": {"user": login["name"], "password": login["password"]}}},
