@@ -9,8 +9,52 @@ from netem.wire import messages
 from netem.wire.carrier import Session, Voice
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
+from netem.wire.wrong import WireError, Wrong
 
 _WAITING = 64  # messages that may wait
+
+
+class Inboxes:
+    """Reads what the medium tells an agent: what it sensed, what was exchanged in the same tick, and so on, until the end.
+
+    Parameters
+    ----------
+    agent, neighbours
+        Whose they are, and the numbers of the agents in its neighbour slots.
+    """
+
+    def __init__(self, agent: int, neighbours: tuple[int, ...]) -> None:
+        self._whose, self._neighbours = f"agent {agent}: its inbox", frozenset(neighbours)
+        self._numbers = Sequences("the medium's")
+        self._tick, self._sensed = -1, False
+
+    def read(self, data: bytes) -> messages.Inbox:
+        """What came.
+
+        Raises
+        ------
+        WireError
+            When it is no inbox, or not the one that is due, or of others than its neighbours.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        inbox = messages.unpack_inbox(data)
+        self._numbers.check("inbox", inbox.seq)
+        match inbox:
+            case messages.SenseInbox():
+                due, whom = not self._sensed and inbox.k > self._tick, inbox.neighbours
+            case messages.ExchangeInbox():
+                due, whom = self._sensed and inbox.k == self._tick, [said.src for said in inbox.messages]
+            case messages.EndInbox():
+                return inbox
+        if not due:
+            wrong = Wrong.PAST if inbox.k < self._tick else Wrong.FUTURE if inbox.k > self._tick else Wrong.REPEATED
+            raise WireError(f"{self._whose}: it is of tick {inbox.k}, after one of tick {self._tick}", wrong)
+        if not self._neighbours.issuperset(whom):
+            strangers = sorted({*whom} - self._neighbours)
+            raise WireError(f"{self._whose}: it has no neighbours {strangers} (see docs/protocol.md)", Wrong.SHAPE)
+        self._tick, self._sensed = inbox.k, isinstance(inbox, messages.SenseInbox)
+        return inbox
 
 
 class Mailbox:
@@ -50,7 +94,7 @@ class Mailbox:
         """Nothing was said or heard: the agent is new."""
         self.heard = 0
         self._numbers = Numbering()
-        self._inboxes, self._tellings = Sequences("the medium's"), Sequences("the centre's")
+        self._inboxes, self._tellings = Inboxes(self.agent, self.neighbours), Sequences("the centre's")
 
     @property
     def voices(self) -> list[Voice]:
@@ -63,12 +107,11 @@ class Mailbox:
         Raises
         ------
         WireError
-            When it is no inbox.
+            When it is no inbox, or not the one that is due, or of others than its neighbours.
         UninstructedLoss
             When one before it is missing.
         """
-        inbox = messages.unpack_inbox(self._inbox.next().data)
-        self._inboxes.check("inbox", inbox.seq)
+        inbox = self._inboxes.read(self._inbox.next().data)
         if isinstance(inbox, messages.ExchangeInbox):
             self.heard += len(inbox.messages)
         return inbox

@@ -29,6 +29,7 @@ from netem.wire.carrier import Ear, Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
 from netem.wire.session import CENTRE, HUB, Login, client
+from netem.wire.wrong import WireError, Wrong
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class AgentsNode:
             for one in briefs
         }
         self._hears_centre = first.hears_centre
-        self._roster = None if host is None else Roster(session.hears(Keys(first.run).roster(host), 4))
+        self._roster = None if host is None else Roster(session.hears(Keys(first.run).roster(host), 4), self._mailboxes)
 
     def _begun(self, first: AgentBrief) -> AgentState:
         fresh = self._agents.init(self._numbers.shape)
@@ -230,13 +231,29 @@ class AgentsNode:
 class Roster:
     """Who of a host's agents takes part in each tick, as the medium calls it."""
 
-    def __init__(self, ear: Ear) -> None:
-        self._ear, self._calls = ear, Sequences("the medium's")
+    def __init__(self, ear: Ear, agents: Collection[int]) -> None:
+        self._ear, self._agents, self._calls = ear, frozenset(agents), Sequences("the medium's")
 
     def next(self) -> messages.Roster:
         """Wait for the next tick."""
-        called = messages.unpack(messages.Roster, self._ear.next().data)
+        return self.read(self._ear.next().data)
+
+    def read(self, data: bytes) -> messages.Roster:
+        """What came.
+
+        Raises
+        ------
+        WireError
+            When it is something else, or calls agents that are none of this host's.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        called = messages.unpack(messages.Roster, data)
         self._calls.check("roster", called.seq)
+        if not self._agents.issuperset([*called.awake, *called.restarted, *called.remembering]):
+            raise WireError(
+                "the medium: Roster: it calls agents that are none of this host's (see docs/protocol.md)", Wrong.SHAPE
+            )
         return called
 
 

@@ -27,12 +27,16 @@ from netem.medium.medium import Medium, recorded
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
-from netem.wire.arrays import CODE, WHOLE, Form, WireError, channel_rows, numbers, packed
+from netem.wire.arrays import CODE, WHOLE, Form, channel_rows, numbers, packed
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
+from netem.wire.intake import Intake, Trust
 from netem.wire.keys import Keys
-from netem.wire.sequence import Numbering, Sequences
+from netem.wire.payloads import Payloads
+from netem.wire.senses import Senses
+from netem.wire.sequence import Numbering
 from netem.wire.session import HUB, WORLD, Login, hub
+from netem.wire.wrong import WireError
 
 if TYPE_CHECKING:
     from netem.medium.journal import Writer
@@ -56,12 +60,14 @@ class MediumBrief:
         Faults that an earlier run was given while it flew.
     recorded
         The journal of an earlier run that is to be judge of this one.
-    forms
-        What the fields of each channel hold that agents look into.
+    dimension, forms
+        D, and what the fields of each channel hold that agents look into.
     positioned
         Agents that have positioning, shape (N,).
     hosts
         For each process that carries several agents, which.
+    trust
+        What is taken from agents.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
     """
@@ -77,9 +83,11 @@ class MediumBrief:
     triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
+    dimension: int
     forms: Mapping[str, Mapping[str, Form]]
     positioned: Mask
     hosts: Mapping[int, tuple[int, ...]]
+    trust: Trust
     journal: str
     batch: int
 
@@ -157,11 +165,15 @@ class MediumNode:
         self._relay = Relay[Spoken](Medium(brief.seed, brief.channels, brief.profiles, timeline, verdicts))
         self._spoken = [name for name in brief.channels if name != channels.SENSE]
         self._voices = [(agent, name) for agent in agents for name in brief.channels]
-        self._from_world = Sequences("world")
-        self._reader = Broadcasts(keys, agents, self._spoken)
+        self._senses = Senses(len(brief.links), brief.links.agents, brief.dimension)
+        self._intake = Intake(brief.trust)
+        supervisor.counts(lambda: self._intake.refused)
+        neighbours = {agent: frozenset(brief.links.neighbours_of(agent)) for agent in agents}
+        payloads = Payloads(brief.forms, neighbours, brief.dimension, brief.trust.foreign)
+        self._reader = Broadcasts(keys, agents, self._spoken, payloads)
         self._numbers = Numbering()
         self._sense = session.hears(keys.sense, 16)
-        self._broadcasts = session.hears(keys.broadcast("*", "*"), 4096)
+        self._broadcasts = session.hears_anybody(keys.broadcast("*", "*"))
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
@@ -179,8 +191,7 @@ class MediumNode:
         tick = 0
         while True:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
-            sense = messages.unpack(messages.Sense, self._sense.next().data)
-            self._from_world.check("sense", sense.seq)
+            sense = self._senses.read(self._sense.next().data, tick)
             self._supervisor.works(sense.k)
             if sense.last:
                 self._end(sense.k)
@@ -229,6 +240,7 @@ class MediumNode:
                 try:
                     order = messages.unpack(Order, question.data)
                 except WireError as error:
+                    self._intake.note(None, error.wrong)
                     question.refuse(str(error))
                     continue
                 question.answer(messages.pack(self._relay.obey(order, tick)))
@@ -302,8 +314,11 @@ class MediumNode:
         somebody_lies = bool(decided.relayed.conditions.liars)
         while self._awaited:
             arrived = self._broadcasts.next()
-            data = arrived.data
-            broadcast = self._reader.read(arrived.key, data, tick, self._awaited)
+            key, data = arrived.key, arrived.data
+            speaker = self._reader.speaker(key)
+            broadcast = self._intake.take(speaker, key, data, tick, self._awaited, self._reader.read)
+            if broadcast is None:
+                continue
             self._awaited.remove((broadcast.src, broadcast.channel))
             said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data) if somebody_lies else data
         self._relay.keep(tick, said)

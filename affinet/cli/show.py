@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -196,7 +196,7 @@ def designed(made: Designed, file: Path) -> None:
 
 def outcome(outcome: Outcome, plan: Plan) -> None:
     """What came of a run."""
-    table = Table(show_header=False, title=f"{_VERDICTS[outcome.verdict]}")
+    table = Table(show_header=False, title=outcome.says.replace(outcome.verdict, _VERDICTS[outcome.verdict], 1))
     flown, messages = outcome.flown, outcome.messages
     errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
     errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
@@ -220,6 +220,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
             ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
+        *((f"wrong, of {who}", what) for who, what in _refused(outcome)),
         *(("fault", str(bite)) for bite in outcome.faults),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
@@ -230,6 +231,15 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console.print(table)
     for reason in outcome.reasons:
         console.print(_plain(reason), soft_wrap=True)
+
+
+def _refused(outcome: Outcome) -> Iterator[tuple[str, str]]:
+    """Of each agent whose messages were refused, how many, for what, and by whom."""
+    agents = dict.fromkeys(one["agent"] for one in outcome.refused)
+    for agent in agents:
+        of_agent = [one for one in outcome.refused if one["agent"] == agent]
+        said = ", ".join(f"{one['count']} {one['wrong']} ({one['by']})" for one in of_agent)
+        yield "the control login" if agent is None else f"agent {agent}", said
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:

@@ -29,6 +29,7 @@ from netem.medium.medium import JOURNAL
 from netem.process import MediumBrief
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
+from netem.wire.intake import Trust
 from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, host_name, socket_folder
 from world.brief import WorldBrief
 from world.physics.world import World
@@ -48,6 +49,8 @@ class LaunchRecord:
         Why the run ended early, if it did, and whether a user's own code is why.
     start_s, wall_s
         From the first process started to the first tick, and from there to the end, in seconds.
+    refused
+        Messages that were refused: of which agent, by whom, for what mistake, and how many.
     processes
         Every process there was.
     """
@@ -58,6 +61,7 @@ class LaunchRecord:
     user_code: bool = False
     start_s: float = 0.0
     wall_s: float = 0.0
+    refused: list[dict[str, Any]] = field(default_factory=list)
     processes: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -129,6 +133,11 @@ class Launcher:
 
     def _note(self, group: ProcessGroup) -> None:
         self.flight.processes = [child.report() for child in group.processes]
+        self.flight.refused = [
+            {"agent": agent, "by": child.name, "wrong": wrong, "count": count}
+            for child in group.children
+            for (agent, wrong), count in child.refused.items()
+        ]
 
     def _start(self, group: ProcessGroup) -> None:
         private = self._private
@@ -229,6 +238,13 @@ class Launcher:
         self._agents[number] = child
         return child
 
+    @property
+    def _trust(self) -> Trust:
+        given = self._plan.scenario.trust
+        return Trust(
+            given.wrong_messages, given.largest_message, given.messages_per_tick, foreign=frozenset(self._programs)
+        )
+
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(
             run=self._run,
@@ -239,6 +255,8 @@ class Launcher:
             faults=self._plan.faults,
             triggers=self._plan.triggers,
             reports=self._plan.reports,
+            limit=self._plan.scenario.agents.limit,
+            trust=self._trust,
             books=self._plan.books(self._viewer),
         )
 
@@ -255,24 +273,25 @@ class Launcher:
             triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
+            dimension=self._plan.world.formation.dimension,
             forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
             hosts=self._hosts,
+            trust=self._trust,
             journal=str(self._out / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
         )
 
     def _centre_brief(self, login: Login) -> CentreBrief:
-        return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm)
+        return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm, self._trust)
 
     def _agent_brief(self, number: int, login: Login, checkpoint: str | None, *, remembers: bool = False) -> AgentBrief:
         plan, row = self._plan, number - 1
-        links = plan.world.links
         return AgentBrief(
             run=self._run,
             login=login,
             agent=number,
-            neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
+            neighbours=plan.world.links.neighbours_of(number),
             estimator=plan.estimator,
             law=plan.law,
             leaders=plan.scenario.agents.leaders,

@@ -150,6 +150,7 @@ def _over_processes(plan: Plan, out: Path, watch: Watch, viewer: str | None, int
         user_code=flight.user_code,
         wall_s=flight.wall_s,
         processes=flight.processes,
+        refused=flight.refused,
         out=out,
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -37,7 +38,8 @@ class Outcome:
 
     `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents that find out
     where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the faults where
-    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early.
+    they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run ended early;
+    `refused` has the wrong messages of each agent, by whom they were refused, for what, and how many.
     """
 
     verdict: RunVerdict
@@ -53,6 +55,7 @@ class Outcome:
     messages: dict[str, Any]
     faults: tuple[Bite, ...]
     timeline: Timeline
+    refused: tuple[dict[str, Any], ...]
     processes: tuple[dict[str, Any], ...]
     out: str
 
@@ -77,6 +80,14 @@ class Outcome:
     def real_time_factor(self) -> float:
         """Simulated seconds per second of wall time."""
         return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
+
+    @property
+    def says(self) -> str:
+        """The verdict in words; of one that was reached although messages were dropped, how many."""
+        dropped = sum(one["count"] for one in self.refused)
+        return (
+            f"{self.verdict}, {dropped} wrong messages dropped" if dropped and self.verdict != "fail" else self.verdict
+        )
 
     def failing(self, reason: str) -> Outcome:
         """The outcome of a run that failed for this reason too."""
@@ -107,6 +118,7 @@ def judge(
     wall_s: float,
     processes: list[dict[str, Any]],
     out: Path,
+    refused: Sequence[dict[str, Any]] = (),
 ) -> Outcome:
     """The outcome of a run.
 
@@ -129,6 +141,8 @@ def judge(
         From the first tick to the last, in seconds.
     processes, out
         Every process there was, and the run directory.
+    refused
+        Wrong messages, as in `Outcome`.
     """
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
     booked = accounts or NOTHING
@@ -155,6 +169,7 @@ def judge(
         messages=_messages(booked, uninstructed),
         faults=tuple(faults),
         timeline=timeline,
+        refused=tuple(refused),
         processes=tuple(processes),
         out=str(out),
     )

@@ -51,6 +51,14 @@ class _Messages:
 
 
 @dataclass(frozen=True)
+class _Refused:
+    agent: _Count | None
+    by: str
+    wrong: str
+    count: _Count
+
+
+@dataclass(frozen=True)
 class _Process:
     role: str
     id: int | None
@@ -71,6 +79,7 @@ class _Summary:
     ticks: _Count
     wall_s: _Seconds
     messages: _Messages
+    refused: tuple[_Refused, ...]
     processes: tuple[_Process, ...]
 
 
@@ -107,6 +116,7 @@ def evidence(out: Path) -> Evidence:
         user_code=summary.user_code,
         wall_s=summary.wall_s,
         processes=[asdict(process) for process in summary.processes],
+        refused=[asdict(one) for one in summary.refused],
         out=out,
     )
     if summary.verdict != "fail" and judged.messages != asdict(

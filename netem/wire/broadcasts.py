@@ -6,9 +6,10 @@ from collections.abc import Container, Iterable, Sequence
 
 from netem.core.plain import shown
 from netem.wire import messages
-from netem.wire.arrays import WireError
 from netem.wire.keys import Keys
+from netem.wire.payloads import Payloads
 from netem.wire.sequence import Sequences
+from netem.wire.wrong import WireError, Wrong
 
 
 class Broadcasts:
@@ -20,12 +21,18 @@ class Broadcasts:
         Of the run.
     agents, channels
         Who broadcasts, and on which channels.
+    payloads
+        What they may say there.
     """
 
-    def __init__(self, keys: Keys, agents: Iterable[int], channels: Sequence[str]) -> None:
+    def __init__(self, keys: Keys, agents: Iterable[int], channels: Sequence[str], payloads: Payloads) -> None:
         self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in channels}
-        self._channels = list(channels)
+        self._channels, self._payloads = list(channels), payloads
         self._streams = Sequences("agent")
+
+    def speaker(self, key: str) -> int:
+        """Whose key it is."""
+        return int(key.rsplit("/", 3)[1])
 
     def restart(self, agent: int) -> None:
         """Expect the broadcasts of a new process."""
@@ -33,7 +40,7 @@ class Broadcasts:
             self._streams.restart(f"{agent} {name}")
 
     def read(self, key: str, data: bytes, tick: int, awaited: Container[tuple[int, str]]) -> messages.Broadcast:
-        """The broadcast that came on a key, which access control leaves to one agent.
+        """The broadcast that came on a key, which access control leaves to one agent; of a wrong one no note is taken.
 
         Parameters
         ----------
@@ -56,13 +63,17 @@ class Broadcasts:
         try:
             said = messages.unpack_relayed(data)
         except WireError as error:
-            raise WireError(f"{whose}: {error}") from error
-        if self._speaking.get(key) != (said.src, said.channel) or said.k != tick:
+            raise WireError(f"{whose}: {error}", error.wrong) from error
+        spoofed = self._speaking.get(key) != (said.src, said.channel)
+        if spoofed or said.k != tick:
             raise WireError(
                 f"{whose} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
-                f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
+                f"channels here are {', '.join(self._channels)} (see docs/protocol.md)",
+                Wrong.SPOOFED if spoofed else Wrong.PAST if said.k < tick else Wrong.FUTURE,
             )
-        self._streams.check(f"{said.src} {said.channel}", said.seq)
         if (said.src, said.channel) not in awaited:
-            raise WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
+            says = f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused"
+            raise WireError(says, Wrong.REPEATED)
+        self._payloads.check(said.src, said.channel, said.payload)
+        self._streams.check(f"{said.src} {said.channel}", said.seq)
         return said

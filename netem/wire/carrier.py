@@ -10,6 +10,7 @@ from typing import Any
 import zenoh
 
 _WAITING_CHANGES = 4
+_WAITING_FOR_ALL = 1 << 16  # far more than a tick of a thousand agents; each costs what its message does
 
 
 class NotCarried(RuntimeError):
@@ -136,6 +137,13 @@ class Session:
     def hears(self, key: str, room: int) -> Ear:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
+
+    def hears_anybody(self, key: str) -> Ear:
+        """Hear a key on which others may say as much as they like.
+
+        Where too much waits, the oldest of it is lost: to wait for room would keep the whole session from hearing anything.
+        """
+        return Ear(self._session.declare_subscriber(key, zenoh.handlers.RingChannel(_WAITING_FOR_ALL)))
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""

@@ -15,7 +15,8 @@ import msgspec
 
 from netem.core.plain import located, plainly
 from netem.faults.control import Answer, Order
-from netem.wire.arrays import Packed, WireError
+from netem.wire.arrays import Packed
+from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
 
@@ -248,5 +249,7 @@ def _read(kind: Any, name: str, data: bytes, root: str = "$") -> Any:
         return _decoder(kind).decode(data)
     except msgspec.ValidationError as error:
         raise WireError(f"{name}: {located(error, root)} (see docs/protocol.md)") from error
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+    except RecursionError as error:
+        raise WireError(f"{name}: it nests too deep (see docs/protocol.md)", Wrong.DEEP) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise WireError(f"{name}: not MessagePack: {error} (see docs/protocol.md)") from error

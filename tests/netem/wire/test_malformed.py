@@ -9,10 +9,11 @@ from agents.arrivals import Arrivals
 from netem.core.links import Links
 from netem.core.plain import shown
 from netem.wire import messages
-from netem.wire.arrays import Form, WireError
+from netem.wire.arrays import Form
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.keys import Keys
 from netem.wire.sequence import UninstructedLoss
+from netem.wire.wrong import WireError
 from world.acts import Acts
 
 KEYS = Keys("r1")

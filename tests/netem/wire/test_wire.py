@@ -27,8 +27,9 @@ from netem.impairments.delay import DelayLaw
 from netem.loading.choice import Choice
 from netem.process import MediumBrief
 from netem.wire import messages
-from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, WireError, channel_rows, numbers, packed
+from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, channel_rows, numbers, packed
 from netem.wire.session import Login
+from netem.wire.wrong import WireError
 
 SIGHTED = messages.Sighted(position=packed([1.5, 2.0]), done=True, by=0, method=1)
 
