@@ -173,7 +173,7 @@ class MediumNode:
         self._reader = Broadcasts(keys, agents, self._spoken, payloads)
         self._numbers = Numbering()
         self._sense = session.hears(keys.sense, 16)
-        self._broadcasts = session.hears_anybody(keys.broadcast("*", "*"))
+        self._broadcasts = session.hears_anybody(keys.broadcast("*", "*"), len(self._voices))
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
         self._inboxes = {agent: session.says(keys.inbox(agent)) for agent in agents}
@@ -314,13 +314,13 @@ class MediumNode:
         somebody_lies = bool(decided.relayed.conditions.liars)
         while self._awaited:
             arrived = self._broadcasts.next()
-            key, data = arrived.key, arrived.data
-            speaker = self._reader.speaker(key)
-            broadcast = self._intake.take(speaker, key, data, tick, self._awaited, self._reader.read)
+            broadcast = self._intake.take(arrived, tick, self._awaited, self._reader)
             if broadcast is None:
                 continue
             self._awaited.remove((broadcast.src, broadcast.channel))
-            said[broadcast.src, broadcast.channel] = self._as_told(broadcast, data) if somebody_lies else data
+            said[broadcast.src, broadcast.channel] = (
+                self._as_told(broadcast, arrived.data) if somebody_lies else arrived.data
+            )
         self._relay.keep(tick, said)
         self._supervisor.works(tick)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,7 +95,7 @@ class Acts:
         before, self._heard[act.src] = self._heard[act.src], act.heard
         return self._handed[act.src - 1] - (act.heard - before)
 
-    def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> messages.Act:
+    def read(self, key: str, data: bytes, tick: int, awaited: Container[int]) -> messages.Act:
         """The act that came on a key.
 
         Parameters

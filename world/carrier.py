@@ -72,7 +72,7 @@ class ZenohCarrier:
         supervisor.counts(lambda: self._intake.refused)
         dimension = world.formation.dimension
         self._reader = Acts(keys, world.links, dimension, brief.reports, brief.trust.foreign, brief.limit)
-        self._acts = session.hears_anybody(keys.act("*"))
+        self._acts = session.hears_anybody(keys.act("*"), world.links.agents)
         self._verdicts = Sequences("the medium's")
         self._journal = session.hears(keys.journal, 64)
         self._sense = session.says(keys.sense)
@@ -185,11 +185,7 @@ class ZenohCarrier:
         self._supervisor.waits(tick, "its act", self._idle)
         acts = {}
         while self._awaited:
-            arrived = self._acts.next()
-            key = arrived.key
-            act = self._intake.take(
-                self._reader.speaker(key), key, arrived.data, tick, self._awaited, self._reader.read
-            )
+            act = self._intake.take(self._acts.next(), tick, self._awaited, self._reader)
             if act is not None:
                 self._awaited.remove(act.src)
                 acts[act.src] = act

@@ -83,10 +83,10 @@ class Outcome:
 
     @property
     def says(self) -> str:
-        """The verdict in words; of one that was reached although messages were dropped, how many."""
-        dropped = sum(one["count"] for one in self.refused)
+        """The verdict in words; of one that was reached although messages were wrong, how many."""
+        refused = sum(one["count"] for one in self.refused)
         return (
-            f"{self.verdict}, {dropped} wrong messages dropped" if dropped and self.verdict != "fail" else self.verdict
+            f"{self.verdict}, {refused} wrong messages refused" if refused and self.verdict != "fail" else self.verdict
         )
 
     def failing(self, reason: str) -> Outcome:

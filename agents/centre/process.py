@@ -59,7 +59,9 @@ class CentreNode:
         self._supervisor, self._swarm, self._centre = supervisor, brief.swarm, centre
         keys, self._agents = Keys(brief.run), range(1, brief.swarm.agents + 1)
         heard = (MEASUREMENT, INPUT)
-        self._ears = {channel: session.hears_anybody(keys.broadcast("*", channel)) for channel in heard}
+        self._ears = {
+            channel: session.hears_anybody(keys.broadcast("*", channel), brief.swarm.agents) for channel in heard
+        }
         self._told = {agent: session.says(keys.told(agent)) for agent in self._agents}
         self._intake, self._numbers = Intake(brief.trust), Numbering()
         supervisor.counts(lambda: self._intake.refused)
@@ -97,11 +99,7 @@ class CentreNode:
         self._supervisor.waits(tick, "what it broadcasts", partial(_silent, self._agents, said))
         awaited = {(agent, channel) for agent in self._agents}
         while awaited:
-            arrived = self._ears[channel].next()
-            key = arrived.key
-            broadcast = self._intake.take(
-                self._reader.speaker(key), key, arrived.data, tick, awaited, self._reader.read
-            )
+            broadcast = self._intake.take(self._ears[channel].next(), tick, awaited, self._reader)
             if broadcast is not None:
                 awaited.remove((broadcast.src, channel))
                 said[broadcast.src] = broadcast.payload

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from types import TracebackType
 from typing import Any
 
 import zenoh
 
 _WAITING_CHANGES = 4
-_WAITING_FOR_ALL = 1 << 16  # far more than a tick of a thousand agents; each costs what its message does
+_LEAST_ROOM, _TICKS = 1024, 4  # for messages of those who may flood
 
 
 class NotCarried(RuntimeError):
@@ -23,12 +24,17 @@ class Arrived:
     def __init__(self, sample: zenoh.Sample) -> None:
         self._sample = sample
 
-    @property
+    @cached_property
     def key(self) -> str:
         """The key."""
         return str(self._sample.key_expr)
 
     @property
+    def size(self) -> int:
+        """How many bytes there are; nothing is copied for it."""
+        return len(self._sample.payload)
+
+    @cached_property
     def data(self) -> bytes:
         """The bytes."""
         return self._sample.payload.to_bytes()
@@ -138,12 +144,13 @@ class Session:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
 
-    def hears_anybody(self, key: str) -> Ear:
-        """Hear a key on which others may say as much as they like.
+    def hears_anybody(self, key: str, in_a_tick: int) -> Ear:
+        """Hear a key on which others may say as much as they like, and are to say so many messages in a tick.
 
-        Where too much waits, the oldest of it is lost: to wait for room would keep the whole session from hearing anything.
+        Of far more that wait, the oldest are lost: to wait for room would keep the whole session from hearing anything at all.
         """
-        return Ear(self._session.declare_subscriber(key, zenoh.handlers.RingChannel(_WAITING_FOR_ALL)))
+        room = max(_LEAST_ROOM, _TICKS * in_a_tick)
+        return Ear(self._session.declare_subscriber(key, zenoh.handlers.RingChannel(room)))
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""

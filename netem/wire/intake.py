@@ -7,14 +7,15 @@ message its reader says (`WireError`); sizes and numbers are looked at here, bef
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Container
+from collections.abc import Container
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 Policy = Literal["fail", "drop"]
 
 
@@ -48,6 +49,32 @@ class Refusals(NamedTuple):
     number: int
 
 
+class Came(Protocol):
+    """A message as it came."""
+
+    @property
+    def key(self) -> str:
+        """On which key."""
+
+    @property
+    def size(self) -> int:
+        """How many bytes there are."""
+
+    @property
+    def data(self) -> bytes:
+        """The bytes."""
+
+
+class Reader(Protocol[T_co]):
+    """Reads the messages of one kind."""
+
+    def speaker(self, key: str) -> int:
+        """Whose key it is."""
+
+    def read(self, key: str, data: bytes, tick: int, awaited: Container[Any]) -> T_co:
+        """What came in a tick in which so much is awaited; a `WireError` or an `UninstructedLoss` where it is wrong."""
+
+
 class Intake:
     """What a subscriber takes from agents.
 
@@ -72,37 +99,34 @@ class Intake:
         """Count what is wrong, and no reason to refuse anything."""
         self._refused[agent, wrong] += count
 
-    def take(
-        self, agent: int, key: str, data: bytes, tick: int, awaited: Container[Any], read: Callable[..., T]
-    ) -> T | None:
-        """What came, as `read` reads it; None where it is wrong, and is dropped.
+    def take(self, arrived: Came, tick: int, awaited: Container[Any], reader: Reader[T]) -> T | None:
+        """What came, as it is read; None where it is wrong, and is dropped.
 
         Parameters
         ----------
-        agent
-            Whose key it came on.
-        key, data
+        arrived
             As it came.
         tick, awaited
             In which the subscriber is, and what is to come.
-        read
-            Reads the bytes of a key in a tick in which so much is awaited.
+        reader
+            Who reads it.
 
         Raises
         ------
         WireError, UninstructedLoss
             When it is wrong, and that fails the run.
         """
+        agent = reader.speaker(arrived.key)
         try:
-            self._admit(agent, key, len(data), tick)
-            return read(key, data, tick, awaited)
+            self._admit(agent, arrived, tick)
+            return reader.read(arrived.key, arrived.data, tick, awaited)
         except (WireError, UninstructedLoss) as error:
             self.note(agent, error.wrong)
             if self._trust.wrong_messages == "fail":
                 raise
             return None
 
-    def _admit(self, agent: int, key: str, size: int, tick: int) -> None:
+    def _admit(self, agent: int, arrived: Came, tick: int) -> None:
         if tick != self._tick:
             self._tick = tick
             self._came.clear()
@@ -111,6 +135,6 @@ class Intake:
         if came > trust.messages_per_tick:
             says = f"more than {trust.messages_per_tick} messages in tick {tick} (trust.messages_per_tick)"
             raise WireError(f"agent {agent}: {says}", Wrong.FLOOD)
-        if size > trust.largest_message:
-            says = f"{size} bytes on '{key}', at most {trust.largest_message} are taken (trust.largest_message)"
+        if (size := arrived.size) > trust.largest_message:
+            says = f"{size} bytes on {arrived.key!r}, at most {trust.largest_message} are taken (trust.largest_message)"
             raise WireError(f"agent {agent}: {says}", Wrong.OVERSIZED)
