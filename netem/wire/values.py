@@ -16,9 +16,8 @@ from netem.core.plain import shown
 from netem.wire.wrong import WireError, Wrong
 
 LARGEST = 1e150  # its square is a number
-FASTEST = (
-    1e6  # of an input, where the scenario sets no `agents.limit`: five times the speed of the fastest probe, in m/s
-)
+# Of an input, in m/s or m/s2, where the scenario sets no `agents.limit`: 100 km/s, or 10,000 g.
+FASTEST = 1e5
 _ROUNDING = 1e-9
 
 
