@@ -50,6 +50,8 @@ class Inboxes:
         if not due:
             wrong = Wrong.PAST if inbox.k < self._tick else Wrong.FUTURE if inbox.k > self._tick else Wrong.REPEATED
             raise WireError(f"{self._whose}: it is of tick {inbox.k}, after one of tick {self._tick}", wrong)
+        if isinstance(inbox, messages.ExchangeInbox) and any(not 0 <= said.k <= inbox.k for said in inbox.messages):
+            raise WireError(f"{self._whose}: it has what is said in a future tick, or in none", Wrong.FUTURE)
         if not self._neighbours.issuperset(whom):
             strangers = sorted({*whom} - self._neighbours)
             raise WireError(f"{self._whose}: it has no neighbours {strangers} (see docs/protocol.md)", Wrong.SHAPE)

@@ -6,6 +6,7 @@ changes it.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ from netem.wire.keys import Keys
 from netem.wire.payloads import Payloads
 from netem.wire.senses import Senses
 from netem.wire.sequence import Numbering
-from netem.wire.session import HUB, WORLD, Login, hub
+from netem.wire.session import HUB, HUB_ENVIRONMENT, WORLD, Login, hub
 from netem.wire.wrong import WireError
 
 if TYPE_CHECKING:
@@ -382,6 +383,7 @@ def _rows(data: bytes, count: int, which: Integers) -> tuple[bytes, int]:
 
 def main() -> None:
     """Run the medium until the run is over."""
+    os.environ |= HUB_ENVIRONMENT
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     config = hub(brief.login, brief.dictionary_file, Keys(brief.run), range(1, brief.links.agents + 1), brief.hosts)

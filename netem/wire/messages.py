@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 
@@ -19,6 +19,8 @@ from netem.wire.arrays import Packed
 from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
+
+_Small = Annotated[int, msgspec.Meta(ge=-(2**31), lt=2**31)]  # that stands in an array
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,8 +35,8 @@ class Sighted(_Message, frozen=True, kw_only=True):
 
     position: bytes
     done: bool
-    by: int
-    method: int
+    by: _Small
+    method: _Small
 
 
 class Sense(_Message, frozen=True, kw_only=True):
@@ -81,7 +83,7 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     k: int
     src: str
     seq: int
-    clock: int
+    clock: _Small
     neighbours: list[int]
     measured: bytes
     position: bytes | None

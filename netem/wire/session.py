@@ -21,9 +21,20 @@ WORLD = "world"
 CONTROL = "control"
 CENTRE = "centre"
 
+
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
-_RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
-ENVIRONMENT = {"ZENOH_RUNTIME": f"({_RUNTIME}, app: (worker_threads: 1))", "OPENBLAS_NUM_THREADS": "1"}
+def _threads(own: str) -> str:
+    parts = (
+        (part, "worker_threads: 1" if part in ("app", own) else "handover: app")
+        for part in ("rx", "tx", "acc", "net", "app")
+    )
+    return f"({', '.join(f'{part}: ({where})' for part, where in parts)})"
+
+
+ENVIRONMENT = {"ZENOH_RUNTIME": _threads(own="app"), "OPENBLAS_NUM_THREADS": "1"}
+# The hub passes on what it receives while it receives: as one thread it would wait for itself as soon as more is to be sent on
+# than its queue holds, like a message of a mebibyte.
+HUB_ENVIRONMENT = {"ZENOH_RUNTIME": _threads(own="rx")}
 
 _PRIORITIES = (
     "control",
