@@ -98,18 +98,23 @@ def read(path: Path, schema: Any) -> Any:
     Raises
     ------
     TableError
-        When there is none, or it has other columns.
+        When there is none, or it has other columns, or is damaged.
     """
     try:
         stream = pa.ipc.open_stream(pa.memory_map(str(path)))
-    except (OSError, pa.ArrowInvalid) as error:
+        has = stream.schema.names
+    except (OSError, pa.ArrowException, ValueError) as error:
         raise TableError(f"{path}: no such table: {error}") from error
-    if stream.schema.names != schema.names:
-        raise TableError(f"{path}: its columns are {stream.schema.names}, not {schema.names}")
+    if not stream.schema.equals(schema):
+        raise TableError(f"{path}: its columns are {has}, not {schema.names}, or of other types")
     batches, note = [], None
-    for batch, beside in _batches(stream):
-        batches.append(batch)
-        note = beside or note
+    try:
+        for batch, beside in _batches(stream):
+            batch.validate(full=True)  # what reads it later would believe every length and place in it
+            batches.append(batch)
+            note = beside or note
+    except (pa.ArrowException, MemoryError, ValueError) as error:
+        raise TableError(f"{path}: it is damaged: {error}") from error
     return pa.Table.from_batches(batches, schema=stream.schema).replace_schema_metadata(note)
 
 

@@ -20,7 +20,7 @@ from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
 
-_Small = Annotated[int, msgspec.Meta(ge=-(2**31), lt=2**31)]  # that stands in an array
+_Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # that is to stand in an array
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,8 +35,8 @@ class Sighted(_Message, frozen=True, kw_only=True):
 
     position: bytes
     done: bool
-    by: _Small
-    method: _Small
+    by: _Whole
+    method: _Whole
 
 
 class Sense(_Message, frozen=True, kw_only=True):
@@ -83,7 +83,7 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     k: int
     src: str
     seq: int
-    clock: _Small
+    clock: _Whole
     neighbours: list[int]
     measured: bytes
     position: bytes | None

@@ -246,6 +246,14 @@ class History:
             np.savez(unfinished, allow_pickle=False, **self.arrays())
 
 
+# What NumPy, and what it reads archives with, say of one that is not whole; an `OSError` of an open file is that of a place in
+# it that cannot be.
+_UNREADABLE = (
+    ValueError, TypeError, EOFError, MemoryError, NotImplementedError, RuntimeError, LookupError, SyntaxError, OSError,
+    BadZipFile, zlib.error,
+)  # fmt: skip
+
+
 class Damaged(ValueError):
     """What lies in a run directory is not what the run wrote: which file, what is wrong in it, and the way out.
 
@@ -275,15 +283,15 @@ def load(path: Path) -> Arrays:
     Damaged
         When they are not whole, or not those of a run any more.
     """
-    try:
-        with path.open("rb") as file:
+    with path.open("rb") as file:
+        try:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, NpzFile):
                 raise ValueError("it is one array, not an archive of them")
             arrays = dict(archive)
-        _refuse_other_forms(arrays)
-    except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, BadZipFile, zlib.error) as error:
-        raise Damaged(path, str(error)) from error
+            _refuse_other_forms(arrays)
+        except _UNREADABLE as error:
+            raise Damaged(path, str(error)) from error
     return arrays
 
 
