@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
+from affinet.verdicts.refused import by_sender
 from analysis.models.finding import Finding
 from netem.faults.control import Answer
 
@@ -220,7 +221,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
             ", ".join(f"{reason} {number}" for reason, number in messages["dropped"].items()) or "none",
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
-        *((f"wrong, of {who}", what) for who, what in _refused(outcome)),
+        *((f"wrong, of {who}", what) for who, what in by_sender(outcome.refused).items()),
         *(("fault", str(bite)) for bite in outcome.faults),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
@@ -231,15 +232,6 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console.print(table)
     for reason in outcome.reasons:
         console.print(_plain(reason), soft_wrap=True)
-
-
-def _refused(outcome: Outcome) -> Iterator[tuple[str, str]]:
-    """Of each agent whose messages were refused, how many, for what, and by whom."""
-    agents = dict.fromkeys(one["agent"] for one in outcome.refused)
-    for agent in agents:
-        of_agent = [one for one in outcome.refused if one["agent"] == agent]
-        said = ", ".join(f"{one['count']} {one['wrong']} ({one['by']})" for one in of_agent)
-        yield "the control login" if agent is None else f"agent {agent}", said
 
 
 def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:

@@ -19,6 +19,7 @@ from affinet.runtimes.inject import Access
 from affinet.runtimes.interruption import Interrupted, Interruption
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
+from affinet.verdicts.refused import in_words
 from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
 from agents.process import AgentBrief, HostBrief
@@ -110,11 +111,15 @@ class Launcher:
         try:
             self._launch()
         except (RunFailed, Interrupted) as failure:
-            self.flight.failure = str(failure)
+            self.flight.failure = "; ".join(filter(None, [str(failure), self._refusals()]))
             self.flight.user_code = isinstance(failure, UserCodeFailed)
         except OSError as error:
             self.flight.failure = f"the swarm could not be launched: {said(error)}"
         return self.flight
+
+    def _refusals(self) -> str:
+        """What was dropped, which may be why nothing moved any more."""
+        return in_words(self.flight.refused) if self._plan.scenario.trust.wrong_messages == "drop" else ""
 
     def _launch(self) -> None:
         logs = self._out / "logs"

@@ -1,7 +1,7 @@
 """An agent that flies as it should, but for what it says besides on its own keys in one tick, before what it should say.
 
-Names of mistakes (`hostile.catalogue`) to make are its arguments, "all" for all of them; "floods" for very many of one; "deaf" for
-an agent that reads no more.
+Names of mistakes (`hostile.catalogue`) to make are its arguments, "all" for all of them; "floods" for very many of one;
+"deaf" for an agent that reads no more.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Bytes that are wrong in whatever way, in every file that is read: each is taken, or refused in one line; nothing ever fails."""
+"""Bytes that are wrong in whatever way, in every file that is read: each is taken, or refused in one line."""
 
 import json
 import shutil

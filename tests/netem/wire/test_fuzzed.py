@@ -202,13 +202,12 @@ def fuzz(examples, each):
             data = mutations.packed(random, plain)
             try:
                 reads(data)
-            except (WireError, UninstructedLoss) as error:
-                assert len(str(error)) < 600, data
-            except BaseException as error:
+            except (WireError, UninstructedLoss):
+                continue
+            except Exception as error:
                 error.add_note(f"{kind}: {data[:200]!r}")
                 raise
-            else:
-                taken[kind] += 1
+            taken[kind] += 1
 
     any_bytes()
     return taken

@@ -1,4 +1,4 @@
-"""Each thing that a rogue agent may say on its own keys is refused, counted by its kind, and named by its agent; nothing is left of it."""
+"""Each thing that a rogue agent may say on its own keys is refused, counted by its kind, and named by its agent."""
 
 from types import SimpleNamespace
 
