@@ -32,7 +32,8 @@ class Broadcasts:
 
     def speaker(self, key: str) -> int:
         """Whose key it is."""
-        return int(key.rsplit("/", 3)[1])
+        speaking = self._speaking.get(key)
+        return int(key.rsplit("/", 3)[1]) if speaking is None else speaking[0]
 
     def restart(self, agent: int) -> None:
         """Expect the broadcasts of a new process."""
@@ -58,22 +59,25 @@ class Broadcasts:
         UninstructedLoss
             When one before it is missing.
         """
-        _, agent, _, channel = key.rsplit("/", 3)
-        whose = f"agent {agent} on {channel!r}"
         try:
             said = messages.unpack_relayed(data)
         except WireError as error:
-            raise WireError(f"{whose}: {error}", error.wrong) from error
+            raise WireError(f"{_whose(key)}: {error}", error.wrong) from error
         spoofed = self._speaking.get(key) != (said.src, said.channel)
         if spoofed or said.k != tick:
             raise WireError(
-                f"{whose} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
+                f"{_whose(key)} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
                 f"channels here are {', '.join(self._channels)} (see docs/protocol.md)",
                 Wrong.SPOOFED if spoofed else Wrong.PAST if said.k < tick else Wrong.FUTURE,
             )
         if (said.src, said.channel) not in awaited:
-            says = f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused"
+            says = f"{_whose(key)}: it speaks twice in tick {tick}, or while it is dead or paused"
             raise WireError(says, Wrong.REPEATED)
         self._payloads.check(said.src, said.channel, said.payload)
         self._streams.check(f"{said.src} {said.channel}", said.seq)
         return said
+
+
+def _whose(key: str) -> str:
+    _, agent, _, channel = key.rsplit("/", 3)
+    return f"agent {agent} on {channel!r}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from types import TracebackType
 from typing import Any
 
@@ -24,7 +23,7 @@ class Arrived:
     def __init__(self, sample: zenoh.Sample) -> None:
         self._sample = sample
 
-    @cached_property
+    @property
     def key(self) -> str:
         """The key."""
         return str(self._sample.key_expr)
@@ -34,7 +33,7 @@ class Arrived:
         """How many bytes there are; nothing is copied for it."""
         return len(self._sample.payload)
 
-    @cached_property
+    @property
     def data(self) -> bytes:
         """The bytes."""
         return self._sample.payload.to_bytes()
@@ -126,6 +125,7 @@ class Session:
     """
 
     def __init__(self, config: Mapping[str, Any]) -> None:
+        zenoh.try_init_log_from_env()  # RUST_LOG, for who looks into what Zenoh does
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:

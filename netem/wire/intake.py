@@ -87,7 +87,7 @@ class Intake:
     def __init__(self, trust: Trust) -> None:
         self._trust = trust
         self._tick = -1
-        self._came: Counter[int] = Counter()
+        self._came: dict[int, int] = {}
         self._refused: Counter[tuple[int | None, Wrong]] = Counter()
 
     @property
@@ -116,25 +116,26 @@ class Intake:
         WireError, UninstructedLoss
             When it is wrong, and that fails the run.
         """
-        agent = reader.speaker(arrived.key)
+        key = arrived.key
+        agent = reader.speaker(key)
         try:
-            self._admit(agent, arrived, tick)
-            return reader.read(arrived.key, arrived.data, tick, awaited)
+            self._admit(agent, key, arrived.size, tick)
+            return reader.read(key, arrived.data, tick, awaited)
         except (WireError, UninstructedLoss) as error:
             self.note(agent, error.wrong)
             if self._trust.wrong_messages == "fail":
                 raise
             return None
 
-    def _admit(self, agent: int, arrived: Came, tick: int) -> None:
+    def _admit(self, agent: int, key: str, size: int, tick: int) -> None:
         if tick != self._tick:
             self._tick = tick
             self._came.clear()
-        self._came[agent] = came = self._came[agent] + 1
+        self._came[agent] = came = self._came.get(agent, 0) + 1
         trust = self._trust
         if came > trust.messages_per_tick:
             says = f"more than {trust.messages_per_tick} messages in tick {tick} (trust.messages_per_tick)"
             raise WireError(f"agent {agent}: {says}", Wrong.FLOOD)
-        if (size := arrived.size) > trust.largest_message:
-            says = f"{size} bytes on {arrived.key!r}, at most {trust.largest_message} are taken (trust.largest_message)"
+        if size > trust.largest_message:
+            says = f"{size} bytes on {key!r}, at most {trust.largest_message} are taken (trust.largest_message)"
             raise WireError(f"agent {agent}: {says}", Wrong.OVERSIZED)

@@ -11,8 +11,6 @@ from netem.wire import values
 from netem.wire.arrays import FLOAT, WHOLE, Form, numbers
 from netem.wire.wrong import WireError, Wrong
 
-Fields = Mapping[str, Form]
-
 
 class Payloads:
     """What may stand in the broadcasts of a run.
@@ -31,12 +29,13 @@ class Payloads:
 
     def __init__(
         self,
-        forms: Mapping[str, Fields],
+        forms: Mapping[str, Mapping[str, Form]],
         neighbours: Mapping[int, frozenset[int]],
         dimension: int,
         foreign: frozenset[int],
     ) -> None:
         self._forms, self._neighbours, self._dimension, self._foreign = forms, neighbours, dimension, foreign
+        self._place = dimension * FLOAT.itemsize
 
     def check(self, agent: int, channel: str, payload: Mapping[str, Any]) -> None:
         """See that an agent says on a channel what belongs there.
@@ -46,37 +45,49 @@ class Payloads:
         WireError
             When it does not: in which field.
         """
-        whose = f"agent {agent} on {channel!r}"
-        if channel == MEASUREMENT:
-            self._check_measurement(agent, whose, payload)
-        else:
-            _check_fields(whose, payload, self._forms[channel], looking=agent in self._foreign)
+        if agent in self._foreign or not self._fits(agent, channel, payload):
+            self._look(agent, channel, payload)
 
-    def _check_measurement(self, agent: int, whose: str, payload: Mapping[str, Any]) -> None:
-        _refuse_other_names(whose, payload, ("neighbours", "measured"))
-        whom, measured = payload["neighbours"], payload["measured"]
-        if type(whom) is not list:
-            whom = numbers(whom, f"{whose}: 'neighbours'", (-1,), WHOLE).tolist()
-        if not ({*map(type, whom)} <= {int} and self._neighbours[agent].issuperset(whom) and len({*whom}) == len(whom)):
+    def _fits(self, agent: int, channel: str, payload: Mapping[str, Any]) -> bool:
+        """Whether it is as agents of ours say it, which is seen at once."""
+        if channel != MEASUREMENT:
+            forms = self._forms[channel]
+            return payload.keys() == forms.keys() and all([form.holds(payload[name]) for name, form in forms.items()])
+        if len(payload) != 2:
+            return False
+        whom, measured = payload.get("neighbours"), payload.get("measured")
+        return (
+            type(whom) is list
+            and self._are_neighbours(agent, whom)
+            and type(measured) is bytes
+            and len(measured) == len(whom) * self._place
+        )
+
+    def _are_neighbours(self, agent: int, whom: list[Any]) -> bool:
+        numbered = all([type(one) is int for one in whom])
+        return numbered and self._neighbours[agent].issuperset(whom) and len({*whom}) == len(whom)
+
+    def _look(self, agent: int, channel: str, payload: Mapping[str, Any]) -> None:
+        whose, forms = f"agent {agent} on {channel!r}", self._forms.get(channel, {})
+        if channel == MEASUREMENT:
+            _refuse_other_names(whose, payload, ("neighbours", "measured"))
+            forms = {
+                "measured": Form((self._measured(agent, whose, payload["neighbours"]), self._dimension), truths=False)
+            }
+        else:
+            _refuse_other_names(whose, payload, forms)
+        for name, form in forms.items():
+            array = numbers(payload[name], f"{whose}: {name!r}", form.shape, form.dtype)
+            if agent in self._foreign:
+                values.finite(array, f"{whose}: {name!r}")
+
+    def _measured(self, agent: int, whose: str, said: Any) -> int:
+        """How many neighbours it has measured."""
+        whom = said if type(said) is list else numbers(said, f"{whose}: 'neighbours'", (-1,), WHOLE).tolist()
+        if not self._are_neighbours(agent, whom):
             says = f"{whose}: 'neighbours': expected some of {sorted(self._neighbours[agent])}, got {shown(whom)}"
             raise WireError(f"{says} (see docs/protocol.md)", Wrong.SHAPE)
-        looking = agent in self._foreign
-        if looking or type(measured) is not bytes or len(measured) != len(whom) * self._dimension * FLOAT.itemsize:
-            _look(f"{whose}: 'measured'", measured, Form((len(whom), self._dimension), truths=False), looking=looking)
-
-
-def _check_fields(whose: str, payload: Mapping[str, Any], forms: Fields, *, looking: bool) -> None:
-    _refuse_other_names(whose, payload, forms)
-    for name, form in forms.items():
-        given = payload[name]
-        if looking or not form.holds(given):
-            _look(f"{whose}: {name!r}", given, form, looking=looking)
-
-
-def _look(whose: str, given: Any, form: Form, *, looking: bool) -> None:
-    array = numbers(given, whose, form.shape, form.dtype)
-    if looking:
-        values.finite(array, whose)
+        return len(whom)
 
 
 def _refuse_other_names(whose: str, payload: Mapping[str, Any], names: Collection[str]) -> None:
