@@ -125,7 +125,7 @@ class Session:
     """
 
     def __init__(self, config: Mapping[str, Any]) -> None:
-        zenoh.try_init_log_from_env()  # RUST_LOG, for who looks into what Zenoh does
+        zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # RUST_LOG, for who looks into what Zenoh does
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:

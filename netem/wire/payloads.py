@@ -52,7 +52,7 @@ class Payloads:
         """Whether it is as agents of ours say it, which is seen at once."""
         if channel != MEASUREMENT:
             forms = self._forms[channel]
-            return payload.keys() == forms.keys() and all([form.holds(payload[name]) for name, form in forms.items()])
+            return payload.keys() == forms.keys() and all(form.holds(payload[name]) for name, form in forms.items())
         if len(payload) != 2:
             return False
         whom, measured = payload.get("neighbours"), payload.get("measured")
@@ -64,7 +64,7 @@ class Payloads:
         )
 
     def _are_neighbours(self, agent: int, whom: list[Any]) -> bool:
-        numbered = all([type(one) is int for one in whom])
+        numbered = all(type(one) is int for one in whom)
         return numbered and self._neighbours[agent].issuperset(whom) and len({*whom}) == len(whom)
 
     def _look(self, agent: int, channel: str, payload: Mapping[str, Any]) -> None:
