@@ -23,18 +23,11 @@ CENTRE = "centre"
 
 
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
-def _threads(own: str) -> str:
-    parts = (
-        (part, "worker_threads: 1" if part in ("app", own) else "handover: app")
-        for part in ("rx", "tx", "acc", "net", "app")
-    )
-    return f"({', '.join(f'{part}: ({where})' for part, where in parts)})"
-
-
-ENVIRONMENT = {"ZENOH_RUNTIME": _threads(own="app"), "OPENBLAS_NUM_THREADS": "1"}
+_RUNTIME = "tx: (handover: app), acc: (handover: app), net: (handover: app), app: (worker_threads: 1)"
+ENVIRONMENT = {"ZENOH_RUNTIME": f"(rx: (handover: app), {_RUNTIME})", "OPENBLAS_NUM_THREADS": "1"}
 # The hub passes on what it receives while it receives: as one thread it would wait for itself as soon as more is to be sent on
 # than its queue holds, like a message of a mebibyte.
-HUB_ENVIRONMENT = {"ZENOH_RUNTIME": _threads(own="rx")}
+HUB_ENVIRONMENT = {"ZENOH_RUNTIME": f"(rx: (worker_threads: 1), {_RUNTIME})"}
 
 _PRIORITIES = (
     "control",
