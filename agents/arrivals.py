@@ -12,7 +12,8 @@ from agents.exchange import Channels, Heard
 from analysis.models.arrays import Array, Mask
 from analysis.models.pursuit import Sighting
 from netem.wire import messages
-from netem.wire.arrays import Form, WireError, channel_rows, numbers
+from netem.wire.arrays import Form, channel_rows, numbers
+from netem.wire.wrong import WireError
 
 
 class Sensed(NamedTuple):

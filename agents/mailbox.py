@@ -6,13 +6,65 @@ from typing import Any
 
 from netem.core import channels
 from netem.wire import messages
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Arrived, Session, Voice
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
 from netem.wire.session import LARGEST
+from netem.wire.wrong import WireError, Wrong
 
 _WAITING = 4096  # messages that may wait
+
+
+class Inboxes:
+    """Reads what the medium tells an agent: what it sensed, what was exchanged in the same tick, and so on, until the end.
+
+    Parameters
+    ----------
+    agent, neighbours
+        Whose they are, and the numbers of the agents in its neighbour slots.
+    in_real_time
+        Whether exchanges come as messages do, and it may begin with any inbox.
+    """
+
+    def __init__(self, agent: int, neighbours: tuple[int, ...], *, in_real_time: bool = False) -> None:
+        self._whose, self._neighbours = f"agent {agent}: its inbox", frozenset(neighbours)
+        self._in_real_time = in_real_time
+        self._numbers = Sequences("the medium's", from_any=in_real_time)
+        self._tick, self._sensed = -1, False
+
+    def read(self, data: bytes) -> messages.Inbox:
+        """What came.
+
+        Raises
+        ------
+        WireError
+            When it is no inbox, or not the one that is due, or of others than its neighbours.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        inbox = messages.unpack_inbox(data)
+        self._numbers.check("inbox", inbox.seq)
+        match inbox:
+            case messages.SenseInbox():
+                due = inbox.k > self._tick and (self._in_real_time or not self._sensed)
+                whom = inbox.neighbours
+            case messages.ExchangeInbox():
+                at_its_time = inbox.k >= self._tick if self._in_real_time else self._sensed and inbox.k == self._tick
+                due, whom = at_its_time, [said.src for said in inbox.messages]
+            case messages.EndInbox():
+                return inbox
+        if not due:
+            wrong = Wrong.PAST if inbox.k < self._tick else Wrong.FUTURE if inbox.k > self._tick else Wrong.REPEATED
+            raise WireError(f"{self._whose}: it is of tick {inbox.k}, after one of tick {self._tick}", wrong)
+        if isinstance(inbox, messages.ExchangeInbox) and any(not 0 <= said.k <= inbox.k for said in inbox.messages):
+            raise WireError(f"{self._whose}: it has what is said in a future tick, or in none", Wrong.FUTURE)
+        if not self._neighbours.issuperset(whom):
+            strangers = sorted({*whom} - self._neighbours)
+            raise WireError(f"{self._whose}: it has no neighbours {strangers} (see docs/protocol.md)", Wrong.SHAPE)
+        self._sensed = isinstance(inbox, messages.SenseInbox)
+        if self._sensed or not self._in_real_time:
+            self._tick = inbox.k
+        return inbox
 
 
 class Mailbox:
@@ -28,8 +80,8 @@ class Mailbox:
         The channels on which it broadcasts arrays; measurements are broadcast too.
     hears_centre
         Whether a centre tells it its edges.
-    joins_late
-        Whether it may miss what the medium tells it at first: in real time nobody waits for it to listen.
+    in_real_time
+        Whether nobody waits for it: it may miss what the medium tells it at first, and hears as messages come.
     """
 
     def __init__(
@@ -41,10 +93,10 @@ class Mailbox:
         spoken: list[str],
         *,
         hears_centre: bool,
-        joins_late: bool = False,
+        in_real_time: bool = False,
     ) -> None:
         keys = Keys(run)
-        self.agent, self.neighbours, self._joins_late = agent, neighbours, joins_late
+        self.agent, self.neighbours, self._in_real_time = agent, neighbours, in_real_time
         self.begin()
         self._inbox = session.hears(keys.inbox(agent), _WAITING)
         self._told = session.hears(keys.told(agent), _WAITING) if hears_centre else None
@@ -55,7 +107,7 @@ class Mailbox:
         """Nothing was said or heard: the agent is new."""
         self.heard = 0
         self._numbers = Numbering()
-        self._inboxes = Sequences("the medium's", from_any=self._joins_late)
+        self._inboxes = Inboxes(self.agent, self.neighbours, in_real_time=self._in_real_time)
         self._tellings = Sequences("the centre's")
 
     @property
@@ -69,7 +121,7 @@ class Mailbox:
         Raises
         ------
         WireError
-            When it is no inbox.
+            When it is no inbox, or not the one that is due, or of others than its neighbours.
         UninstructedLoss
             When one before it is missing.
         """
@@ -86,8 +138,7 @@ class Mailbox:
         return [self._read(arrived) for arrived in self._inbox.waiting()]
 
     def _read(self, arrived: Arrived) -> messages.Inbox:
-        inbox = messages.unpack_inbox(arrived.data)
-        self._inboxes.check("inbox", inbox.seq)
+        inbox = self._inboxes.read(arrived.data)
         if isinstance(inbox, messages.ExchangeInbox):
             self.heard += len(inbox.messages)
         return inbox

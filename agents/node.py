@@ -25,10 +25,11 @@ from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
 from netem.wire.arrays import TRUTH, packed
-from netem.wire.carrier import Arrived, Ear, Session, await_heard
+from netem.wire.carrier import Ear, Session, await_heard
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
 from netem.wire.session import CENTRE, HUB, Login
+from netem.wire.wrong import WireError, Wrong
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class AgentsNode:
         briefs: Sequence[AgentBrief],
         host: int | None = None,
         *,
-        joins_late: bool = False,
+        in_real_time: bool = False,
     ) -> None:
         """Nothing is said yet.
 
@@ -106,8 +107,8 @@ class AgentsNode:
             What each of the agents is told.
         host
             Which of the run's hosts this is; None of an agent that has its process to itself.
-        joins_late
-            Whether they may miss what the medium tells them at first.
+        in_real_time
+            Whether nobody waits for them.
         """
         first, brief = briefs[0], together([one.brief for one in briefs])
         self._supervisor = supervisor
@@ -133,12 +134,14 @@ class AgentsNode:
                 one.neighbours,
                 sorted(self._forms),
                 hears_centre=one.hears_centre,
-                joins_late=joins_late,
+                in_real_time=in_real_time,
             )
             for one in briefs
         }
         self._hears_centre = first.hears_centre
-        self._roster = None if host is None else Roster(session.hears(Keys(first.run).roster(host), 256))
+        self._roster = (
+            None if host is None else Roster(session.hears(Keys(first.run).roster(host), 256), self._mailboxes)
+        )
 
     def _begun(self, first: AgentBrief) -> AgentState:
         fresh = self._agents.init(self._numbers.shape)
@@ -267,18 +270,31 @@ class AgentsNode:
 class Roster:
     """Who of a host's agents takes part in each tick, as the medium calls it."""
 
-    def __init__(self, ear: Ear) -> None:
-        self._ear, self._calls = ear, Sequences("the medium's")
+    def __init__(self, ear: Ear, agents: Collection[int]) -> None:
+        self._ear, self._agents, self._calls = ear, frozenset(agents), Sequences("the medium's")
 
     def next(self) -> messages.Roster:
         """Wait for the next tick."""
-        return self._read(self._ear.next())
+        return self.read(self._ear.next().data)
 
     def waiting(self) -> list[messages.Roster]:
         """Those that have come."""
-        return [self._read(arrived) for arrived in self._ear.waiting()]
+        return [self.read(arrived.data) for arrived in self._ear.waiting()]
 
-    def _read(self, arrived: Arrived) -> messages.Roster:
-        called = messages.unpack(messages.Roster, arrived.data)
+    def read(self, data: bytes) -> messages.Roster:
+        """What came.
+
+        Raises
+        ------
+        WireError
+            When it is something else, or calls agents that are none of this host's.
+        UninstructedLoss
+            When one before it is missing.
+        """
+        called = messages.unpack(messages.Roster, data)
         self._calls.check("roster", called.seq)
+        if not self._agents.issuperset([*called.awake, *called.restarted, *called.remembering]):
+            raise WireError(
+                "the medium: Roster: it calls agents that are none of this host's (see docs/protocol.md)", Wrong.SHAPE
+            )
         return called

@@ -16,9 +16,9 @@ from netem.processes.supervised import Supervisor
 from netem.processes.user_code import UserCodeError
 from netem.processes.wall_time import WallTime, be_prompt
 from netem.wire import messages
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Session
 from netem.wire.session import HUB
+from netem.wire.wrong import WireError
 
 
 class Moment(NamedTuple):
@@ -35,7 +35,7 @@ class RealTimeAgentsNode(AgentsNode):
     def __init__(
         self, session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None = None
     ) -> None:
-        super().__init__(session, supervisor, briefs, host, joins_late=True)
+        super().__init__(session, supervisor, briefs, host, in_real_time=True)
         first = briefs[0]
         assert first.timer is not None, "of a run in real time"
         self._timer = first.timer

@@ -12,6 +12,7 @@ from netem.faults.fault import Fault
 from netem.faults.trigger import Trigger
 from netem.impairments.profile import Profile
 from netem.wire.arrays import Form
+from netem.wire.intake import Trust
 from netem.wire.session import Login
 
 
@@ -31,12 +32,14 @@ class MediumBrief:
         Faults that an earlier run was given while it flew.
     recorded
         The journal of an earlier run that is to be judge of this one.
-    forms
-        What the fields of each channel hold that agents look into.
+    dimension, forms
+        D, and what the fields of each channel hold that agents look into.
     positioned
         Agents that have positioning, shape (N,).
     hosts
         For each process that carries several agents, which.
+    trust
+        What is taken from agents.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
     pace
@@ -54,9 +57,11 @@ class MediumBrief:
     triggers: tuple[Trigger, ...]
     injected: tuple[Fault, ...]
     recorded: str | None
+    dimension: int
     forms: Mapping[str, Mapping[str, Form]]
     positioned: Mask
     hosts: Mapping[int, tuple[int, ...]]
+    trust: Trust
     journal: str
     batch: int
     pace: Pace | None

@@ -77,12 +77,13 @@ class LockstepNode:
         self._supervisor, self._written, self._links = supervisor, journal, brief.links
         self._relay = Relay[Spoken](medium_of(brief))
         self._ports = MediumPorts(session, brief, self._relay)
+        supervisor.counts(lambda: self._ports.intake.refused)
         self._channels = len(brief.channels)
         self._agents = np.arange(1, brief.links.agents + 2)
         self._voices = [(agent, name) for agent in self._agents[:-1].tolist() for name in brief.channels]
         self._awaited: set[tuple[int, str]] = set()
         self._sense = session.hears(keys.sense, 16)
-        self._broadcasts = session.hears(keys.broadcast("*", "*"), 4096)
+        self._broadcasts = session.hears_anybody(keys.broadcast("*", "*"), len(self._voices))
 
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
@@ -94,7 +95,7 @@ class LockstepNode:
         tick = 0
         while True:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
-            sense = self._ports.sense(self._sense.next().data)
+            sense = self._ports.sense(self._sense.next().data, tick)
             self._supervisor.works(sense.k)
             self._ports.refuse_strangers()
             if sense.last:
@@ -146,10 +147,13 @@ class LockstepNode:
         somebody_lies = bool(decided.relayed.conditions.liars)
         while self._awaited:
             arrived = self._broadcasts.next()
-            data = arrived.data
-            broadcast = self._ports.reader.read(arrived.key, data, tick, self._awaited)
+            broadcast = self._ports.intake.take(arrived, tick, self._awaited, self._ports.reader)
+            if broadcast is None:
+                continue
             self._awaited.remove((broadcast.src, broadcast.channel))
-            said[broadcast.src, broadcast.channel] = self._ports.as_told(broadcast, data) if somebody_lies else data
+            said[broadcast.src, broadcast.channel] = (
+                self._ports.as_told(broadcast, arrived.data) if somebody_lies else arrived.data
+            )
         self._relay.keep(tick, said)
         self._supervisor.works(tick)
 

@@ -21,12 +21,16 @@ from netem.medium.in_flight import Entry
 from netem.medium.medium import Medium, recorded
 from netem.medium.relay import FaultedRelay
 from netem.wire import messages
-from netem.wire.arrays import CODE, WHOLE, WireError, channel_rows, numbers, packed
+from netem.wire.arrays import CODE, WHOLE, channel_rows, numbers, packed
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
+from netem.wire.intake import Intake
 from netem.wire.keys import Keys
-from netem.wire.sequence import Numbering, Sequences
+from netem.wire.payloads import Payloads
+from netem.wire.senses import Senses
+from netem.wire.sequence import Numbering
 from netem.wire.session import HUB, clients
+from netem.wire.wrong import WireError
 
 
 class Seen(NamedTuple):
@@ -48,8 +52,11 @@ class MediumPorts:
         self._links = brief.links
         self._ends = np.concatenate([[0], np.cumsum(brief.links.degree)])
         self.spoken = [name for name in brief.channels if name != channels.SENSE]
-        self.reader = Broadcasts(keys, agents, self.spoken)
-        self._from_world = Sequences("world")
+        self.intake = Intake(brief.trust)
+        neighbours = {agent: frozenset(brief.links.neighbours_of(agent)) for agent in agents}
+        payloads = Payloads(brief.forms, neighbours, brief.dimension, brief.trust.foreign)
+        self.reader = Broadcasts(keys, agents, self.spoken, payloads, in_real_time=brief.pace is not None)
+        self._senses = Senses(len(brief.links), brief.links.agents, brief.dimension)
         self._numbers = Numbering()
         self._journal = session.says(keys.journal)
         self._control = session.answers(keys.control, 16)
@@ -63,8 +70,8 @@ class MediumPorts:
         """Wait until all agents and the world listen."""
         await_heard([*self._inboxes.values(), *self._rosters.values(), self._journal])
 
-    def sense(self, data: bytes) -> messages.Sense:
-        """What the world senses.
+    def sense(self, data: bytes, tick: int) -> messages.Sense:
+        """What the world senses in a tick.
 
         Raises
         ------
@@ -73,9 +80,7 @@ class MediumPorts:
         UninstructedLoss
             When something before it is missing.
         """
-        sense = messages.unpack(messages.Sense, data)
-        self._from_world.check("sense", sense.seq)
-        return sense
+        return self._senses.read(data, tick)
 
     def where(self, sense: messages.Sense) -> Array:
         """The agents' positions, shape (N, D), in metres."""
@@ -93,6 +98,7 @@ class MediumPorts:
                 try:
                     order = messages.unpack(Order, question.data)
                 except WireError as error:
+                    self.intake.note(None, error.wrong)
                     question.refuse(str(error))
                     continue
                 question.answer(messages.pack(self._relay.obey(order, tick)))

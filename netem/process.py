@@ -5,6 +5,7 @@ It reads, lets a relay decide, and writes, the journal too.
 
 from __future__ import annotations
 
+import os
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from netem.real_time import RealTimeNode
 from netem.wire.carrier import Session
 from netem.wire.keys import Keys
 from netem.wire.repeating import opened
-from netem.wire.session import dictionary, hub
+from netem.wire.session import HUB_ENVIRONMENT, dictionary, hub
 
 
 def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
@@ -26,6 +27,8 @@ def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
 
 def main() -> None:
     """Run the medium until the run is over."""
+    os.environ |= HUB_ENVIRONMENT
+    os.environ |= HUB_ENVIRONMENT
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     with supervisor.confessing(), _listening(supervisor, brief) as session:

@@ -16,10 +16,10 @@ from netem.ports import MediumPorts, medium_of
 from netem.processes.supervised import Supervisor
 from netem.processes.wall_time import WallTime, be_prompt
 from netem.wire import messages
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Arrived, Session
 from netem.wire.keys import Keys
 from netem.wire.session import WORLD
+from netem.wire.wrong import WireError
 
 if TYPE_CHECKING:
     from netem.medium.deliveries import Deliveries
@@ -42,13 +42,14 @@ class RealTimeNode:
             medium_of(brief), brief.links, len(brief.channels), self._pace.dt, self._pace.grace
         )
         self._ports = MediumPorts(session, brief, self._relay)
+        supervisor.counts(lambda: self._ports.intake.refused)
         self._row = {name: row for row, name in enumerate(brief.channels)}
         self._ears = session.hears_all([self._keys.sense, self._keys.broadcast("*", "*")])
         self._deliveries = deliveries
         self._handed = [0] * brief.links.agents
         self._awake: frozenset[int] = frozenset()
         self._wall: WallTime | None = None
-        self._tick = self._told = 0
+        self._tick, self._told = -1, 0
         self._late = 0.0
         self._over = False
 
@@ -75,7 +76,7 @@ class RealTimeNode:
 
     def _take(self, arrived: Arrived) -> None:
         if arrived.key == self._keys.sense:
-            self._begin(self._ports.sense(arrived.data))
+            self._begin(self._ports.sense(arrived.data, self._tick + 1))
         else:
             self._hear(arrived)
 
@@ -103,7 +104,9 @@ class RealTimeNode:
         self._supervisor.waits(sense.k, "what it senses", lambda: (WORLD,))
 
     def _hear(self, arrived: Arrived) -> None:
-        said = self._ports.reader.read_when_it_comes(arrived.key, arrived.data, self._tick)
+        said = self._ports.intake.take(arrived, self._tick, (), self._ports.reader)
+        if said is None:
+            return
         lies = self._relay.lies(said.k, said.channel, said.src)
         data = self._ports.as_told(said, arrived.data) if lies else arrived.data
         self._relay.say(said.src, self._row[said.channel], said.k, said.at or 0.0, data)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from math import prod
+from collections.abc import Container, Mapping, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
-from netem.wire import messages
-from netem.wire.arrays import FLOAT, TRUTH, Form, WireError, joined, numbers, packed
+from netem.core.plain import shown
+from netem.wire import messages, values
+from netem.wire.arrays import Form, joined, numbers, packed
 from netem.wire.keys import Keys
 from netem.wire.sequence import Sequences
+from netem.wire.wrong import WireError, Wrong
 
 
 class Done(NamedTuple):
@@ -45,34 +47,62 @@ class Acts:
         Of the run.
     reports
         What estimators report beyond edges, by name, and the shape of each for one agent.
+    foreign, limit
+        Agents whose numbers are looked at too, because nobody knows the program that computes them; and the longest input.
+    in_real_time
+        Whether what was decided in an earlier tick may come; what is awaited, and what was handed out by now, does not matter
+        then.
     """
 
-    def __init__(self, keys: Keys, links: Links, dimension: int, reports: Mapping[str, tuple[int, ...]]) -> None:
+    def __init__(
+        self,
+        keys: Keys,
+        links: Links,
+        dimension: int,
+        reports: Mapping[str, tuple[int, ...]],
+        foreign: frozenset[int] = frozenset(),
+        limit: float | None = None,
+        *,
+        in_real_time: bool = False,
+    ) -> None:
+        self._in_real_time = in_real_time
         self._speaking = {keys.act(agent): agent for agent in range(1, links.agents + 1)}
-        self._degree = links.present.sum(axis=1).tolist()
         self._present = links.present
+        self._dimension, self._foreign, self._limit = dimension, foreign, limit
         self._input = Form((dimension,), truths=False)
-        # What an agent believes of an edge: the shape, what it holds, and how many bytes there are of each agent.
-        self._edges = {
-            name: (shape, dtype, [degree * prod(shape) * dtype.itemsize for degree in self._degree])
-            for name, shape, dtype in (
-                ("estimate", (dimension,), FLOAT),
-                ("known", (), TRUTH),
-                ("covariance", (dimension * (dimension + 1) // 2,), FLOAT),
-            )
-        }
+        edge = {"estimate": (dimension,), "known": (), "covariance": (dimension * (dimension + 1) // 2,)}
+        self._beliefs = [
+            {name: Form((degree, *shape), truths=name == "known") for name, shape in edge.items()}
+            for degree in links.present.sum(axis=1).tolist()
+        ]
         self._reports = {name: Form(shape, truths=False) for name, shape in reports.items()}
         self._unsaid = [packed(np.full(shape, np.nan)) for shape in reports.values()]
         self._streams = Sequences("agent")
         self._stream = {agent: f"{agent} act" for agent in self._speaking.values()}
-        fields = ("input", "reports", *self._edges)
+        fields = ("input", "reports", *edge)
         self._whose = {name: [f"agent {agent}: Act: {name}" for agent in self._stream] for name in fields}
+        self._heard = dict.fromkeys(self._stream, 0)
+        self._handed: Sequence[int] = [0] * links.agents
+
+    def speaker(self, key: str) -> int:
+        """Whose key it is."""
+        return self._speaking[key]
 
     def restart(self, agent: int) -> None:
         """Expect the acts of a new process."""
         self._streams.restart(self._stream[agent])
+        self._heard[agent] = 0
 
-    def read(self, key: str, data: bytes, tick: int, awaited: Iterable[int]) -> messages.Act:
+    def expect(self, handed: Sequence[int]) -> None:
+        """In this tick so many broadcasts were put into each agent's inbox, by what the medium says."""
+        self._handed = handed
+
+    def unheard(self, act: messages.Act) -> int:
+        """Of the broadcasts that it was handed in this tick, how many an agent says it has not heard; once for each act."""
+        before, self._heard[act.src] = self._heard[act.src], act.heard
+        return self._handed[act.src - 1] - (act.heard - before)
+
+    def read(self, key: str, data: bytes, tick: int, awaited: Container[int]) -> messages.Act:
         """The act that came on a key.
 
         Parameters
@@ -87,52 +117,74 @@ class Acts:
         Raises
         ------
         WireError
-            When it is none, or not one of this tick, or not of an agent whose act is `awaited`.
+            When it is none, or not one of this tick, or not of an agent whose act is `awaited`; or something else stands in a
+            field than belongs there.
         UninstructedLoss
             When one before it is missing.
         """
-        agent, act = self._unpacked(key, data)
-        if act.src != agent or act.k != tick or agent not in awaited:
-            raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
-        self._streams.check(self._stream[agent], act.seq)
-        return act
-
-    def read_when_it_comes(self, key: str, data: bytes, tick: int) -> messages.Act:
-        """The act that came on a key in this tick, in which or in an earlier one it was decided.
-
-        Raises
-        ------
-        WireError
-            When it is none, or one of a tick that is yet to come.
-        UninstructedLoss
-            When one before it is missing.
-        """
-        agent, act = self._unpacked(key, data)
-        if act.src != agent or not 0 <= act.k <= tick:
-            raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}")
-        self._streams.check(self._stream[agent], act.seq)
-        return act
-
-    def _unpacked(self, key: str, data: bytes) -> tuple[int, messages.Act]:
         agent = self._speaking[key]
         try:
-            return agent, messages.unpack(messages.Act, data)
+            act = messages.unpack(messages.Act, data)
         except WireError as error:
-            raise WireError(f"agent {agent}: {error}") from error
+            raise WireError(f"agent {agent}: {error}", error.wrong) from error
+        if act.src != agent or not (0 <= act.k <= tick if self._in_real_time else act.k == tick):
+            wrong = Wrong.SPOOFED if act.src != agent else Wrong.PAST if act.k < tick else Wrong.FUTURE
+            raise WireError(f"agent {agent} in tick {tick}: agent {act.src} acts in tick {act.k}", wrong)
+        if not (self._in_real_time or agent in awaited):
+            says = f"agent {agent} in tick {tick}: it acts twice, or while it is dead or paused"
+            raise WireError(says, Wrong.REPEATED)
+        self._check_fields(agent, act)
+        if not self._in_real_time:
+            self._check_heard(agent, act)
+        self._streams.check(self._stream[agent], act.seq)
+        return act
+
+    def _check_fields(self, agent: int, act: messages.Act) -> None:
+        looking, row = agent in self._foreign, agent - 1
+        if looking or not self._input.holds(act.input):
+            given = numbers(act.input, self._whose["input"][row], self._input.shape)
+            if looking:
+                values.within(given, self._limit, self._whose["input"][row])
+        for name, form in self._beliefs[row].items():
+            said = getattr(act, name) or form.silence
+            if looking or not form.holds(said):
+                rows = _of_one(said, self._whose[name][row], form)
+                if looking:
+                    values.finite(rows, self._whose[name][row])
+                if looking and name == "covariance":
+                    values.variances(rows, self._dimension, self._whose[name][row])
+        self._check_reports(act, self._whose["reports"][row], looking=looking)
+        if looking:
+            values.indicator(act.psi, f"agent {agent}: Act: psi")
+        if act.punctuality is not None and not isfinite(act.punctuality.late):
+            raise WireError(f"agent {agent}: Act: punctuality: late is {act.punctuality.late}", Wrong.VALUE)
+
+    def _check_reports(self, act: messages.Act, whose: str, *, looking: bool) -> None:
+        for name, said in act.reports.items():
+            if (form := self._reports.get(name)) is None:
+                known = ", ".join(self._reports) or "nothing"
+                raise WireError(
+                    f"{whose}: {shown(name)}: this run's estimator reports {known} (see docs/protocol.md)", Wrong.SHAPE
+                )
+            if looking or not form.holds(said):
+                array = numbers(said, f"{whose}: {name}", form.shape)
+                if looking:
+                    values.finite(array, f"{whose}: {name}", undefined=True)
+
+    def _check_heard(self, agent: int, act: messages.Act) -> None:
+        """What it says that it heard must be what the medium says it delivered, message by message."""
+        handed, heard = self._handed[agent - 1], act.heard - self._heard[agent]
+        if not 0 <= heard <= handed:
+            says = f"it was handed {handed} broadcasts in tick {act.k}, and has heard {heard} more than before"
+            raise WireError(f"agent {agent}: Act: heard: {says} (see docs/protocol.md)", Wrong.MISCOUNTED)
 
     def together(self, acts: Mapping[int, messages.Act]) -> Done:
-        """What the acts of a tick say, by number of the agent, as arrays of all.
-
-        Raises
-        ------
-        WireError
-            When one has something else in a field than belongs there.
-        """
+        """What the acts of a tick say, by number of the agent, as arrays of all."""
         everybody = [acts.get(agent) for agent in self._stream]
         inputs = [self._input.silence if act is None else act.input for act in everybody]
         return Done(
             input=self._input.rows(inputs, self._whose["input"]),
-            **{name: self._of_edges(name, everybody) for name in self._edges},
+            **{name: self._of_edges(name, everybody) for name in self._beliefs[0]},
             reports={
                 name: form.rows(
                     [unsaid if act is None else act.reports.get(name, unsaid) for act in everybody],
@@ -143,22 +195,25 @@ class Acts:
         )
 
     def _of_edges(self, name: str, everybody: Sequence[messages.Act | None]) -> Any:
-        shape, dtype, sizes = self._edges[name]
+        forms = [beliefs[name] for beliefs in self._beliefs]
         said = [b"" if act is None else getattr(act, name) for act in everybody]
-        given = [one or bytes(size) for one, size in zip(said, sizes, strict=True)]  # who has nothing to say has zeros
-        rows = joined(given, sizes, (-1, *shape), dtype)
+        given = [one or form.silence for one, form in zip(said, forms, strict=True)]  # who has nothing to say has zeros
+        shape, dtype = forms[0].shape[1:], forms[0].dtype
+        rows = joined(given, [len(form.silence) for form in forms], (-1, *shape), dtype)
         if rows is None:
-            each = zip(given, self._whose[name], self._degree, strict=True)
-            rows = np.concatenate([_of_one(one, whose, degree, shape, dtype) for one, whose, degree in each])
+            each = zip(given, self._whose[name], forms, strict=True)
+            rows = np.concatenate([_of_one(one, whose, form) for one, whose, form in each])
         padded = np.zeros((*self._present.shape, *shape), dtype)
         padded[self._present] = rows
         return padded
 
 
-def _of_one(given: Any, whose: str, degree: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
-    rows = numbers(given, whose, (-1, *shape), dtype)
+def _of_one(given: Any, whose: str, form: Form) -> Any:
+    degree, *shape = form.shape
+    rows = numbers(given, whose, (-1, *shape), form.dtype)
     if len(rows) != degree:
         raise WireError(
-            f"{whose}: expected one for each of its {degree} neighbours, or none, got {len(rows)} (see docs/protocol.md)"
+            f"{whose}: expected one for each of its {degree} neighbours, or none, got {len(rows)} (see docs/protocol.md)",
+            Wrong.SHAPE,
         )
     return rows

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from netem.core.pace import Pace
 from netem.faults.fault import Fault
 from netem.faults.trigger import Trigger
+from netem.wire.intake import Trust
 from netem.wire.session import Login
 from world.physics.world import World
 
@@ -58,6 +59,10 @@ class WorldBrief:
         What it simulates.
     reports
         What the agents' estimators report beyond edges, by name, and the shape of each for one agent.
+    limit
+        The longest input that agents command, if the scenario sets one.
+    trust
+        What is taken from agents.
     books
         How it writes that down.
     pace
@@ -72,5 +77,7 @@ class WorldBrief:
     faults: tuple[Fault, ...]
     triggers: tuple[Trigger, ...]
     reports: Mapping[str, tuple[int, ...]]
+    limit: float | None
+    trust: Trust
     books: RecordOptions
     pace: Pace | None

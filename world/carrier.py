@@ -14,11 +14,13 @@ from netem.faults.timeline import Timeline
 from netem.medium.in_flight import Entry
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
-from netem.wire.arrays import CODE, WHOLE, WireError, numbers, packed
+from netem.wire.arrays import CODE, WHOLE, numbers, packed
 from netem.wire.carrier import Session, await_heard
+from netem.wire.intake import Intake
 from netem.wire.keys import Keys
-from netem.wire.sequence import Numbering
+from netem.wire.sequence import Numbering, Sequences
 from netem.wire.session import HUB, WORLD
+from netem.wire.wrong import WireError, Wrong
 from world.acts import Acts, Done
 from world.books.kept import Kept
 from world.brief import WorldBrief
@@ -71,12 +73,23 @@ class ZenohCarrier:
         keys, world = Keys(brief.run), brief.world
         self._world, self._supervisor, self._meanwhile = world, supervisor, meanwhile
         self.timeline = Timeline(world.links, brief.faults, brief.triggers)
-        self._reader = Acts(keys, world.links, world.formation.dimension, brief.reports)
-        self._acts = session.hears(keys.act("*"), 4096)
+        self._intake = Intake(brief.trust)
+        supervisor.counts(lambda: self._intake.refused)
+        dimension = world.formation.dimension
+        self._reader = Acts(
+            keys,
+            world.links,
+            dimension,
+            brief.reports,
+            brief.trust.foreign,
+            brief.limit,
+            in_real_time=brief.pace is not None,
+        )
+        self._acts = session.hears_anybody(keys.act("*"), world.links.agents)
+        self._verdicts = Sequences("the medium's")
         self._journal = session.hears(keys.journal, 64)
         self._sense = session.says(keys.sense)
         self._numbers = Numbering()
-        self._heard = dict.fromkeys(range(1, world.links.agents + 1), 0)
         self._fired: Sequence[int] = ()
         self._began: float | None = None
         self._awaited: set[int] = set()
@@ -100,11 +113,12 @@ class ZenohCarrier:
         self._publish(tick, scene, measured)
         self._meanwhile(tick)
         journal = self._read_journal(tick)
+        self._reader.expect(journal.handed)
         acts = self._read_acts(tick)
         self._supervisor.works(tick)
         if journal.injected is not None:
             self.timeline = self.timeline.facing([from_plain(Fault, fault) for fault in journal.injected])
-        self._account(journal, acts)
+        self._account(acts)
         self.entries[tick] = entry_of(journal, len(self._world.links))
         return ProcessesActed(acts, self._reader.together(acts))
 
@@ -126,7 +140,6 @@ class ZenohCarrier:
                 self._await_moved(event)
         for agent in timeline.restarted(tick):
             self._reader.restart(agent)
-            self._heard[agent] = 0
 
     def _await_moved(self, event: str) -> None:
         self._supervisor.await_order(event)
@@ -179,8 +192,13 @@ class ZenohCarrier:
     def _read_journal(self, tick: int) -> messages.Journal:
         self._supervisor.waits(tick, "its journal", lambda: (HUB,))
         journal = messages.unpack(messages.Journal, self._journal.next().data)
+        self._verdicts.check("journal", journal.seq)
         if journal.k != tick:
-            raise WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}")
+            wrong = Wrong.PAST if journal.k < tick else Wrong.FUTURE
+            raise WireError(f"the medium's journal is of tick {journal.k}, the world is in tick {tick}", wrong)
+        if len(journal.handed) != self._world.links.agents:
+            says = f"expected a number for each of {self._world.links.agents} agents, got {len(journal.handed)}"
+            raise WireError(f"the medium: Journal: handed: {says} (see docs/protocol.md)", Wrong.SHAPE)
         return journal
 
     def _read_acts(self, tick: int) -> dict[int, messages.Act]:
@@ -188,24 +206,21 @@ class ZenohCarrier:
         self._supervisor.waits(tick, "its act", self._idle)
         acts = {}
         while self._awaited:
-            arrived = self._acts.next()
-            act = self._reader.read(arrived.key, arrived.data, tick, self._awaited)
-            self._awaited.remove(act.src)
-            acts[act.src] = act
+            act = self._intake.take(self._acts.next(), tick, self._awaited, self._reader)
+            if act is not None:
+                self._awaited.remove(act.src)
+                acts[act.src] = act
         return acts
 
     def _idle(self) -> list[str]:
         return [called(agent) for agent in sorted(self._awaited)]
 
-    def _account(self, journal: messages.Journal, acts: Mapping[int, messages.Act]) -> None:
-        """What the agents say they heard must be what the medium says it delivered, message by message."""
+    def _account(self, acts: Mapping[int, messages.Act]) -> None:
+        """Whoever has heard less than it was handed is counted: the transport has lost it, or the agent is wrong."""
         for agent, act in acts.items():
-            handed, heard = journal.handed[agent - 1], act.heard - self._heard[agent]
-            if not 0 <= heard <= handed:
-                says = f"it was handed {handed} broadcasts in tick {act.k}, and has heard {heard} more than before"
-                raise WireError(f"agent {agent}: Act: heard: {says} (see docs/protocol.md)")
-            self.uninstructed += handed - heard
-            self._heard[agent] = act.heard
+            if unheard := self._reader.unheard(act):
+                self._intake.note(agent, Wrong.UNHEARD, unheard)
+                self.uninstructed += unheard
 
 
 def entry_of(journal: messages.Journal, links: int) -> Entry:

@@ -91,6 +91,7 @@ class RealTimeCarrier(ZenohCarrier):
 
     def _take_journal(self, data: bytes) -> None:
         journal = messages.unpack(messages.Journal, data)
+        self._verdicts.check("journal", journal.seq)
         if journal.injected is not None:
             self.timeline = self.timeline.facing([from_plain(Fault, fault) for fault in journal.injected])
         self.entries[journal.k] = entry_of(journal, len(self._world.links))
@@ -101,9 +102,9 @@ class RealTimeCarrier(ZenohCarrier):
     def _take_acts(self, tick: int) -> None:
         idle = self.timeline.at(tick).idle
         for arrived in self._acts.waiting():
-            act = self._reader.read_when_it_comes(arrived.key, arrived.data, tick)
-            if idle[act.src - 1]:
-                continue  # said before it was stopped
+            act = self._intake.take(arrived, tick, (), self._reader)
+            if act is None or idle[act.src - 1]:  # what it said before it was stopped
+                continue
             self._newest[act.src] = act
             self._spoke[act.src] = tick
             if act.punctuality is not None:

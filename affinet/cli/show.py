@@ -17,6 +17,7 @@ from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.verdicts.outcome import Outcome
+from affinet.verdicts.refused import by_sender
 from affinet.verdicts.timing import DelayError, Lateness, Timing
 from analysis.models.finding import Finding
 from netem.core.listing import listed
@@ -212,7 +213,7 @@ def keys(folder: Path, made: Made) -> None:
 
 def outcome(outcome: Outcome, plan: Plan) -> None:
     """What came of a run."""
-    table = Table(show_header=False, title=_VERDICTS.get(outcome.verdict, f"[yellow]{outcome.verdict}[/]"))
+    table = Table(show_header=False, title=_titled(outcome))
     flown, messages = outcome.flown, outcome.messages
     errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
     errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
@@ -237,6 +238,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         ),
         ("lost by nobody's order", f"{messages['uninstructed']}"),
         *([("lost by the transport", f"{lost}, and asked for again")] if (lost := messages["transport_lost"]) else []),
+        *((f"wrong, of {who}", what) for who, what in by_sender(outcome.refused).items()),
         *(("fault", str(bite)) for bite in outcome.faults),
         *([] if outcome.timing is None else _timing(outcome.timing)),
         ("digest", str(outcome.digest)),
@@ -248,6 +250,12 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console.print(table)
     for reason in outcome.reasons:
         console.print(_plain(reason), soft_wrap=True)
+
+
+def _titled(outcome: Outcome) -> str:
+    """What came of it, in its colour."""
+    verdict = outcome.verdict.partition(",")[0]
+    return outcome.says.replace(verdict, _VERDICTS[verdict], 1)
 
 
 def _timing(timing: Timing) -> list[tuple[str, str]]:

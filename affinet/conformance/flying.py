@@ -28,8 +28,9 @@ from netem.core.listing import listed
 from netem.faults.timeline import Timeline
 from netem.medium.relay import Relayed
 from netem.wire import messages
-from netem.wire.arrays import WireError, numbers
+from netem.wire.arrays import numbers
 from netem.wire.session import HUB
+from netem.wire.wrong import WireError
 from world.flight import fly
 from world.physics.world import Scene
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.link_classes import LinkClass
-from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
+from affinet.scenario.sections import Scenario, ScenarioError, TimeSection, TrustSection
 from affinet.scenario.units import LARGEST, SMALLEST
 from analysis.models.finding import Finding
 from netem.core.links import Links
@@ -18,6 +18,7 @@ from world.formation.nominal import Formation
 from world.physics.world import World
 
 _COPIES = 2  # of the maps, the launcher's and the world's; of arrays, they and what is made of them at the end
+_AROUND = 512  # bytes of a message beside its numbers: names, and what it is of
 _AT_WORK = 4  # arrays like the covariance of the disturbances, while it is put together
 _LEAST_OF_A_TICK = 1e-6  # a delay below this share of a tick would pass as none
 
@@ -88,6 +89,37 @@ def _fits(needed: float, memory: int, what: str, way_out: str) -> Finding:
     if needed > memory:
         return Finding("memory", "error", f"{said}, and {has}; {way_out}")
     return Finding("memory", "ok", f"{said}; {has}")
+
+
+def messages(
+    bits: np.ndarray[Any, np.dtype[np.float64]],
+    world: World,
+    reports: Mapping[str, tuple[int, ...]],
+    trust: TrustSection,
+) -> list[Finding]:
+    """Whether what agents say in a tick is less than the scenario has taken for too much.
+
+    Parameters
+    ----------
+    bits
+        Of a message on each channel, as a rate limit counts them.
+    world, reports
+        Of the run, and what the estimator reports, by name, with the shape for one agent.
+    trust
+        What is taken.
+    """
+    dimension, degree = world.formation.dimension, world.links.slots.shape[1]
+    believed = degree * (dimension + dimension * (dimension + 1) // 2 + 1)
+    reported = sum(int(np.prod(shape)) for shape in reports.values())
+    act = np.dtype(np.float64).itemsize * (dimension + believed + reported)
+    found = []
+    if (largest := max(act, int(bits.max()) // 8) + _AROUND) > trust.largest_message:
+        says = f"agents say up to {_bytes(largest)} at once, and {_bytes(trust.largest_message)} are taken"
+        found.append(Finding("messages", "error", f"{says}; raise trust.largest_message"))
+    if (most := len(bits)) > trust.messages_per_tick:
+        says = f"agents speak {most} times in a tick, and {trust.messages_per_tick} messages are looked at"
+        found.append(Finding("messages", "error", f"{says}; raise trust.messages_per_tick"))
+    return found
 
 
 def delays(

@@ -145,6 +145,7 @@ def _make(given: Scenario) -> Plan:
     _refuse_fatal(findings)
     world = world_of(given, formation)
     bits = network.message_bits(names, spoken, world.links, brief.dimension)
+    _refuse_fatal(limits.messages(bits, world, reports, given.trust))
     own, aired = network.plan(given, formation, world.links, bits)
     degraded = [
         network.degraded(given, formation, world.links, bits, *named, _ruled(played.faults, number, world.links))

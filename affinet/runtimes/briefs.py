@@ -21,12 +21,12 @@ def agent_brief(
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
     """
-    row, links = number - 1, plan.world.links
+    row = number - 1
     return AgentBrief(
         run=run,
         login=login,
         agent=number,
-        neighbours=tuple((links.neighbours[row, links.present[row]] + 1).tolist()),
+        neighbours=plan.world.links.neighbours_of(number),
         estimator=plan.estimator,
         law=plan.law,
         leaders=plan.scenario.agents.leaders,

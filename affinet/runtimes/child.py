@@ -9,7 +9,7 @@ import subprocess
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -22,6 +22,7 @@ from netem.wire.session import ENVIRONMENT
 
 _LAST_LINES, _LAST_BYTES = 12, 1 << 16
 _LONGEST_REASON = 4000
+_SAID_BESIDE = {"beat", "refused"}  # it gets no further by these
 
 
 class Process(Protocol):
@@ -129,6 +130,8 @@ class Child:
         How many messages it says that the transport lost.
     doing, beat_s
         What it does, and when it told so, by the clock of its group; None before its first beat.
+    refused
+        How many messages it has refused so far, by agent and mistake.
     looks
         What the system says of it, since it was first looked at because nothing moved.
     """
@@ -147,6 +150,7 @@ class Child:
     lost: int = 0
     doing: Beat | None = None
     beat_s: float = 0.0
+    refused: dict[tuple[int | None, str], int] = field(default_factory=dict)
     looks: StatusHistory | None = None
     _pending: bytes = b""
 
@@ -231,7 +235,7 @@ class Child:
             said = shown(self._pending)
             raise RunFailed(f"{self.who}: it said {said} on its standard output, and does not end the line")
         events = (self._event(line) for line in lines)
-        return [event for event in events if event["event"] != "beat"]
+        return [event for event in events if event["event"] not in _SAID_BESIDE]
 
     def free(self) -> None:
         """Give back what the launcher holds of a process that is gone, or about to be."""
@@ -276,6 +280,8 @@ class Child:
                 self.doing = beat(event)
             case "lost":
                 self.lost += event["count"]
+            case "refused":
+                self.refused |= {(agent, wrong): count for agent, wrong, count in event["of"]}
             case "ready" if self.is_ready or self.is_done:
                 raise RunFailed(f"{self.who}: it said twice that it is ready (docs/protocol.md)")
             case "done" if self.is_done or not self.is_ready:

@@ -24,6 +24,7 @@ from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
+from affinet.verdicts.refused import in_words
 from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
 from agents.node import HostBrief
@@ -35,6 +36,7 @@ from netem.medium.medium import JOURNAL
 from netem.processes.supervised import LOST
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
+from netem.wire.intake import Trust
 from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
 from world.brief import WorldBrief
 from world.physics.world import World
@@ -56,6 +58,8 @@ class LaunchRecord:
         Why the run ended early, if it did, and whether a user's own code is why.
     start_s, wall_s
         From the first process started to the first tick, and from there to the end, in seconds.
+    refused
+        Messages that were refused: of which agent, by whom, for what mistake, and how many.
     processes
         Every process there was.
     """
@@ -67,6 +71,7 @@ class LaunchRecord:
     user_code: bool = False
     start_s: float = 0.0
     wall_s: float = 0.0
+    refused: list[dict[str, Any]] = field(default_factory=list)
     processes: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -119,11 +124,15 @@ class Launcher:
         try:
             self._launch()
         except (RunFailed, Interrupted) as failure:
-            self.flight.failure = str(failure)
+            self.flight.failure = "; ".join(filter(None, [str(failure), self._refusals()]))
             self.flight.user_code = isinstance(failure, UserCodeFailed)
         except OSError as error:
             self.flight.failure = f"the swarm could not be launched: {said(error)}"
         return self.flight
+
+    def _refusals(self) -> str:
+        """What was dropped, which may be why nothing moved any more."""
+        return in_words(self.flight.refused) if self._plan.scenario.trust.wrong_messages == "drop" else ""
 
     def _launch(self) -> None:
         logs = self._out / "logs"
@@ -144,6 +153,11 @@ class Launcher:
     def _note(self, group: ProcessGroup) -> None:
         self.flight.lost = group.lost
         self.flight.processes = [report | self._clock(report["role"], report["id"]) for report in group.reports]
+        self.flight.refused = [
+            {"agent": agent, "by": child.name, "wrong": wrong, "count": count}
+            for child in group.children
+            for (agent, wrong), count in child.refused.items()
+        ]
 
     def _clock(self, role: str, number: int | None) -> dict[str, float]:
         if self._spread is None or role == NURSERY:
@@ -252,6 +266,13 @@ class Launcher:
         """Where a process of this name writes."""
         return here if self._spread is None else self._spread.folder(name, here)
 
+    @property
+    def _trust(self) -> Trust:
+        given = self._plan.scenario.trust
+        return Trust(
+            given.wrong_messages, given.largest_message, given.messages_per_tick, foreign=frozenset(self._programs)
+        )
+
     def _world_brief(self, login: Login) -> WorldBrief:
         return WorldBrief(
             run=self._run,
@@ -262,6 +283,8 @@ class Launcher:
             faults=self._plan.faults,
             triggers=self._plan.triggers,
             reports=self._plan.reports,
+            limit=self._plan.scenario.agents.limit,
+            trust=self._trust,
             books=self._plan.books(self._viewer),
             pace=self._plan.pace,
         )
@@ -279,16 +302,18 @@ class Launcher:
             triggers=self._plan.triggers,
             injected=self._plan.injected,
             recorded=None if self._plan.journal is None else str(self._plan.journal),
+            dimension=self._plan.world.formation.dimension,
             forms=forms_of(self._plan.agents.channels()),
             positioned=self._plan.positioned,
             hosts=self._hosts,
+            trust=self._trust,
             journal=str(self._folder(HUB, self._out) / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
             pace=self._plan.pace,
         )
 
     def _centre_brief(self, login: Login) -> CentreBrief:
-        return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm)
+        return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm, self._trust)
 
 
 def _prepare_kernels(world: World) -> None:

@@ -178,6 +178,7 @@ def _over_processes(
         user_code=flight.user_code,
         wall_s=flight.wall_s,
         processes=flight.processes,
+        refused=flight.refused,
         out=out,
         lost=flight.lost,
         timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),

@@ -7,12 +7,15 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from netem.wire.wrong import Wrong
+
 Event = dict[str, Any]
 Check = Callable[[Any], bool]
 
 LONGEST_LINE = 1 << 20
 _SHOWN = 120
 _KEY = re.compile(r"[\w/-]{1,200}", re.ASCII)
+_WRONG = frozenset(map(str, Wrong))
 
 
 class NotItsOwn(ValueError):
@@ -43,6 +46,13 @@ def _is_number(value: Any) -> bool:
     return type(value) is float
 
 
+def _is_refusal(value: Any) -> bool:
+    if type(value) is not list or len(value) != 3:
+        return False
+    agent, wrong, count = value
+    return (agent is None or _is_count(agent)) and wrong in _WRONG and _is_count(count)
+
+
 def _all(check: Check) -> Check:
     return lambda value: type(value) is list and all(map(check, value))
 
@@ -54,15 +64,17 @@ _OF_ALL: Mapping[str, Mapping[str, Check]] = {
     "failed": {"reason": _is_text},
     "lost": {"key": _is_key, "count": _is_count},
 }
+_REFUSED = {"refused": {"of": _all(_is_refusal)}}
 _PROCESSES = {"agents": _COUNTS, "remembering": _COUNTS, "k": _is_count}
 MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "nursery": {"ready": {}, "failed": {"reason": _is_text}},
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "host": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
-    "netem": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
-    "centre": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
+    "netem": {**_OF_ALL, **_REFUSED, "user-code": {"reason": _is_text}, "done": {}},
+    "centre": {**_OF_ALL, **_REFUSED, "user-code": {"reason": _is_text}, "done": {}},
     "world": {
         **_OF_ALL,
+        **_REFUSED,
         "tick": {"k": _is_count, "error": _is_number},
         "fired": {"triggers": _COUNTS, "k": _is_count},
         **dict.fromkeys(("kill", "restart", "pause", "resume"), _PROCESSES),

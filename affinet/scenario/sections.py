@@ -304,6 +304,17 @@ class NetworkSection(Section):
         return self
 
 
+class TrustSection(Section):
+    """What is taken from agents: whether a wrong message fails the run, or is dropped while the right one is waited for.
+
+    The largest message, in bytes, and how many of an agent are looked at in a tick.
+    """
+
+    wrong_messages: Literal["fail", "drop"] = "fail"
+    largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 30)] = 1 << 20
+    messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = 100
+
+
 class RecordSection(Section):
     """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
@@ -326,6 +337,7 @@ class Scenario(Section):
     agents: AgentsSection
     network: NetworkSection = NetworkSection()
     timeline: list[AnyEvent] = Field(default_factory=list)
+    trust: TrustSection = TrustSection()
     record: RecordSection = RecordSection()
     _source: Source | None = PrivateAttr(default=None)
     _own: dict[str, Path] = PrivateAttr(default_factory=dict)

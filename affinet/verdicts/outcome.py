@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -42,7 +42,8 @@ class Outcome:
     transport lost 3"; `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents
     that find out where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the
     faults where they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run
-    ended early; `timing` says how processes kept their time in a run in real time.
+    ended early; `refused` has the wrong messages of each agent, by whom they were refused, for what, and how many; `timing`
+    says how processes kept their time in a run in real time.
     """
 
     verdict: str
@@ -58,6 +59,7 @@ class Outcome:
     messages: dict[str, Any]
     faults: tuple[Bite, ...]
     timeline: Timeline
+    refused: tuple[dict[str, Any], ...]
     processes: tuple[dict[str, Any], ...]
     timing: Timing | None
     out: str
@@ -85,6 +87,14 @@ class Outcome:
     def real_time_factor(self) -> float:
         """Simulated seconds per second of wall time."""
         return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
+
+    @property
+    def says(self) -> str:
+        """The verdict in words; of one that was reached although messages were wrong, how many."""
+        refused = sum(one["count"] for one in self.refused)
+        return (
+            f"{self.verdict}, {refused} wrong messages refused" if refused and self.verdict != "fail" else self.verdict
+        )
 
     def failing(self, reason: str) -> Outcome:
         """The outcome of a run that failed for this reason too."""
@@ -117,6 +127,7 @@ def judge(
     out: Path,
     lost: int = 0,
     timing: Timing | None = None,
+    refused: Sequence[dict[str, Any]] = (),
 ) -> Outcome:
     """The outcome of a run.
 
@@ -143,6 +154,8 @@ def judge(
         Messages that the transport between machines lost, and that were had again.
     timing
         How they kept their time, in a run in real time.
+    refused
+        Wrong messages, as in `Outcome`.
     """
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
     booked = accounts or NOTHING
@@ -170,6 +183,7 @@ def judge(
         messages=_messages(booked, uninstructed, lost),
         faults=tuple(faults),
         timeline=timeline,
+        refused=tuple(refused),
         processes=tuple(processes),
         timing=timing,
         out=str(out),

@@ -52,6 +52,14 @@ class _Messages:
 
 
 @dataclass(frozen=True)
+class _Refused:
+    agent: _Count | None
+    by: str
+    wrong: str
+    count: _Count
+
+
+@dataclass(frozen=True)
 class _Process:
     role: str
     id: int | None
@@ -75,6 +83,7 @@ class _Summary:
     ticks: _Count
     wall_s: _Seconds
     messages: _Messages
+    refused: tuple[_Refused, ...]
     processes: tuple[_Process, ...]
 
 
@@ -111,6 +120,7 @@ def evidence(out: Path) -> Evidence:
         failure=None,
         user_code=summary.user_code,
         wall_s=summary.wall_s,
+        refused=[asdict(one) for one in summary.refused],
         processes=[_told(process) for process in summary.processes],
         out=out,
         timing=None if plan.pace is None else timing.of_run(out, plan.pace.factor),

@@ -19,10 +19,12 @@ from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor, called
 from netem.processes.user_code import UserCodeError
 from netem.wire import messages
-from netem.wire.arrays import WHOLE, WireError, numbers, packed
+from netem.wire.arrays import WHOLE, Form, numbers, packed
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.carrier import Session, await_heard
+from netem.wire.intake import Intake, Trust
 from netem.wire.keys import Keys
+from netem.wire.payloads import Payloads
 from netem.wire.repeating import opened
 from netem.wire.sequence import Numbering
 from netem.wire.session import CENTRE, Login, client
@@ -40,12 +42,15 @@ class CentreBrief:
         Whose centre it is.
     swarm
         What that is made for.
+    trust
+        What is taken from agents.
     """
 
     run: str
     login: Login
     estimator: Choice
     swarm: SwarmBrief
+    trust: Trust
 
 
 class CentreNode:
@@ -54,14 +59,22 @@ class CentreNode:
     def __init__(self, session: Session, supervisor: Supervisor, brief: CentreBrief, centre: CheckedCentre) -> None:
         self._supervisor, self._swarm, self._centre = supervisor, brief.swarm, centre
         keys, self._agents = Keys(brief.run), range(1, brief.swarm.agents + 1)
-        self._ears = {channel: session.hears(keys.broadcast("*", channel), 4096) for channel in (MEASUREMENT, INPUT)}
+        heard = (MEASUREMENT, INPUT)
+        self._ears = {
+            channel: session.hears_anybody(keys.broadcast("*", channel), brief.swarm.agents) for channel in heard
+        }
         self._told = {agent: session.says(keys.told(agent)) for agent in self._agents}
-        self._reader, self._numbers = Broadcasts(keys, self._agents, (MEASUREMENT, INPUT)), Numbering()
+        self._intake, self._numbers = Intake(brief.trust), Numbering()
+        supervisor.counts(lambda: self._intake.refused)
         slots = zip(brief.swarm.neighbours.tolist(), brief.swarm.present.tolist(), strict=True)
         self._slots = [
             {number + 1: slot for slot, (number, real) in enumerate(zip(row, there, strict=True)) if real}
             for row, there in slots
         ]
+        steered = dict.fromkeys(DERIVATIVES[: brief.swarm.order], Form((brief.swarm.dimension,), truths=False))
+        neighbours = {agent: frozenset(slots) for agent, slots in enumerate(self._slots, start=1)}
+        payloads = Payloads({INPUT: steered}, neighbours, brief.swarm.dimension, brief.trust.foreign)
+        self._reader = Broadcasts(keys, self._agents, heard, payloads)
 
     def await_everybody(self) -> None:
         """Wait until all agents listen."""
@@ -87,10 +100,10 @@ class CentreNode:
         self._supervisor.waits(tick, "what it broadcasts", partial(_silent, self._agents, said))
         awaited = {(agent, channel) for agent in self._agents}
         while awaited:
-            arrived = self._ears[channel].next()
-            broadcast = self._reader.read(arrived.key, arrived.data, tick, awaited)
-            awaited.remove((broadcast.src, channel))
-            said[broadcast.src] = broadcast.payload
+            broadcast = self._intake.take(self._ears[channel].next(), tick, awaited, self._reader)
+            if broadcast is not None:
+                awaited.remove((broadcast.src, channel))
+                said[broadcast.src] = broadcast.payload
         return said
 
     def _input(self, agent: int, said: dict[str, Any]) -> Any:
@@ -105,8 +118,6 @@ class CentreNode:
         for agent, observed in said.items():
             whose, slots_of = f"agent {agent} on {MEASUREMENT!r}", self._slots[agent - 1]
             whom = numbers(observed.get("neighbours"), f"{whose}: 'neighbours'", (-1,), WHOLE).tolist()
-            if strangers := [neighbour for neighbour in whom if neighbour not in slots_of]:
-                raise WireError(f"{whose}: 'neighbours': it has none called {strangers} (see docs/protocol.md)")
             rows = [slots_of[neighbour] for neighbour in whom]
             given = numbers(observed.get("measured"), f"{whose}: 'measured'", (len(rows), self._swarm.dimension))
             measured[agent - 1, rows], seen[agent - 1, rows] = given, True

@@ -106,7 +106,7 @@ def read(path: Path, schema: Any) -> Any:
     Raises
     ------
     TableError
-        When there is none, or it has other columns.
+        When there is none, or it has other columns, or is damaged.
     """
     return pa.Table.from_batches([batch for batch, _ in scan(path, schema)], schema=schema)
 
@@ -117,21 +117,25 @@ def scan(path: Path, schema: Any, only: str | None = None) -> Iterator[tuple[Any
     Raises
     ------
     TableError
-        When there is none, or it has other columns.
+        When there is none, or it has other columns, or is damaged.
     """
-    names = schema.names if only is None else [only]
+    wanted = schema if only is None else pa.schema([schema.field(only)])
     options = pa.ipc.IpcReadOptions(included_fields=None if only is None else [schema.get_field_index(only)])
     files = parts(path) or [path]
     for file in files:
         try:
             stream = pa.ipc.open_stream(pa.memory_map(str(file)), options=options)
-        except (OSError, pa.ArrowInvalid) as error:
+            has = stream.schema.names
+        except (OSError, pa.ArrowException, ValueError) as error:
             if file == files[-1] != path:  # who wrote it was killed where it began
                 return
             raise TableError(f"{file}: no such table: {error}") from error
-        if stream.schema.names != names:
-            raise TableError(f"{file}: its columns are {stream.schema.names}, not {names}")
-        yield from _batches(stream)
+        if not stream.schema.equals(wanted):
+            raise TableError(f"{file}: its columns are {has}, not {wanted.names}, or of other types")
+        try:
+            yield from _batches(stream)
+        except (pa.ArrowException, MemoryError, ValueError) as error:
+            raise TableError(f"{file}: it is damaged: {error}") from error
 
 
 def _batches(stream: Any) -> Iterator[tuple[Any, Any]]:
@@ -140,5 +144,6 @@ def _batches(stream: Any) -> Iterator[tuple[Any, Any]]:
             batch, beside = stream.read_next_batch_with_custom_metadata()
         except (StopIteration, OSError, pa.ArrowInvalid):  # the end, or where a killed run stopped writing
             return
+        batch.validate(full=True)  # what reads it later would believe every length and place in it
         note = None if beside is None else beside.get(_NOTE)
         yield batch, None if note is None else json.loads(note)

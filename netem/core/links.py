@@ -92,6 +92,11 @@ class Links:
         """Neighbour in each agent's slot as an array row (number - 1), shape (agents, n)."""
         return np.where(self.present, self.src[self.slots] - 1, 0)
 
+    def neighbours_of(self, agent: int) -> tuple[int, ...]:
+        """The numbers of the agents in the neighbour slots of one."""
+        row = agent - 1
+        return tuple((self.neighbours[row, self.present[row]] + 1).tolist())
+
     @cached_property
     def back(self) -> Integers:
         """The slot in which the neighbour in each slot has this agent, shape (agents, n); 0 in padding."""

@@ -48,6 +48,8 @@ SCHEMA = pa.schema(
         ("transport", pa.string()),
     ]
 )
+_ALWAYS = ("tick", "src", "dst", "channel", "seq", "verdict")  # what each row has
+_LEAST = {"tick": 0, "src": 1, "dst": 1, "seq": 0}
 
 
 class JournalError(ValueError):
@@ -169,9 +171,24 @@ def read(path: Path) -> Any:
         When it is no journal.
     """
     try:
-        return arrow.read(path, SCHEMA)
+        table = arrow.read(path, SCHEMA)
     except arrow.TableError as error:
         raise JournalError(str(error)) from error
+    if wrong := _damage(table, told(path).accounts):
+        raise JournalError(f"{path}: it is damaged: {wrong}")
+    return table
+
+
+def _damage(table: Any, booked: Accounts | None) -> str | None:
+    """What no journal that a run has written says."""
+    if empty := [name for name in _ALWAYS if table[name].null_count]:
+        return f"it has rows without {', '.join(empty)}"
+    if below := [name for name, least in _LEAST.items() if table[name].to_numpy().min(initial=least) < least]:
+        return f"{', '.join(below)} cannot be negative, or that of nobody"
+    last = int(table["tick"].to_numpy().max(initial=-1))
+    if last >= (0 if booked is None else booked.ticks):
+        return f"it has verdicts of tick {last}, of which its accounts know nothing"
+    return None
 
 
 class Told(NamedTuple):

@@ -20,7 +20,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NamedTuple, NoReturn, TypeVar
@@ -37,6 +37,7 @@ _LENGTH = struct.Struct("<I")
 _STDIN, _STDOUT, _STDERR = 0, 1, 2
 _PR_SET_PDEATHSIG = 1
 _LAST_RESORT_S = 2.0
+_LAST_WORDS = {"done", "failed", "user-code"}
 
 BEAT_S = 0.5
 LOST = "lost"  # an order that tells of messages: their key, and how many
@@ -70,6 +71,8 @@ class Supervisor:
         self._confessed = False
         self._speaking = threading.Lock()
         self._doing = _Doing(0, "", tuple)
+        self._refused: Callable[[], Sequence[Any]] = tuple
+        self._told_refused: Sequence[Any] = ()
         self._orders: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._lost: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
         signal.signal(signal.SIGTERM, _leave)
@@ -85,6 +88,8 @@ class Supervisor:
 
     def tell(self, event: str, **facts: Any) -> None:
         """Report an event to the launcher."""
+        if event in _LAST_WORDS:
+            self._tell_refused()
         line = json.dumps({"event": event} | facts).encode() + b"\n"
         with self._speaking:
             while line:
@@ -102,6 +107,16 @@ class Supervisor:
                 key, count = self._lost.get_nowait()
                 counts[key] += count
         return dict(counts)
+
+    def counts(self, refused: Callable[[], Sequence[Any]]) -> None:
+        """From now on tell with each beat what the child has refused so far; asked from another thread."""
+        self._refused = refused
+
+    def _tell_refused(self) -> None:
+        refused = self._refused()
+        if refused != self._told_refused:
+            self._told_refused = refused
+            self.tell("refused", of=refused)
 
     def works(self, tick: int) -> None:
         """From now on the child waits for nobody: what comes of this tick is up to it."""
@@ -149,6 +164,7 @@ class Supervisor:
             tick, what, whom = self._doing
             try:
                 self.tell("beat", k=tick, what=what, waits=list(whom()))
+                self._tell_refused()
             except OSError:  # the launcher is gone, and the lifeline says so
                 return
             time.sleep(BEAT_S)

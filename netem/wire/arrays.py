@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from netem.core.plain import shown
+from netem.wire.wrong import WireError, Wrong
 
 Packed = bytes | list[Any]  # an array as it travels
 Shape = tuple[int, ...]
@@ -23,10 +24,6 @@ FLOAT, WHOLE, TRUTH, CODE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("?"), np.
 
 _TRUTHS = b"\0\1"
 _KINDS = {"f": "iuf", "i": "i", "b": "b"}  # of numbers in a list that will do for one
-
-
-class WireError(ValueError):
-    """A message that does not say what its key promises."""
 
 
 def packed(array: Any, dtype: np.dtype[Any] = FLOAT) -> bytes:
@@ -58,7 +55,7 @@ def numbers(given: Any, whose: str, shape: Shape, dtype: np.dtype[Any] = FLOAT) 
         what = {"b": "truths", "f": "numbers"}.get(dtype.kind, "whole numbers")
         of = ", ".join("any" if length < 0 else str(length) for length in shape)
         got = f"{len(given)} bytes" if type(given) is bytes else shown(given)
-        raise WireError(f"{whose}: expected {what} of shape ({of}), got {got} (see docs/protocol.md)")
+        raise WireError(f"{whose}: expected {what} of shape ({of}), got {got} (see docs/protocol.md)", Wrong.SHAPE)
     return array
 
 
@@ -86,6 +83,10 @@ class Form:
     def silence(self) -> bytes:
         """Zeros, as they travel."""
         return bytes(prod(self.shape) * self.dtype.itemsize)
+
+    def holds(self, given: Any) -> bool:
+        """Whether something is such an array as bytes."""
+        return type(given) is bytes and len(given) == len(self.silence) and not (self.truths and given.strip(_TRUTHS))
 
     def rows(self, given: Sequence[Any], whose: Iterable[str]) -> Any:
         """What several said in this field, a row each.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
+from math import isfinite
 
 from netem.core.plain import shown
 from netem.wire import messages
-from netem.wire.arrays import WireError
 from netem.wire.keys import Keys
+from netem.wire.payloads import Payloads
 from netem.wire.sequence import Sequences
+from netem.wire.wrong import WireError, Wrong
 
 
 class Broadcasts:
@@ -20,12 +22,30 @@ class Broadcasts:
         Of the run.
     agents, channels
         Who broadcasts, and on which channels.
+    payloads
+        What they may say there.
+    in_real_time
+        Whether they may speak of ticks that are over, and say when they do; what is awaited is nobody's matter then.
     """
 
-    def __init__(self, keys: Keys, agents: Iterable[int], channels: Sequence[str]) -> None:
+    def __init__(
+        self,
+        keys: Keys,
+        agents: Iterable[int],
+        channels: Sequence[str],
+        payloads: Payloads,
+        *,
+        in_real_time: bool = False,
+    ) -> None:
+        self._in_real_time = in_real_time
         self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in channels}
-        self._channels = list(channels)
+        self._channels, self._payloads = list(channels), payloads
         self._streams = Sequences("agent")
+
+    def speaker(self, key: str) -> int:
+        """Whose key it is."""
+        speaking = self._speaking.get(key)
+        return int(key.rsplit("/", 3)[1]) if speaking is None else speaking[0]
 
     def restart(self, agent: int) -> None:
         """Expect the broadcasts of a new process."""
@@ -33,7 +53,7 @@ class Broadcasts:
             self._streams.restart(f"{agent} {name}")
 
     def read(self, key: str, data: bytes, tick: int, awaited: Container[tuple[int, str]]) -> messages.Broadcast:
-        """The broadcast that came on a key, which access control leaves to one agent.
+        """The broadcast that came on a key, which access control leaves to one agent; of a wrong one no note is taken.
 
         Parameters
         ----------
@@ -51,40 +71,32 @@ class Broadcasts:
         UninstructedLoss
             When one before it is missing.
         """
-        said, whose = self._unpacked(key, data)
-        if said.k != tick:
-            raise WireError(f"{whose} in tick {tick}: it speaks of tick {said.k} (see docs/protocol.md)")
-        self._streams.check(f"{said.src} {said.channel}", said.seq)
-        if (said.src, said.channel) not in awaited:
-            raise WireError(f"{whose}: it speaks twice in tick {tick}, or while it is dead or paused")
-        return said
-
-    def read_when_it_comes(self, key: str, data: bytes, tick: int) -> messages.Broadcast:
-        """The broadcast that came on a key in this tick, of which or of an earlier one it speaks.
-
-        Raises
-        ------
-        WireError
-            When it is none, or speaks of what is yet to come, or does not say when it was said.
-        UninstructedLoss
-            When one before it is missing.
-        """
-        said, whose = self._unpacked(key, data)
-        if not 0 <= said.k <= tick or said.at is None:
-            raise WireError(f"{whose} in tick {tick}: it speaks of tick {said.k}, at {said.at} (see docs/protocol.md)")
-        self._streams.check(f"{said.src} {said.channel}", said.seq)
-        return said
-
-    def _unpacked(self, key: str, data: bytes) -> tuple[messages.Broadcast, str]:
-        _, agent, _, channel = key.rsplit("/", 3)
-        whose = f"agent {agent} on {channel!r}"
         try:
             said = messages.unpack_relayed(data)
         except WireError as error:
-            raise WireError(f"{whose}: {error}") from error
-        if self._speaking.get(key) != (said.src, said.channel):
+            raise WireError(f"{_whose(key)}: {error}", error.wrong) from error
+        spoofed = self._speaking.get(key) != (said.src, said.channel)
+        if spoofed or not (0 <= said.k <= tick if self._in_real_time else said.k == tick):
             raise WireError(
-                f"{whose}: it speaks as agent {said.src}, on {shown(said.channel)}; "
-                f"channels here are {', '.join(self._channels)} (see docs/protocol.md)"
+                f"{_whose(key)} in tick {tick}: it speaks as agent {said.src}, on {shown(said.channel)}, of tick {said.k}; "
+                f"channels here are {', '.join(self._channels)} (see docs/protocol.md)",
+                Wrong.SPOOFED if spoofed else Wrong.PAST if said.k < tick else Wrong.FUTURE,
             )
-        return said, whose
+        if self._in_real_time:
+            _refuse_timeless(said, _whose(key))
+        elif (said.src, said.channel) not in awaited:
+            says = f"{_whose(key)}: it speaks twice in tick {tick}, or while it is dead or paused"
+            raise WireError(says, Wrong.REPEATED)
+        self._payloads.check(said.src, said.channel, said.payload)
+        self._streams.check(f"{said.src} {said.channel}", said.seq)
+        return said
+
+
+def _refuse_timeless(said: messages.Broadcast, whose: str) -> None:
+    if said.at is None or not isfinite(said.at):
+        raise WireError(f"{whose}: at: in real time it says when, got {said.at} (see docs/protocol.md)", Wrong.VALUE)
+
+
+def _whose(key: str) -> str:
+    _, agent, _, channel = key.rsplit("/", 3)
+    return f"agent {agent} on {channel!r}"

@@ -14,6 +14,7 @@ from netem.wire.session import Login, client, identity
 
 _WAITING_CHANGES = 4
 _WAITING_ENTRANTS = 1024
+_LEAST_ROOM, _TICKS = 1024, 4  # for messages of those who may flood
 
 
 class NotCarried(RuntimeError):
@@ -34,6 +35,11 @@ class Arrived:
     def key(self) -> str:
         """The key."""
         return str(self._sample.key_expr)
+
+    @property
+    def size(self) -> int:
+        """How many bytes there are; nothing is copied for it."""
+        return len(self._sample.payload)
 
     @property
     def data(self) -> bytes:
@@ -200,6 +206,7 @@ class Session:
     """
 
     def __init__(self, config: Mapping[str, Any]) -> None:
+        zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # RUST_LOG, for who looks into what Zenoh does
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
@@ -230,6 +237,13 @@ class Session:
     def hands(self, key: str, take: Callable[[Arrived], None]) -> None:
         """Hand over what is said on a key, in a thread of the session's, where nothing may be said or asked."""
         self._handing.append(self._session.declare_subscriber(key, lambda sample: take(Arrived(sample))))
+
+    def hears_anybody(self, key: str, in_a_tick: int) -> Ear:
+        """Hear a key on which others may say as much as they like, and are to say so many messages in a tick.
+
+        Of far more that wait, the oldest are lost: to wait for room would keep the whole session from hearing anything at all.
+        """
+        return Ear(self._session.declare_subscriber(key, zenoh.handlers.RingChannel(room_for(in_a_tick))))
 
     def says(self, key: str) -> Voice:
         """Say something on a key."""
@@ -305,6 +319,11 @@ def joined(login: Login, patience_s: float | None = None) -> Session:
         return Session(client(login, patience_s))
     except NotCarried as error:
         raise NotCarried(login.why_refused() or str(error)) from error
+
+
+def room_for(in_a_tick: int) -> int:
+    """How many messages may wait of those who are to say so many in a tick, and may flood."""
+    return max(_LEAST_ROOM, _TICKS * in_a_tick)
 
 
 def await_heard(voices: Iterable[Voice]) -> None:

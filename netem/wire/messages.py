@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 
 from netem.core.plain import located, plainly
 from netem.faults.control import Answer, Order
-from netem.wire.arrays import Packed, WireError
+from netem.wire.arrays import Packed
+from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
+
+_Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # that is to stand in an array
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -32,8 +35,8 @@ class Sighted(_Message, frozen=True, kw_only=True):
 
     position: bytes
     done: bool
-    by: int
-    method: int
+    by: _Whole
+    method: _Whole
 
 
 class Sense(_Message, frozen=True, kw_only=True):
@@ -83,7 +86,7 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     k: int
     src: str
     seq: int
-    clock: int
+    clock: _Whole
     neighbours: list[int]
     measured: bytes
     position: bytes | None
@@ -270,5 +273,7 @@ def _read(kind: Any, name: str, data: bytes, root: str = "$") -> Any:
         return _decoder(kind).decode(data)
     except msgspec.ValidationError as error:
         raise WireError(f"{name}: {located(error, root)} (see docs/protocol.md)") from error
-    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+    except RecursionError as error:
+        raise WireError(f"{name}: it nests too deep (see docs/protocol.md)", Wrong.DEEP) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise WireError(f"{name}: not MessagePack: {error} (see docs/protocol.md)") from error

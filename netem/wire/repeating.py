@@ -19,10 +19,11 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgpack
 
-from netem.wire.carrier import Arrived, Ear, NotCarried, Question, Session, Voice
+from netem.wire.carrier import Arrived, Ear, NotCarried, Question, Session, Voice, room_for
 from netem.wire.keys import again
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import Login
+from netem.wire.wrong import Wrong
 
 T = TypeVar("T")
 Lost = Callable[[str, int], None]  # on which key, and how many
@@ -228,7 +229,8 @@ class AskingEar(Ear):
         oldest = answer.said[0][0] if answer.said else answer.following
         if oldest > due:
             raise UninstructedLoss(
-                f"{answer.key}: the transport lost {oldest - due} messages from {due} on, and who said them has not kept them"
+                f"{answer.key}: the transport lost {oldest - due} messages from {due} on, and who said them has not kept them",
+                Wrong.SKIPPED,
             )
 
 
@@ -237,6 +239,11 @@ class Again(NamedTuple):
 
     key: str
     data: bytes
+
+    @property
+    def size(self) -> int:
+        """How many bytes there are."""
+        return len(self.data)
 
 
 class RepeatingSession(Session):
@@ -275,6 +282,10 @@ class RepeatingSession(Session):
         ear = AskingEar(self, key, room, self._lost)
         self._ears.append(ear)
         return ear
+
+    def hears_anybody(self, key: str, in_a_tick: int) -> Ear:
+        """Hear a key on which others may say as much as they like, in order and whole."""
+        return self.hears(key, room_for(in_a_tick))
 
     def says(self, key: str) -> Voice:
         """Say something on a key, and once more to who asks."""

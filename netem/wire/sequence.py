@@ -4,9 +4,23 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from netem.wire.wrong import Wrong
+
 
 class UninstructedLoss(RuntimeError):
-    """A message vanished that no fault and no profile had dropped."""
+    """A message vanished that no fault and no profile had dropped, or one came twice.
+
+    Parameters
+    ----------
+    says
+        Which.
+    wrong
+        Which of both.
+    """
+
+    def __init__(self, says: str, wrong: Wrong) -> None:
+        super().__init__(says)
+        self.wrong = wrong
 
 
 class Numbering:
@@ -14,6 +28,10 @@ class Numbering:
 
     def __init__(self) -> None:
         self._next: defaultdict[str, int] = defaultdict(int)
+
+    def due(self, stream: str) -> int:
+        """The number that would be next."""
+        return self._next[stream]
 
     def next(self, stream: str) -> int:
         """The number of the message about to be sent."""
@@ -46,7 +64,7 @@ class Sequences:
         self._expected = Numbering()
 
     def check(self, stream: str, number: int) -> None:
-        """Take note of a message.
+        """Take note of a message; of one that is not the next, no note is taken.
 
         Raises
         ------
@@ -55,12 +73,14 @@ class Sequences:
         """
         if self._from_any:
             self._expected.join(stream, number)
-        expected = self._expected.next(stream)
+        expected = self._expected.due(stream)
         if number != expected:
             raise UninstructedLoss(
                 f"{self._sender} {stream}: message {number} came where {expected} was due; "
-                f"the transport lost or doubled {abs(number - expected)} that nobody ordered"
+                f"the transport lost or doubled {abs(number - expected)} that nobody ordered",
+                Wrong.SKIPPED if number > expected else Wrong.REPEATED,
             )
+        self._expected.next(stream)
 
     def restart(self, stream: str) -> None:
         """Expect 0 again: the sender is a new process."""

@@ -25,9 +25,13 @@ COORDINATOR = "coordinator"
 CENTRE = "centre"
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
+
 # One worker thread per process: with the default eleven, a tick of ten agents takes a quarter longer on two cores.
-_RUNTIME = ", ".join(f"{part}: (handover: app)" for part in ("rx", "tx", "acc", "net"))
-ENVIRONMENT = {"ZENOH_RUNTIME": f"({_RUNTIME}, app: (worker_threads: 1))", "OPENBLAS_NUM_THREADS": "1"}
+_RUNTIME = "tx: (handover: app), acc: (handover: app), net: (handover: app), app: (worker_threads: 1)"
+ENVIRONMENT = {"ZENOH_RUNTIME": f"(rx: (handover: app), {_RUNTIME})", "OPENBLAS_NUM_THREADS": "1"}
+# The hub passes on what it receives while it receives: as one thread it would wait for itself as soon as more is to be sent on
+# than its queue holds, like a message of a mebibyte.
+HUB_ENVIRONMENT = {"ZENOH_RUNTIME": f"(rx: (worker_threads: 1), {_RUNTIME})"}
 
 _PRIORITIES = (
     "control",

@@ -94,6 +94,7 @@ BASES: dict[str, dict[str, Any]] = {
         **_FLOWN,
         "seed": 1,
         "dynamics": {"disturbance": 0.01, "persistence": 0.5, "kernel": {"shape": "exponential", "length": 2.0}},
+        "trust": {"largest_message": 4096, "messages_per_tick": 50},
         "record": {"every": 5, "window": 0.1},
     },
     "air": {

@@ -251,6 +251,20 @@ def file_of(name: str) -> str:
     return quote(name, safe="") + growing.ENDING
 
 
+# What NumPy says of an array that is not whole; an `OSError` of an open file is that of a place in it that cannot be.
+_UNREADABLE = (
+    ValueError,
+    TypeError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    LookupError,
+    SyntaxError,
+    OSError,
+)
+
+
 class Damaged(ValueError):
     """What lies in a run directory is not what the run wrote: which file, what is wrong in it, and the way out.
 
@@ -303,7 +317,7 @@ def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = Fa
 def _of(file: Path, *, mapped: bool) -> NDArray[Any]:
     try:
         return growing.read(file, mapped=mapped)
-    except (ValueError, TypeError, EOFError, MemoryError, OverflowError, SyntaxError) as error:
+    except _UNREADABLE as error:
         raise Damaged(file, str(error)) from error
 
 

@@ -16,8 +16,9 @@ from analysis.models.arrays import Array
 from netem.core.channels import INPUT, MEASUREMENT
 from netem.core.plain import shown
 from netem.wire import messages
-from netem.wire.arrays import WireError, channel_rows, numbers
+from netem.wire.arrays import channel_rows, numbers
 from netem.wire.keys import Keys
+from netem.wire.wrong import WireError
 from world.acts import Acts
 
 _BRIEF, _SENSE, _EXCHANGE = (f"An agent's life, {step}" for step in ("1. Brief", "3. Sense", "4. Exchange"))

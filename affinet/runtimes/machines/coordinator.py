@@ -21,12 +21,12 @@ from analysis.kernels import kernel as kernels
 from netem.core.listing import listed
 from netem.processes.supervised import BEAT_S
 from netem.wire import seats
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Arrived, Ear, NotCarried, Question, Voice
 from netem.wire.offset import SAME, ClockOffset
 from netem.wire.repeating import RepeatingSession
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import HUB, Login
+from netem.wire.wrong import WireError
 
 KEPT = 4096  # messages of a seat: what its processes write while a link is cut
 SILENT_S = 3 * BEAT_S  # then a machine is cut off

@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from affinet.runtimes.machines.identity import Identity
-from netem.wire.arrays import WireError
 from netem.wire.offset import ClockOffset
+from netem.wire.wrong import WireError
 
 T = TypeVar("T")
 

@@ -19,13 +19,13 @@ from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.coordinator import KEPT
 from affinet.runtimes.machines.joining import Admitted, Alive, Down, Ended, Joining, Logged, Part, Started, Told, Up
 from netem.wire import offset, seats
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Ear, NotCarried, Question
 from netem.wire.certificates import AGAIN
 from netem.wire.offset import ClockOffset
 from netem.wire.repeating import RepeatingSession
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import Login, client
+from netem.wire.wrong import WireError
 
 _FOUND_WITHIN_S, _TRIED_S = 60.0, 3.0  # a coordinator, whoever is started first
 _ANSWERED_WITHIN_S = 10.0

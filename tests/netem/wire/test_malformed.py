@@ -9,10 +9,12 @@ from agents.arrivals import Arrivals
 from netem.core.links import Links
 from netem.core.plain import shown
 from netem.wire import messages
-from netem.wire.arrays import Form, WireError
+from netem.wire.arrays import Form
 from netem.wire.broadcasts import Broadcasts
 from netem.wire.keys import Keys
+from netem.wire.payloads import Payloads
 from netem.wire.sequence import UninstructedLoss
+from netem.wire.wrong import WireError
 from world.acts import Acts
 
 KEYS = Keys("r1")
@@ -45,13 +47,19 @@ def with_field(plain, field, packed):
     return head + b"".join(parts)
 
 
+FORMS = {"input": {"velocity": Form((2,), truths=False)}}
+NEIGHBOURS = {agent: frozenset(LINKS.neighbours_of(agent)) for agent in (1, 2, 3)}
+
+
 def broadcast(data, key=None, tick=TICK, awaited=None):
-    reader = Broadcasts(KEYS, range(1, 4), ("input", "measurement"))
+    payloads = Payloads(FORMS, NEIGHBOURS, 2, foreign=frozenset())
+    reader = Broadcasts(KEYS, range(1, 4), ("input", "measurement"), payloads)
     return reader.read(key or KEYS.broadcast(2, "input"), data, tick, awaited or {(2, "input"), (2, "measurement")})
 
 
 def act(data):
     reader = Acts(KEYS, LINKS, 2, {"place": (2,)})
+    reader.expect([0, 12, 0])
     read = reader.read(KEYS.act(2), data, TICK, {1, 2, 3})
     return reader.together({2: read})
 
@@ -165,6 +173,7 @@ def test_an_act_that_fits_is_read_as_it_was_said(own):
 @pytest.mark.parametrize("bytes_", [True, False], ids=["bytes", "lists"])
 def test_beliefs_are_padded_to_the_widest(none, bytes_):
     reader = Acts(KEYS, LINKS, 2, {})
+    reader.expect([12, 0, 12])
     edges = {"estimate": [[4.0, 5.0]], "known": [True], "covariance": [[1.0, 0.0, 1.0]]}
     said = {name: np.array(value).tobytes() for name, value in edges.items()} if bytes_ else edges
     own = {**ACT, "src": 1, **said, "reports": {}}

@@ -27,8 +27,10 @@ from netem.faults.trigger import Trigger
 from netem.impairments.delay import DelayLaw
 from netem.loading.choice import Choice
 from netem.wire import messages
-from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, WireError, channel_rows, numbers, packed
+from netem.wire.arrays import CODE, FLOAT, TRUTH, WHOLE, Form, channel_rows, numbers, packed
+from netem.wire.intake import Trust
 from netem.wire.session import Login
+from netem.wire.wrong import WireError
 
 SIGHTED = messages.Sighted(position=packed([1.5, 2.0]), done=True, by=0, method=1)
 
@@ -410,6 +412,7 @@ MEDIUM = MediumBrief(
     seed=2**64 - 1,
     links=LINKS,
     channels=("sense", "theta"),
+    dimension=2,
     forms={"theta": {"local": Form((2, 2), truths=False)}},
     profiles=(PROFILE, DEGRADED),
     faults=(
@@ -434,6 +437,7 @@ MEDIUM = MediumBrief(
     recorded="/tmp/journal.arrows",
     positioned=np.array([True, False, False]),
     hosts={1: (1, 3)},
+    trust=Trust("drop", 1 << 20, 100, foreign=frozenset({2})),
     journal="/tmp/run/journal.arrows",
     batch=50,
 )
