@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -20,13 +21,16 @@ from netem.wire.carrier import Session
 from netem.wire.session import HUB
 from netem.wire.wrong import WireError
 
+_ROUNDING = 1e-9
+
 
 class Moment(NamedTuple):
-    """When agents wake, when they act, and when they wake again, in simulated seconds."""
+    """When agents wake, when they act, and when they wake again, in simulated seconds; and after how many ticks at the most."""
 
     wakes: float
     acts: float
     following: float
+    ticks: int
 
 
 class RealTimeAgentsNode(AgentsNode):
@@ -70,7 +74,8 @@ class RealTimeAgentsNode(AgentsNode):
     def _moment(self, clock: OwnClock, number: int) -> Moment:
         wakes = clock.when(self._timer.moment(number))
         following = clock.when(self._timer.moment(number + 1))
-        return Moment(wakes, wakes + self._timer.listens / clock.speed, following)
+        ticks = ceil(self._timer.period / clock.speed / self._agents.brief.dt - _ROUNDING)
+        return Moment(wakes, wakes + self._timer.listens / clock.speed, following, ticks)
 
     def _set(self, clock: OwnClock) -> OwnClock:
         """The clock as it runs from now on."""
@@ -120,6 +125,7 @@ class RealTimeAgentsNode(AgentsNode):
 
     def _live_by(self, moment: Moment, inboxes: Mapping[int, messages.SenseInbox]) -> None:
         late, tick = self._wall.now() - moment.wakes, next(iter(inboxes.values())).k
+        self._missed += max(0, tick - self._lived - moment.ticks)
         self._lived = tick
         self._supervisor.works(tick)
         try:
