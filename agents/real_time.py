@@ -125,7 +125,8 @@ class RealTimeAgentsNode(AgentsNode):
 
     def _live_by(self, moment: Moment, inboxes: Mapping[int, messages.SenseInbox]) -> None:
         late, tick = self._wall.now() - moment.wakes, next(iter(inboxes.values())).k
-        self._missed += max(0, tick - self._lived - moment.ticks)
+        if self._lived >= 0:
+            self._missed += max(0, tick - self._lived - moment.ticks)
         self._lived = tick
         self._supervisor.works(tick)
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,9 +38,8 @@ class RealTimeNode:
         assert brief.pace is not None, "of a run in real time"
         self._keys, self._supervisor, self._written = Keys(brief.run), supervisor, journal
         self._pace: Pace = brief.pace
-        self._relay = RealTimeRelay[bytes](
-            medium_of(brief), brief.links, len(brief.channels), self._pace.dt, self._pace.grace
-        )
+        self._brief = brief
+        self._relay = self._new_relay()
         self._ports = MediumPorts(session, brief, self._relay)
         supervisor.counts(lambda: self._ports.intake.refused)
         self._row = {name: row for row, name in enumerate(brief.channels)}
@@ -53,9 +52,14 @@ class RealTimeNode:
         self._late = 0.0
         self._over = False
 
+    def _new_relay(self) -> RealTimeRelay[bytes]:
+        brief, pace = self._brief, self._pace
+        return RealTimeRelay(medium_of(brief), brief.links, len(brief.channels), pace.dt, pace.grace)
+
     def await_everybody(self) -> None:
         """Wait until all agents and the world listen."""
         self._ports.await_everybody()
+        _rehearse(self._new_relay(), self._brief)
         be_prompt()
 
     def run(self) -> None:
@@ -142,3 +146,13 @@ class RealTimeNode:
             self._ports.tell_the_world(self._ports.journal(self._told, entry, handed, kept))
             self._written.enter(entry, self._relay.in_flight, self._supervisor.lost_anywhere())
             self._told, self._late = self._told + 1, 0.0
+
+
+def _rehearse(relay: RealTimeRelay[bytes], brief: MediumBrief) -> None:
+    """Call what a tick calls: to load kernels takes longer than a tick may."""
+    relay.begin(0, np.zeros((brief.links.agents, brief.dimension)))
+    for agent in range(1, brief.links.agents + 1):
+        for channel in range(1, len(brief.channels)):
+            relay.say(agent, channel, 0, 0.0, b"")
+    relay.arriving(np.inf)
+    deque(relay.closed(all_of_them=True), maxlen=0)
