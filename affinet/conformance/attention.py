@@ -77,7 +77,7 @@ class Attention:
         self._taken += 1
         match happened:
             case Published(stream, data):
-                self._record.said.append(Said(len(self._record.asked), stream, data))
+                self._record.said.append(Said(len(self._record.lives) - 1, len(self._record.asked), stream, data))
             case Told(life, line):
                 self._note(self._record.lives[life], line)
         return True

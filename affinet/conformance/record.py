@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -57,14 +56,15 @@ class Said(NamedTuple):
 
     Parameters
     ----------
-    after
-        How many inboxes had gone out by then.
+    life, after
+        Which of its processes there was, and how many inboxes had gone out by then.
     stream
         The channel, or `act`.
     data
         As it came.
     """
 
+    life: int
     after: int
     stream: str
     data: bytes
@@ -147,13 +147,9 @@ class Record:
         """On which it has to broadcast."""
         return list(self.plan.channels[1:])
 
-    def asks(self, phase: Phase) -> Iterator[Asked]:
-        """Inboxes of this phase."""
-        return (asked for asked in self.asked if asked.phase == phase)
-
     @cached_property
     def answers(self) -> list[Answer]:
-        """What it published, each with the inbox before it that is answered on this stream, or the first there is."""
+        """What it published, each with the inbox before it that is answered on this stream, or the first of its process."""
         return [Answer(asked, said.stream, said) for said in self.said if (asked := self._answered_by(said))]
 
     def to(self, asked: Asked, stream: str) -> list[Said]:
@@ -162,5 +158,8 @@ class Record:
 
     def _answered_by(self, said: Said) -> Asked | None:
         phase: Phase = "exchange" if said.stream == ACT else "sense"
-        before = [asked for asked in self.asked[: said.after] if asked.phase == phase]
-        return before[-1] if before else next(iter(self.asks(phase)), None)
+        own = [
+            (sent, asked) for sent, asked in enumerate(self.asked) if (asked.life, asked.phase) == (said.life, phase)
+        ]
+        before = [asked for sent, asked in own if sent < said.after]
+        return before[-1] if before else next((asked for _, asked in own), None)

@@ -23,7 +23,8 @@ def _counts_anew(record: Record) -> Iterator[str]:
 
 
 def _flies_nothing(record: Record) -> Iterator[str]:
-    yield from (said for _, said in told_input(record, 1))
+    begins = next((asked for asked in record.asked if asked.life == 1), None)
+    yield from (said for asked, said in told_input(record, 1) if asked is begins)
 
 
 def _goes_on(record: Record) -> Iterator[str]:

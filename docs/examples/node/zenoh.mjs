@@ -26,6 +26,7 @@ class Reader {
   constructor(data) {
     this.data = data;
     this.at = 0;
+    this.header = 0;
   }
 
   get more() {
@@ -157,7 +158,7 @@ export class Session {
 
   close() {
     this.write(Buffer.from([CLOSE | 0x20, 0]));
-    return new Promise((resolve) => this.socket.end(resolve));
+    return new Promise((resolve) => this.socket.end(() => resolve(undefined)));
   }
 
   async listen() {

@@ -21,7 +21,7 @@ from netem.wire import messages
 pytestmark = PROCESSES
 
 OURS = [sys.executable, "-c", "from agents.process import main; main()"]
-BRISK = Patience(ready_s=3.0, answer_s=1.5)
+BRISK = Patience(ready_s=6.0, answer_s=1.5)
 
 # What a planted fault has to show, and nothing else.
 PLANTED = {
@@ -167,7 +167,7 @@ def test_a_flight_that_breaks_off_shows_nothing_of_what_was_to_come():
         "done": "not reached",
         "acts": "not reached",
     }
-    assert found["tick"].instead[0].startswith("tick 4, sense: nothing came on input, measurement, and it sleeps")
+    assert found["tick"].instead[0].startswith("tick 6, sense: nothing came on input, measurement, and it sleeps")
 
 
 def test_the_end_of_a_log_is_told_of_who_dies():
