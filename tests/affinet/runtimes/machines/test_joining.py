@@ -10,7 +10,7 @@ from affinet.runtimes.child import RunFailed
 from affinet.runtimes.machines import identity, joining
 from affinet.runtimes.machines.coordinator import Coordinator
 from affinet.runtimes.machines.joining import Joining
-from affinet.runtimes.machines.place import Place, Refused
+from affinet.runtimes.machines.place import Place, Refused, of_folder
 from affinet.runtimes.machines.remote import RemoteProcess
 from netem.wire import seats
 from netem.wire.keys import again
@@ -170,3 +170,22 @@ def test_what_a_process_on_another_machine_says_comes_out_of_a_pipe(tmp_path):
     assert said == [joining.Say(3, b"order\n"), joining.Signal(3, 15)]
     assert (tmp_path / "log").read_bytes() == b"line\n"
     process.stdout.close()
+
+
+def test_an_address_that_is_taken_is_said(coordinator, keys):
+    login = Login(coordinator._login.endpoint, COORDINATOR, keys=keys)
+    second = Coordinator(login, [HUB], scenario="this one", gone_after_s=20.0)
+    with pytest.raises(RunFailed, match=f"the coordinator cannot listen at {login.endpoint}: .*in use"):
+        second.__enter__()
+
+
+def test_a_folder_gives_the_files_that_are_asked_for_and_none_beside_it(tmp_path):
+    (tmp_path / "there").mkdir()
+    for name in ("journal.arrows", "journal-2.arrows", "held"):
+        (tmp_path / "there" / name).write_bytes(name.encode())
+    (tmp_path / "secret").write_text("of another")
+    listed = joining.unpack(list[str], of_folder(tmp_path / "there", joining.Listing(stem="journal")))
+    assert listed == ["journal-2.arrows", "journal.arrows"]
+    assert of_folder(tmp_path / "there", joining.Part(name="journal.arrows", start=8)) == b"arrows"
+    with pytest.raises(FileNotFoundError):
+        of_folder(tmp_path / "there", joining.Part(name="../secret", start=0))
