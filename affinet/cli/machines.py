@@ -30,7 +30,8 @@ def typed(plan: Plan, parsed: argparse.Namespace) -> Callable[[Path], Spread]:
     """All but the world is elsewhere, and its commands are typed there."""
     endpoints.over_machines(parsed.listen)
     found = seats.by_hand(plan)
-    return partial(_spread, plan, found, parsed.listen, hosts.beside(parsed.listen), parsed.keys, parsed.gone_after, ())
+    keys, medium = str(Path(parsed.keys).absolute()), hosts.beside(parsed.listen)
+    return partial(_spread, plan, found, parsed.listen, medium, keys, parsed.gone_after, ())
 
 
 def started(plan: Plan, read: Hosts, folder: Path) -> Callable[[Path], Spread]:

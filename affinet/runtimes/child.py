@@ -263,7 +263,8 @@ class Child:
             "pss_mb": round(self.pss_mb, 1),
             "exit": self.process.returncode,
         }
-        return report if self.elsewhere is None else report | {"machine": self.elsewhere.where}
+        where = {} if self.elsewhere is None else {"machine": self.elsewhere.where}
+        return report | where | ({"lost": self.lost} if self.lost else {})
 
     def _event(self, line: bytes) -> Event:
         try:

@@ -67,6 +67,7 @@ class _Process:
     pss_mb: float
     exit: int | None
     machine: str | None = None
+    lost: _Count | None = None
     clock_offset_s: float | None = None
     clock_uncertainty_s: float | None = None
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import zenoh
 
-from netem.wire.session import Login, client, identity
+from netem.wire.session import CONTROL, Login, client, identity
 
 _WAITING_CHANGES = 4
 _WAITING_ENTRANTS = 1024
@@ -178,12 +178,15 @@ class Doorway:
             if event.kind != zenoh.SampleKind.PUT:
                 continue
             called = str(event.transport.zid)
-            proven, expected = self._proven(called), self._known.get(called)
+            proven, expected = self._proven(called), self._expected(called)
             if expected is None or proven not in (None, expected):
                 raise StrangerEntered(
                     f"{proven or 'somebody who has a password of this run'} opened a session called {called}: a process "
                     "has one, called by the id of its login (docs/protocol.md)"
                 )
+
+    def _expected(self, called: str) -> str | None:
+        return CONTROL if called.startswith(identity(CONTROL)) else self._known.get(called)
 
     def _proven(self, called: str) -> str | None:
         """Of whom the certificate is by which a session entered; None where it did by a password."""

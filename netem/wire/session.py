@@ -8,6 +8,7 @@ other that subscribes, so access control at the hub says, by default deny, who m
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -52,6 +53,7 @@ _LEASE_MS = 3_600_000
 # after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
 _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
 LARGEST = 2**20  # bytes that an agent may say at once; what is longer the hub drops before anybody reads it
+_ASKING = 3  # sessions of those who inject, besides one
 _LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
 
@@ -80,6 +82,11 @@ def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[s
 def identity(name: str) -> str:
     """Which Zenoh session is that of a process: another that logs in as it may do nothing, and so each has one."""
     return name.encode().hex()
+
+
+def _new_identity(name: str) -> str:
+    # Whoever injects comes and goes: a session of the same id, at once after the last, got no answer three times in 300.
+    return identity(name) + (secrets.token_hex(4) if name == CONTROL else "")
 
 
 @dataclass(frozen=True)
@@ -205,7 +212,7 @@ def listening(
         login,
         auth=_by_password(login, dictionary_file=dictionary_file) if certificates is None else {},
         tls={} if certificates is None else certificates.listening(),
-        max_sessions=len(rights),
+        max_sessions=len(rights) + _ASKING,
     )
 
 
@@ -235,7 +242,7 @@ def _config(
     lease_ms, open_ms = (_LEASE_MS, _LEASE_MS) if login.is_local else (_LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS)
     times = {"open_timeout": open_ms, "accept_timeout": open_ms, "accept_pending": _PENDING}
     return base | {
-        "id": identity(login.name),
+        "id": _new_identity(login.name),
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "shared_memory": {"enabled": False},
@@ -280,7 +287,9 @@ def _access(rights: Mapping[str, list[dict[str, Any]]], proof: str) -> dict[str,
         "enabled": True,
         "default_permission": "deny",
         "rules": [rule for rules in rights.values() for rule in rules],
-        "subjects": [{"id": name, proof: [name], "zids": [identity(name)]} for name in rights],
+        "subjects": [
+            {"id": name, proof: [name]} | ({} if name == CONTROL else {"zids": [identity(name)]}) for name in rights
+        ],
         "policies": [{"rules": [rule["id"] for rule in rules], "subjects": [name]} for name, rules in rights.items()],
     }
 

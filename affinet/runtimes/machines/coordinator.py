@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -15,8 +15,9 @@ from typing import IO, Any
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.identity import Identity, own
-from affinet.runtimes.machines.joining import Admitted, Alive, Down, Failed, Joining, Leave, Part, Start, Up
+from affinet.runtimes.machines.joining import Admitted, Joining, Leave, Listing, Part, Start
 from affinet.runtimes.machines.remote import RemoteProcess
+from affinet.runtimes.machines.seat import SILENT_S, Seat
 from analysis.kernels import kernel as kernels
 from netem.core.listing import listed
 from netem.processes.supervised import BEAT_S
@@ -29,85 +30,14 @@ from netem.wire.session import HUB, Login
 from netem.wire.wrong import WireError
 
 KEPT = 4096  # messages of a seat: what its processes write while a link is cut
-SILENT_S = 3 * BEAT_S  # then a machine is cut off
 _BACK_WITHIN_S = 1.5  # a machine whose session was closed, and not cut: else its command is dead
 _MOST_LOOKED_S = 2 * BEAT_S
 _ANSWERED_WITHIN_S = 5.0
 _LEFT_WITHIN_S = 2.0
+_LAST_S = 1.5  # once the run is given up, for answers of other machines
 _ROOM = 4096
 _CLOCK = "clock"
 _OTHER_AFFINET = "another affinet speaks there: install the same on both"
-
-
-@dataclass
-class Seat:
-    """The place of a process on another machine.
-
-    Attributes
-    ----------
-    name
-        Under which it logs in.
-    joined
-        What its machine joined with.
-    process
-        The one that runs there, or ran last.
-    """
-
-    name: str
-    voice: Voice
-    joined: Joining | None = None
-    process: RemoteProcess | None = None
-    failed: str | None = None
-    started: int = 0
-    silent_s: float = 0.0
-    gone_s: float = 0.0
-    was_closed: bool = False
-    is_here: bool = False
-    _heard: threading.Event = field(default_factory=threading.Event)
-
-    @property
-    def where(self) -> str:
-        """For people."""
-        return f"{self.name.replace('-', ' ')} on {self.joined.machine}" if self.joined else self.name
-
-    @property
-    def folder(self) -> Path:
-        """A directory of its own over there."""
-        assert self.joined is not None, "it has joined"
-        return Path(self.joined.folder)
-
-    def say(self, message: Down) -> None:
-        """Tell its machine."""
-        self.voice.say(joining.pack(message))
-
-    def lives(self, data: bytes) -> None:
-        """Its machine says so."""
-        self._heard.set()
-        alive = joining.unpack(Alive, data)
-        if self.process is not None and alive.number == self.started:
-            self.process.lives(alive)
-
-    def take(self, data: bytes) -> None:
-        """Its machine tells of its processes."""
-        message = joining.unpack(Up, data)
-        if isinstance(message, Failed):
-            self.failed = message.why
-        if self.process is not None and (isinstance(message, Failed) or message.number == self.started):
-            self.process.take(message)
-
-    def looked_at(self, since_s: float) -> None:
-        """Count how long it has been silent, while somebody looked for so many seconds more."""
-        if self._heard.is_set():
-            self._heard.clear()
-            self.silent_s = 0.0
-        else:
-            self.silent_s += since_s
-        if self.is_here:
-            self.gone_s, self.was_closed = 0.0, False
-            return
-        # A cut link goes silent first; a session that goes before was closed, since its process has died.
-        self.was_closed = self.was_closed or (self.gone_s == 0.0 and self.silent_s < SILENT_S)
-        self.gone_s += since_s
 
 
 class Coordinator:
@@ -145,17 +75,19 @@ class Coordinator:
         self._tell, self._identity = tell, identity or own()
         self._asked: queue.SimpleQueue[tuple[str, Question] | None] = queue.SimpleQueue()
         self._over = threading.Event()
-        self._is_given_up = False
+        self._given_up_s = math.inf
         self._wrong: str | None = None
         self._threads: list[threading.Thread] = []
         self._looked_s = time.monotonic()
         self.heed_too: Callable[[], None] = lambda: None
         self.seats: dict[str, Seat] = {}
-        self.lost = 0
 
     def __enter__(self) -> Coordinator:
-        session = RepeatingSession(seats.coordinator(self._login, self._names), self._note_loss, KEPT)
-        self._session = session
+        config = seats.coordinator(self._login, self._names)
+        try:
+            session = self._session = RepeatingSession(config, lambda *_: None, KEPT)
+        except NotCarried as error:
+            raise RunFailed(f"the coordinator cannot listen at {self._login.endpoint}: {error}") from error
         self.seats = {name: Seat(name, session.says(seats.down(name))) for name in self._names}
         up = session.hears(seats.up("*"), _ROOM)
         session.hands(seats.alive("*"), self._note_life)
@@ -250,7 +182,7 @@ class Coordinator:
 
     def give_up(self) -> None:
         """The run is over or has failed: nobody is waited for any more as long as a link may be cut."""
-        self._is_given_up = True
+        self._given_up_s = time.monotonic()
 
     def clock(self, name: str, medium: str = HUB) -> ClockOffset:
         """How much the medium's clock shows more than that of the machine of a seat."""
@@ -261,35 +193,34 @@ class Coordinator:
         to_coordinator = SAME if ours is None else ours.clock
         return to_coordinator.then(SAME if theirs is None else theirs.clock.back)
 
-    def fetch(self, name: str, file: str, to: Path) -> None:
-        """Bring a file that a process wrote over there.
+    def fetch(self, name: str, stem: str, to: Path) -> None:
+        """Bring all files that a process wrote over there whose names begin with a stem.
 
         Raises
         ------
         RunFailed
             When its machine does not answer.
         """
-        start, self._looked_s = 0, time.monotonic()
-        with to.open("wb") as written:
-            while part := self._part(name, Part(name=file, start=start)):
-                written.write(part)
-                start += len(part)
+        self._looked_s = time.monotonic()
+        for file in joining.unpack(list[str], self._asked_for(name, Listing(stem=stem))):
+            start = 0
+            with (to / Path(file).name).open("wb") as written:
+                while part := self._asked_for(name, Part(name=file, start=start)):
+                    written.write(part)
+                    start += len(part)
 
-    def _part(self, name: str, part: Part) -> bytes:
+    def _asked_for(self, name: str, what: Listing | Part) -> bytes:
         while True:
             try:
-                return self._session.ask(seats.file(name), joining.pack(part), _ANSWERED_WITHIN_S)
+                return self._session.ask(seats.file(name), joining.pack(what), _ANSWERED_WITHIN_S)
             except NotCarried as error:
                 if not self.heed():
-                    raise RunFailed(f"{self.seats[name].where}: {part.name} cannot be had: {error}") from error
+                    raise RunFailed(f"{self.seats[name].where}: its files cannot be had: {error}") from error
 
     def _is_over(self) -> bool:
-        if not self._is_given_up:
+        if self._given_up_s == math.inf:
             self.heed()
-        return self._is_given_up
-
-    def _note_loss(self, _key: str, count: int) -> None:
-        self.lost += count
+        return time.monotonic() - self._given_up_s > _LAST_S
 
     def _note_life(self, arrived: Arrived) -> None:
         self._guarded(arrived.key, lambda seat: seat.lives(arrived.data))

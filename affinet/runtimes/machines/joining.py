@@ -121,7 +121,13 @@ class Alive(_Message, frozen=True, kw_only=True):
     pss_mb: float
 
 
-class Part(_Message, frozen=True, kw_only=True):
+class Listing(_Message, frozen=True, kw_only=True, tag="listing"):
+    """Asks for the names of the files in the machine's folder that begin with a stem."""
+
+    stem: str
+
+
+class Part(_Message, frozen=True, kw_only=True, tag="part"):
     """Asks for a part of a file in the machine's folder."""
 
     name: str
@@ -129,12 +135,13 @@ class Part(_Message, frozen=True, kw_only=True):
 
 
 Down = Start | Say | Shut | Signal | Leave
+Wanted = Listing | Part
 Up = Started | Told | Logged | Ended | Failed
 
 _encoder = msgspec.msgpack.Encoder()
 
 
-def pack(message: _Message | float) -> bytes:
+def pack(message: _Message | float | list[str]) -> bytes:
     """A message as MessagePack."""
     return _encoder.encode(message)
 

@@ -20,14 +20,16 @@ from typing import IO, NoReturn
 
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.forked import NURSERY, Nursery, end_by
-from affinet.runtimes.machines.coordinator import SILENT_S
+from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.identity import Identity, own
 from affinet.runtimes.machines.joining import Down, Failed, Joining, Leave, Say, Shut, Signal, Start
-from affinet.runtimes.machines.place import Place, own_name, part_of
+from affinet.runtimes.machines.place import Place, of_folder, own_name
+from affinet.runtimes.machines.seat import SILENT_S
 from affinet.runtimes.private import private_folder
 from netem.processes.supervised import BEAT_S
 from netem.processes.system_errors import said
 from netem.wire import endpoints
+from netem.wire.arrays import WireError
 from netem.wire.carrier import Question
 from netem.wire.session import Login
 
@@ -194,8 +196,8 @@ class Machine:
             poll.register(fd, select.POLLIN)
         for place in self._places:
             if place.process is not None:
-                poll.register(place.process.stdout, select.POLLIN)
-                poll.register(place.log_fd, select.POLLIN)
+                for fd in place.open_fds:
+                    poll.register(fd, select.POLLIN)
                 if place.pending and not place.process.stdin.closed:
                     poll.register(place.process.stdin, select.POLLOUT)
         found = dict(poll.poll(max(0.0, 1000.0 * within_s)))
@@ -231,9 +233,9 @@ class Machine:
     def _give(self, question: Question) -> None:
         with question:
             try:
-                question.answer(part_of(self._folder, question))
-            except OSError as error:
-                question.refuse(said(error))
+                question.answer(of_folder(self._folder, joining.unpack(joining.Wanted, question.data)))
+            except (OSError, WireError) as error:
+                question.refuse(said(error) if isinstance(error, OSError) else str(error))
 
     def _start(self, place: Place, number: int, name: str) -> None:
         assert self._nursery is not None

@@ -17,7 +17,19 @@ import psutil
 from affinet.runtimes.forked import ForkedProcess
 from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.coordinator import KEPT
-from affinet.runtimes.machines.joining import Admitted, Alive, Down, Ended, Joining, Logged, Part, Started, Told, Up
+from affinet.runtimes.machines.joining import (
+    Admitted,
+    Alive,
+    Down,
+    Ended,
+    Joining,
+    Listing,
+    Logged,
+    Started,
+    Told,
+    Up,
+    Wanted,
+)
 from netem.wire import offset, seats
 from netem.wire.carrier import Ear, NotCarried, Question
 from netem.wire.certificates import AGAIN
@@ -63,6 +75,7 @@ class Place:
         self.pending = bytearray()  # for its standard input
         self.is_shut = False
         self.log_fd = -1
+        self.open_fds: set[int] = set()  # of its output, which it may close before it ends
         self.beaten = threading.Event()
 
     def __enter__(self) -> Place:
@@ -110,6 +123,7 @@ class Place:
         self.pending.clear()
         self.is_shut = False
         self._beats = 0
+        self.open_fds = {process.stdout.fileno(), log_fd}
         for fd in (process.stdin.fileno(), process.stdout.fileno(), log_fd):
             os.set_blocking(fd, False)
         self.tell(Started(number, process.pid))
@@ -123,6 +137,7 @@ class Place:
             with suppress(BlockingIOError):
                 while data := os.read(fd, 1 << 16):
                     self.tell(kind(self.number, data))
+                self.open_fds.discard(fd)
 
     def write(self) -> None:
         """Pass on what the process can take."""
@@ -189,9 +204,10 @@ class Place:
             return
 
 
-def part_of(folder: Path, question: Question) -> bytes:
-    """The part of a file of a folder that is asked for."""
-    asked: Part = joining.unpack(Part, question.data)
+def of_folder(folder: Path, asked: Wanted) -> bytes:
+    """What is asked for of a folder: the names of some files, or a part of one."""
+    if isinstance(asked, Listing):
+        return joining.pack(sorted(file.name for file in folder.iterdir() if file.name.startswith(asked.stem)))
     with (folder / Path(asked.name).name).open("rb") as file:
         file.seek(asked.start)
         return file.read(_PART)

@@ -27,7 +27,6 @@ from affinet.runtimes.machines.joining import (
 from affinet.runtimes.silence import ProcessStatus
 
 _LOOKS_S = 0.1
-_LAST_S = 1.5  # once the run is given up, for an answer from another machine
 
 
 class RemoteProcess:
@@ -53,7 +52,7 @@ class RemoteProcess:
         say
             Tells that machine.
         heed
-            Looks whether the machine is still there, and raises if it is not; whether the run has been given up.
+            Looks whether the machine is still there, and raises if it is not; whether nothing is awaited of it any more.
         log
             Where its standard error goes.
         """
@@ -98,7 +97,7 @@ class RemoteProcess:
             waited_s = time.monotonic() - began_s
             if timeout is not None and waited_s >= timeout:
                 raise subprocess.TimeoutExpired(self.where, timeout)
-            if self._heed() and waited_s >= _LAST_S:
+            if self._heed():
                 return -signal.SIGKILL  # it will be ended there: its machine finds the coordinator gone
             self._ended.wait(_LOOKS_S)
         return self.returncode

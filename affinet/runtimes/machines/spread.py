@@ -83,4 +83,4 @@ class Spread:
     def _bring(self) -> None:
         medium = self.coordinator.seats.get(HUB)
         if medium is not None and medium.process is not None:
-            self.coordinator.fetch(HUB, JOURNAL, self._out / JOURNAL)
+            self.coordinator.fetch(HUB, Path(JOURNAL).stem, self._out)

@@ -36,7 +36,7 @@ def crew(tmp_path, monkeypatch):
 
     @contextmanager
     def make(first="pass", patience=3.0):
-        monkeypatch.setattr(forked, "program", lambda _: program(first))
+        monkeypatch.setattr(forked, "program", lambda *_: program(first))
         with ProcessGroup(tmp_path, patience, Interruption()) as group:
             group.start_nursery(NOWHERE)
             yield group
@@ -50,7 +50,7 @@ def shared(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # As some parents leave it to their children: then nobody is told of the end of theirs.
         patch.setattr(
-            forked, "program", lambda _: program("import signal; signal.signal(signal.SIGCHLD, signal.SIG_IGN)")
+            forked, "program", lambda *_: program("import signal; signal.signal(signal.SIGCHLD, signal.SIG_IGN)")
         )
         with ProcessGroup(tmp_path_factory.mktemp("logs"), 3.0, Interruption()) as group:
             group.start_nursery(NOWHERE)

@@ -26,6 +26,10 @@ def line(said):
         *((role, {"event": "ready"}) for role in ("agent", "centre", "netem", "world")),
         *((role, BEAT) for role in ("agent", "centre", "netem", "world")),
         *((role, {"event": "failed", "reason": "why"}) for role in ("agent", "centre", "netem", "world")),
+        *(
+            (role, {"event": "lost", "key": "affinet/run/agent/3/rx", "count": 2})
+            for role in ("agent", "host", "netem")
+        ),
         ("agent", {"event": "done"}),
         ("centre", {"event": "done"}),
         ("netem", {"event": "done"}),
@@ -72,7 +76,7 @@ def test_what_is_not_ones_own_is_refused_with_what_may_be_said(said):
     shown = repr(said)[1:] if len(said) < 100 else f"({len(said):,} bytes)"
     assert shown in str(error.value)
     assert str(error.value).endswith(
-        "on its standard output, where it may say ready, beat, failed, user-code, done, as JSON"
+        "on its standard output, where it may say ready, beat, failed, lost, user-code, done, as JSON"
     )
     assert len(str(error.value)) < 300
 
@@ -91,6 +95,7 @@ def test_what_is_not_ones_own_is_refused_with_what_may_be_said(said):
         ("agent", BEAT | {"k": 1 << 64}, "'beat' needs k, what, waits"),
         ("agent", BEAT | {"waits": "netem"}, "'beat' needs k, what, waits"),
         ("agent", BEAT | {"waits": [1]}, "'beat' needs k, what, waits"),
+        ("agent", {"event": "lost", "key": "a key 1\nleave", "count": 2}, "'lost' needs key, count"),
         ("netem", {"event": "done", "in_flight": 0}, "'done' has nothing else in it"),
         ("world", {"event": "done", "in_flight": 0}, "'done' needs uninstructed"),
         ("world", {"event": "tick", "k": 3, "error": "0.5"}, "'tick' needs k, error"),

@@ -188,7 +188,7 @@ def test_a_medium_whose_accounts_do_not_close_fails_the_run(monkeypatch, tmp_pat
         pytest.param(
             "prints",
             """agent 2 (pid {pid}): it said '{{"event":"kill","agents":[1]}}' on its standard output, """
-            "where it may say ready, beat, failed, user-code, done, as JSON (docs/protocol.md)",
+            "where it may say ready, beat, failed, lost, user-code, done, as JSON (docs/protocol.md)",
             id="an order that is the world's",
         ),
         pytest.param(

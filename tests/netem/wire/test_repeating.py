@@ -2,11 +2,12 @@
 
 from datetime import timedelta
 
+import msgpack
 import pytest
 
 from netem.wire import authority
 from netem.wire.carrier import await_heard
-from netem.wire.keys import Keys
+from netem.wire.keys import Keys, again
 from netem.wire.repeating import Incoming, RepeatingSession, opened
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import HUB, WORLD, Login, agent_name, client, hub
@@ -162,6 +163,6 @@ def test_an_agent_cannot_ask_for_what_was_said_to_another(star):
         await_heard([voice])
         voice.say(b"private")
         assert ear.next().data == b"private"
-        theirs = one.hears(run.inbox(2), 16)
-        theirs._ask()
-        assert not theirs._turn
+        question = msgpack.packb((0, {}))
+        assert two.ask_all(again(run.inbox(2)), question, 5.0)
+        assert not one.ask_all(again(run.inbox(2)), question, 1.0)
