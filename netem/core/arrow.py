@@ -13,12 +13,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.models.arrays import Integers, Mask
-from netem.core.parts import LARGEST, part, parts
+from netem.core.parts import part, parts
 from netem.core.plain import to_plain
 
 Names = Sequence[str] | NDArray[np.str_]
 
 _NOTE = b"note"
+LARGEST = 2**26  # bytes, after which the next part begins
 NAMES = pa.dictionary(pa.int8(), pa.string())
 
 

@@ -28,7 +28,7 @@ from world.recording.logbook import GRAPH, GRAPH_SCHEMA
 
 pytestmark = PROCESSES
 
-LONG = ("time.duration=60", "record.enabled=false", 'agents.estimator="none"')
+LONG = ("time.duration=6", "record.enabled=false", 'agents.estimator="none"')  # 6,000 ticks
 SETTLED = 2000  # ticks
 
 

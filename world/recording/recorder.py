@@ -20,7 +20,7 @@ from analysis.models.arrays import Array, Mask
 from analysis.models.information import reported
 from analysis.models.reports import NIS
 from netem.core.channels import PLACE, THETA
-from netem.core.parts import LARGEST, part
+from netem.core.parts import part
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
@@ -56,6 +56,9 @@ _LINK_COLOURS = {
     Verdict.OVERFLOW: 0x26C6DAFF,
 }
 _FLUSH_S = 20.0
+LARGEST = (
+    2**23
+)  # bytes, after which the next part begins: the library holds 0.7 kB of each chunk of one, for its ending
 Layer = Places | Pursued | PerceivedFormations
 _COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 
