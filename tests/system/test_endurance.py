@@ -96,6 +96,7 @@ def readable(out):
 
 FULL = """
 import json, sys
+from pathlib import Path
 from affinet.planning import making
 from affinet.runtimes.run import fly
 from affinet.scenario import loading

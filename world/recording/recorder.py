@@ -173,8 +173,12 @@ class Recorder:
         self._flush()  # what a killed run leaves can be read from the first tick on
 
     def _flush(self) -> None:
-        with writing(self._path):
-            self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
+        try:
+            with writing(self._path):
+                self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
+        except NotRecorded:
+            if self._viewer is None:  # else it may be gone, and whether the file is whole shows when it is closed
+                raise
 
     def _log_static(self) -> None:
         numbers = [str(agent) for agent in range(1, self._formation.agents + 1)]
