@@ -125,7 +125,7 @@ def scan(path: Path, schema: Any, only: str | None = None) -> Iterator[tuple[Any
     files = parts(path) or [path]
     for file in files:
         try:
-            stream = pa.ipc.open_stream(pa.memory_map(str(file)), options=options)
+            stream = pa.ipc.open_stream(pa.OSFile(str(file), "rb"), options=options)
         except (OSError, pa.ArrowInvalid) as error:
             if file == files[-1] != path:  # who wrote it was killed where it began
                 return
