@@ -13,12 +13,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.models.arrays import Integers, Mask
-from netem.core.parts import LARGEST, part, parts
+from netem.core.parts import part, parts
 from netem.core.plain import to_plain
 
 Names = Sequence[str] | NDArray[np.str_]
 
 _NOTE = b"note"
+LARGEST = 2**26  # bytes, after which the next part begins
 NAMES = pa.dictionary(pa.int8(), pa.string())
 
 
@@ -124,7 +125,7 @@ def scan(path: Path, schema: Any, only: str | None = None) -> Iterator[tuple[Any
     files = parts(path) or [path]
     for file in files:
         try:
-            stream = pa.ipc.open_stream(pa.memory_map(str(file)), options=options)
+            stream = pa.ipc.open_stream(pa.OSFile(str(file), "rb"), options=options)
             has = stream.schema.names
         except (OSError, pa.ArrowException, ValueError) as error:
             if file == files[-1] != path:  # who wrote it was killed where it began

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-LARGEST = 2**26  # bytes, after which the next part begins
-
 
 def part(path: Path, number: int) -> Path:
     """A part of a file, the first of which has its own name."""

@@ -24,6 +24,7 @@ SMALLEST = {
 }
 ELSEWHERE = {
     "accuracy": "netem/impairments/test_models.py",
+    "endurance": "system/test_endurance.py",
     "kills": "system/test_kills.py",
     "redcho": "system/test_redcho.py",
 }

@@ -28,7 +28,7 @@ from world.recording.logbook import GRAPH, GRAPH_SCHEMA
 
 pytestmark = PROCESSES
 
-LONG = ("time.duration=60", "record.enabled=false", 'agents.estimator="none"')
+LONG = ("time.duration=6", "record.enabled=false", 'agents.estimator="none"')  # 6,000 ticks
 SETTLED = 2000  # ticks
 
 
@@ -96,6 +96,7 @@ def readable(out):
 
 FULL = """
 import json, sys
+from pathlib import Path
 from affinet.planning import making
 from affinet.runtimes.run import fly
 from affinet.scenario import loading

@@ -20,7 +20,7 @@ from analysis.models.arrays import Array, Mask
 from analysis.models.information import reported
 from analysis.models.reports import NIS
 from netem.core.channels import PLACE, THETA
-from netem.core.parts import LARGEST, part
+from netem.core.parts import part
 from netem.faults.timeline import Conditions, Timeline
 from netem.medium.verdict import REASONS, Verdict, VerdictCodes
 from netem.processes import system_errors
@@ -58,6 +58,9 @@ _LINK_COLOURS = {
     Verdict.UNSAID: 0xF48FB1FF,
 }
 _FLUSH_S = 20.0
+LARGEST = (
+    2**23
+)  # bytes, after which the next part begins: the library holds 0.7 kB of each chunk of one, for its ending
 Layer = Places | Pursued | PerceivedFormations
 _COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 
@@ -184,8 +187,12 @@ class Recorder:
         self._flush()  # what a killed run leaves can be read from the first tick on
 
     def _flush(self) -> None:
-        with writing(self._path):
-            self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
+        try:
+            with writing(self._path):
+                self._stream.flush(timeout_sec=_FLUSH_S)  # without end it would wait for a writer that has given up
+        except NotRecorded:
+            if self._viewer is None:  # else it may be gone, and whether the file is whole shows when it is closed
+                raise
 
     def _log_static(self) -> None:
         numbers = [str(agent) for agent in range(1, self._formation.agents + 1)]

@@ -29,9 +29,9 @@ from affinet.runtimes.private import private_folder
 from netem.processes.supervised import BEAT_S
 from netem.processes.system_errors import said
 from netem.wire import endpoints
-from netem.wire.arrays import WireError
 from netem.wire.carrier import Question
 from netem.wire.session import Login
+from netem.wire.wrong import WireError
 
 _GRACE_S = 1.2
 _READY_S = 60.0

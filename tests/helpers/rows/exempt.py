@@ -38,6 +38,7 @@ EXEMPT = {
         netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
         netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
         netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.faults.timeline.Timeline.each
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
@@ -83,7 +84,9 @@ EXEMPT = {
         netem.medium.relay.Relayed.entry netem.medium.journal.Recorded.verdicts
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
-        world.books.history.digest world.books.history.one_nan
+        world.books.history.digest world.books.history.one_nan world.books.history.forms world.books.history.by_span
+        world.books.archive.Archive.extend world.books.growing.GrowingArray.write world.books.growing.let_go
+        world.books.growing.read
         analysis.metrics.consistency.averaged analysis.metrics.consistency.correlation_time world.books.history.form
         world.books.history.refuse_those_of_another
         world.books.localized.FirstMeasurements.of
