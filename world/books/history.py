@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
@@ -250,7 +251,7 @@ class History:
 # it that cannot be.
 _UNREADABLE = (
     ValueError, TypeError, EOFError, MemoryError, NotImplementedError, RuntimeError, LookupError, SyntaxError, OSError,
-    BadZipFile, zlib.error,
+    BadZipFile, TokenError, zlib.error,
 )  # fmt: skip
 
 
