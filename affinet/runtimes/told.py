@@ -50,7 +50,7 @@ def _is_refusal(value: Any) -> bool:
     if type(value) is not list or len(value) != 3:
         return False
     agent, wrong, count = value
-    return (agent is None or _is_count(agent)) and wrong in _WRONG and _is_count(count)
+    return (agent is None or _is_count(agent)) and _is_text(wrong) and wrong in _WRONG and _is_count(count)
 
 
 def _all(check: Check) -> Check:

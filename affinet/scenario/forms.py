@@ -52,6 +52,8 @@ EXAMPLES: Mapping[str, Any] = {
     "network.links.profile": "wifi_busy",
     "network.zones.links": "all",
     "network.zones.centre": [0.0, 0.0],
+    "trust.largest_message": 1 << 20,
+    "trust.messages_per_tick": 100,
     "timeline": [{"verb": "cut", "at": 1.0, "links": ["1-2"]}],
     "timeline.name": "first",
     "timeline.at": 1.0,

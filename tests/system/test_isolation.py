@@ -36,7 +36,8 @@ def fly(plan, out, **programs):
     return history.load(out / history.ARRAYS)
 
 
-def test_a_rogue_gets_nothing_through(out, tmp_path):
+def test_a_rogue_gets_nothing_through(out, tmp_path, monkeypatch):
+    monkeypatch.setenv("RUST_LOG", "zenoh::net::routing::interceptor::access_control=trace")
     cut_off = (
         *("time.dt=0.02", "time.duration=0.6", "agents.parameters.static.alpha=2", 'agents.estimator="crkf"'),
         'timeline=[{verb="cut",at=0.0,links=["5"]}]',
@@ -47,6 +48,10 @@ def test_a_rogue_gets_nothing_through(out, tmp_path):
     told = json.loads(report.read_text())
     assert told["lies"] == 9 * 5 * 20
     assert told["heard"] == ["agent/5/rx", "agent/5/told"]
+    # All that can be known of what is refused before anybody of ours sees it; some is lost in the queue of who says it.
+    lines = (out / "logs" / "netem.log").read_text().splitlines()
+    refused = [line for line in lines if "Username(agent-5)" in line and "is unauthorized to Put (ingress)" in line]
+    assert refused
     assert history.digest(arrays) == digest_of("rigid", *cut_off)
 
 

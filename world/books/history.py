@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, NamedTuple
 from urllib.parse import quote, unquote
 
@@ -253,16 +254,8 @@ def file_of(name: str) -> str:
 
 # What NumPy says of an array that is not whole; an `OSError` of an open file is that of a place in it that cannot be.
 _UNREADABLE = (
-    ValueError,
-    TypeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    RuntimeError,
-    LookupError,
-    SyntaxError,
-    OSError,
-)
+    ValueError, TypeError, EOFError, MemoryError, OverflowError, RuntimeError, LookupError, SyntaxError, OSError, TokenError,
+)  # fmt: skip
 
 
 class Damaged(ValueError):

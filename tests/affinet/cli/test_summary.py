@@ -2,6 +2,7 @@
 
 import json
 import platform
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -70,3 +71,24 @@ def test_agents_that_pursue_a_target_say_how_far_it_is_and_how_well_they_know_it
     assert "tracking_error" not in told
     assert {"goal distance", "target error"} <= rows.keys()
     assert "tracking error" not in rows
+
+
+REFUSED = (
+    {"agent": 2, "by": "netem", "wrong": "flood", "count": 7},
+    {"agent": 2, "by": "world", "wrong": "oversized", "count": 1},
+    {"agent": None, "by": "netem", "wrong": "malformed", "count": 2},
+)
+
+
+def test_what_was_refused_is_said_of_each_agent_and_qualifies_the_verdict(capsys):
+    evidence = rehearse(plan_of("corridor", "time.dt=0.05", "time.duration=0.5"))
+    assert evidence.outcome.says == "pass"
+    evidence = replace(evidence, outcome=replace(evidence.outcome, refused=REFUSED))
+    show.outcome(evidence.outcome, evidence.plan)
+    said = capsys.readouterr().out
+    assert said.splitlines()[0].strip() == evidence.outcome.says == "pass, 10 wrong messages refused"
+    rows = table(evidence, capsys)
+    assert rows["wrong, of agent 2"] == "7 flood (netem), 1 oversized (world)"
+    assert rows["wrong, of the control login"] == "2 malformed (netem)"
+    assert summary(evidence)["refused"] == list(REFUSED)
+    assert replace(evidence.outcome, verdict="fail").says == "fail"

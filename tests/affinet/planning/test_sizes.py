@@ -6,11 +6,12 @@ from extremes import BASES
 from flying import plan_of
 from scripted import timeline
 
+from affinet.planning import limits
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import Scenario
+from affinet.scenario.sections import Scenario, TrustSection
 from affinet.studies.batch import fly_all
 from analysis.metrics.errors import procrustes_error, root_mean_square, tracking_error
 from analysis.models import graph
@@ -139,3 +140,20 @@ def test_check_says_that_half_a_turn_by_theta_collapses_the_formation():
     assert said(half % (0.0, 1, 1, ",angle=0.0"), half % (9.0, 1, 1, ",angle=6.283185307179586")) == [
         ("ok", "the formation turns by 6.28 rad from keyframe to keyframe")
     ]
+
+
+def test_agents_that_say_more_at_once_than_is_taken_do_not_fly():
+    given = ['formation={preset="swarm50"}', "agents.law=static", "agents.estimator=joint-kf", "time.duration=0.1"]
+    assert planning.make(loading.load("corridor", given))
+    with pytest.raises(
+        PlanError, match=r"agents say up to .* at once, and 1 KiB are taken; raise trust\.largest_message"
+    ):
+        planning.make(loading.load("corridor", [*given, "trust.largest_message=1024"]))
+
+
+def test_agents_that_speak_more_often_than_is_looked_at_do_not_fly():
+    said, trust = np.full(11, 100.0), TrustSection(messages_per_tick=10)
+    (finding,) = limits.messages(said, plan_of("corridor").world, {}, trust)
+    assert finding.fatal
+    assert "agents speak 11 times in a tick, and 10 messages are looked at" in finding.says
+    assert not limits.messages(said[:10], plan_of("corridor").world, {}, trust)

@@ -30,6 +30,8 @@ def line(said):
             (role, {"event": "lost", "key": "affinet/run/agent/3/rx", "count": 2})
             for role in ("agent", "host", "netem")
         ),
+        *((role, {"event": "refused", "of": [[2, "flood", 7]]}) for role in ("centre", "netem", "world")),
+        ("netem", {"event": "refused", "of": [[None, "malformed", 1]]}),
         ("agent", {"event": "done"}),
         ("centre", {"event": "done"}),
         ("netem", {"event": "done"}),
@@ -228,3 +230,39 @@ def test_a_death_is_noticed_though_a_grandchild_keeps_the_pipe_open(tmp_path):
 def test_the_end_of_a_long_log_is_told(tmp_path):
     says = "os.write(2, b'y' * 3_000_000 + b'\\nthe end\\n'); os._exit(3)"
     assert failure_of(tmp_path, says).endswith("\n    the end")
+
+
+@pytest.mark.parametrize(
+    "of",
+    [
+        *(7, None, {}, [7], [[]], [[2, "flood"]], [[2, "flood", 7, 8]]),
+        *(
+            [["2", "flood", 7]],
+            [[-1, "flood", 7]],
+            [[2, "lunch", 7]],
+            [[2, ["flood"], 7]],
+            [[2, "flood", -1]],
+            [[2, "flood", 0.5]],
+        ),
+    ],
+    ids=str,
+)
+def test_what_is_refused_is_told_as_agents_kinds_and_counts(of):
+    with pytest.raises(NotItsOwn, match="'refused' needs of"):
+        told.read("world", line({"event": "refused", "of": of}))
+
+
+def test_an_agent_tells_of_nothing_that_it_refused():
+    with pytest.raises(NotItsOwn, match="where it may say"):
+        told.read("agent", line({"event": "refused", "of": []}))
+
+
+def test_what_is_refused_is_counted_and_moves_nothing(tmp_path):
+    """Before it was counted apart, a flood would have been progress, and a run that waits would never have stalled."""
+    says = [{"event": "refused", "of": [[2, "flood", count]]} for count in (7, 9)]
+    program = [sys.executable, "-S", "-c", "import sys; print(sys.argv[1], flush=True); sys.stdin.read()"]
+    with ProcessGroup(tmp_path, 60.0, Interruption()) as crew:
+        child = crew.start("world", [*program, "\n".join(map(json.dumps, says))], {})
+        while child.refused != {(2, "flood"): 9}:
+            assert crew.listen() == []
+        assert crew._moved_s == 0.0
