@@ -9,7 +9,6 @@ from netem.wire import messages
 from netem.wire.carrier import Arrived, Session, Voice
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering, Sequences
-from netem.wire.session import LARGEST
 from netem.wire.wrong import WireError, Wrong
 
 _WAITING = 4096  # messages that may wait
@@ -162,17 +161,9 @@ class Mailbox:
         """Tell the neighbours, and in real time when this is said, in simulated seconds."""
         seq = self._numbers.next(channel)
         said = messages.Broadcast(k=tick, src=self.agent, channel=channel, seq=seq, payload=payload, at=at)
-        self._say(self._broadcasts[channel], repr(channel), messages.pack(said))
+        self._broadcasts[channel].say(messages.pack(said))
 
     def act(self, tick: int, **said: Any) -> None:
         """Tell the world what it does, and believes."""
         act = messages.Act(k=tick, src=self.agent, seq=self._numbers.next("act"), heard=self.heard, **said)
-        self._say(self._act, "'act'", messages.pack(act))
-
-    def _say(self, voice: Voice, key: str, data: bytes) -> None:
-        if len(data) > LARGEST:
-            raise WireError(
-                f"agent {self.agent} says {len(data)} bytes on {key}, and nobody hears more than {LARGEST} at once: "
-                "have its estimator say or report less"
-            )
-        voice.say(data)
+        self._act.say(messages.pack(act))

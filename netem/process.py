@@ -22,7 +22,8 @@ from netem.wire.session import HUB_ENVIRONMENT, dictionary, hub
 def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
     agents = range(1, brief.links.agents + 1)
     with dictionary(brief.passwords) as file:
-        return opened(hub(brief.login, file, Keys(brief.run), agents, brief.hosts), brief.login, supervisor.lost)
+        config = hub(brief.login, file, Keys(brief.run), agents, brief.hosts, brief.trust.largest_message)
+        return opened(config, brief.login, supervisor.lost)
 
 
 def main() -> None:

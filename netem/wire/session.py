@@ -52,7 +52,8 @@ _LEASE_MS = 3_600_000
 # Between machines a link breaks: it has to be noticed before TCP, which waits twice as long from try to try, comes to look only
 # after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
 _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
-LARGEST = 2**20  # bytes that an agent may say at once; what is longer the hub drops before anybody reads it
+LARGEST = 2**20  # bytes that an agent may say at once, if nobody says otherwise
+_BEYOND = 4  # times as much the hub drops before anybody reads it; what is between is counted, and its agent named
 _ASKING = 3  # sessions of those who inject, besides one
 _LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
@@ -169,7 +170,12 @@ def client(login: Login, patience_s: float | None = None) -> dict[str, Any]:
 
 
 def hub(
-    login: Login, dictionary_file: str | None, keys: Keys, agents: Iterable[int], hosts: Mapping[int, Iterable[int]]
+    login: Login,
+    dictionary_file: str | None,
+    keys: Keys,
+    agents: Iterable[int],
+    hosts: Mapping[int, Iterable[int]],
+    largest: int = LARGEST,
 ) -> dict[str, Any]:
     """Configuration of the medium: listens on one endpoint, knows who logs in and what each of them may do.
 
@@ -183,6 +189,8 @@ def hub(
         All agents.
     hosts
         For each process that carries several of them, which.
+    largest
+        What an agent may say at once, in bytes.
 
     Raises
     ------
@@ -190,15 +198,19 @@ def hub(
         When it would listen beyond this machine without certificates, or these will not do.
     """
     limited = [keys.broadcast("*", "**"), keys.act("*"), keys.control]
-    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts), limited)
+    return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts), limited, largest)
 
 
 def listening(
-    login: Login, dictionary_file: str | None, rights: Mapping[str, list[dict[str, Any]]], limited: list[str]
+    login: Login,
+    dictionary_file: str | None,
+    rights: Mapping[str, list[dict[str, Any]]],
+    limited: list[str],
+    largest: int = LARGEST,
 ) -> dict[str, Any]:
     """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone.
 
-    Nobody may say more than a mebibyte at once on the keys that are `limited`.
+    On the keys that are `limited` nobody is heard who says more than four times the `largest` at once.
     """
     login.check()
     certificates = login.certificates
@@ -206,7 +218,7 @@ def listening(
         {
             "mode": "router",
             "listen": {"endpoints": [login.endpoint]},
-            "low_pass_filter": [_no_longer_than(LARGEST, limited)],
+            "low_pass_filter": [_no_longer_than(_BEYOND * largest, limited)],
             "access_control": _access(rights, "usernames" if certificates is None else "cert_common_names"),
         },
         login,
