@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from netem.core import channels
@@ -21,14 +22,16 @@ class Inboxes:
     ----------
     agent, neighbours
         Whose they are, and the numbers of the agents in its neighbour slots.
-    in_real_time
-        Whether exchanges come as messages do, and it may begin with any inbox.
+    lost
+        In real time, where exchanges come as messages do, and it may begin with any inbox: told how many are missing.
     """
 
-    def __init__(self, agent: int, neighbours: tuple[int, ...], *, in_real_time: bool = False) -> None:
+    def __init__(
+        self, agent: int, neighbours: tuple[int, ...], *, lost: Callable[[str, int], None] | None = None
+    ) -> None:
         self._whose, self._neighbours = f"agent {agent}: its inbox", frozenset(neighbours)
-        self._in_real_time = in_real_time
-        self._numbers = Sequences("the medium's", from_any=in_real_time)
+        self._in_real_time = lost is not None
+        self._numbers = Sequences("the medium's", from_any=self._in_real_time, lost=lost)
         self._tick, self._sensed = -1, False
 
     def read(self, data: bytes) -> messages.Inbox:
@@ -79,8 +82,8 @@ class Mailbox:
         The channels on which it broadcasts arrays; measurements are broadcast too.
     hears_centre
         Whether a centre tells it its edges.
-    in_real_time
-        Whether nobody waits for it: it may miss what the medium tells it at first, and hears as messages come.
+    lost
+        In real time, where nobody waits for it, and it may miss what the medium tells it: told on which key, and how much.
     """
 
     def __init__(
@@ -92,10 +95,11 @@ class Mailbox:
         spoken: list[str],
         *,
         hears_centre: bool,
-        in_real_time: bool = False,
+        lost: Callable[[str, int], None] | None = None,
     ) -> None:
         keys = Keys(run)
-        self.agent, self.neighbours, self._in_real_time = agent, neighbours, in_real_time
+        self.agent, self.neighbours = agent, neighbours
+        self._lost = lost and (lambda _, number: lost(keys.inbox(agent), number))
         self.begin()
         self._inbox = session.hears(keys.inbox(agent), _WAITING)
         self._told = session.hears(keys.told(agent), _WAITING) if hears_centre else None
@@ -106,7 +110,7 @@ class Mailbox:
         """Nothing was said or heard: the agent is new."""
         self.heard = 0
         self._numbers = Numbering()
-        self._inboxes = Inboxes(self.agent, self.neighbours, in_real_time=self._in_real_time)
+        self._inboxes = Inboxes(self.agent, self.neighbours, lost=self._lost)
         self._tellings = Sequences("the centre's")
 
     @property

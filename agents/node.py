@@ -5,7 +5,7 @@ They hear the medium, let `Agent` decide, and speak, each on keys of its own.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -48,8 +48,9 @@ class AgentBrief:
         Whether a centre tells it its edges.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
-    timer
-        When it wakes, in a run in real time; None in lockstep.
+    timer, clock_s
+        When it wakes, in a run in real time, None in lockstep; and how much the medium's clock shows more than that of its
+        machine, in seconds.
     """
 
     run: str
@@ -67,6 +68,7 @@ class AgentBrief:
     checkpoint: str | None
     remembers: bool
     timer: Timer | None
+    clock_s: float
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class AgentsNode:
         briefs: Sequence[AgentBrief],
         host: int | None = None,
         *,
-        in_real_time: bool = False,
+        lost: Callable[[str, int], None] | None = None,
     ) -> None:
         """Nothing is said yet.
 
@@ -107,8 +109,8 @@ class AgentsNode:
             What each of the agents is told.
         host
             Which of the run's hosts this is; None of an agent that has its process to itself.
-        in_real_time
-            Whether nobody waits for them.
+        lost
+            In real time, where nobody waits for them: told on which key messages are missing, and how many.
         """
         first, brief = briefs[0], together([one.brief for one in briefs])
         self._supervisor = supervisor
@@ -134,7 +136,7 @@ class AgentsNode:
                 one.neighbours,
                 sorted(self._forms),
                 hears_centre=one.hears_centre,
-                in_real_time=in_real_time,
+                lost=lost,
             )
             for one in briefs
         }

@@ -26,15 +26,18 @@ def host() -> NoReturn:
 
 def _fly(supervisor: Supervisor) -> None:
     brief = supervisor.brief(AgentBrief)
-    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
+    with supervisor.confessing(), _session(supervisor, brief) as session:
         _until_the_end(supervisor, node_of(session, supervisor, [brief], None))
 
 
 def _carry(supervisor: Supervisor) -> None:
     brief = supervisor.brief(HostBrief)
-    login = brief.agents[0].login
-    with supervisor.confessing(), opened(client(login), login, supervisor.lost) as session:
+    with supervisor.confessing(), _session(supervisor, brief.agents[0]) as session:
         _until_the_end(supervisor, node_of(session, supervisor, brief.agents, brief.host))
+
+
+def _session(supervisor: Supervisor, brief: AgentBrief) -> Session:
+    return opened(client(brief.login), brief.login, supervisor.lost, in_real_time=brief.timer is not None)
 
 
 def node_of(session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None) -> AgentsNode:

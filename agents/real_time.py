@@ -39,10 +39,10 @@ class RealTimeAgentsNode(AgentsNode):
     def __init__(
         self, session: Session, supervisor: Supervisor, briefs: Sequence[AgentBrief], host: int | None = None
     ) -> None:
-        super().__init__(session, supervisor, briefs, host, in_real_time=True)
+        super().__init__(session, supervisor, briefs, host, lost=supervisor.lost)
         first = briefs[0]
         assert first.timer is not None, "of a run in real time"
-        self._timer = first.timer
+        self._timer, self._clock_s = first.timer, first.clock_s
         algorithms = (first.estimator.build(), first.law.build())
         self._only_of_now = any(capabilities.wants(algorithm).synchronous for algorithm in algorithms)
         self._senses: dict[int, messages.SenseInbox] = {}
@@ -94,7 +94,7 @@ class RealTimeAgentsNode(AgentsNode):
         began = next(iter(self._senses.values())).began if self._senses else 0.0
         if began is None:
             raise WireError("the medium: SenseInbox: began: a run in real time begins at a time (see docs/protocol.md)")
-        return WallTime(began, self._timer.factor)
+        return WallTime(began - self._clock_s, self._timer.factor)
 
     def _listen(self) -> None:
         for called in [] if self._roster is None else self._roster.waiting():

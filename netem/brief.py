@@ -42,8 +42,9 @@ class MediumBrief:
         What is taken from agents.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
-    pace
-        How time goes in a run in real time; None in lockstep.
+    pace, clock_s
+        How time goes in a run in real time, None in lockstep; and how much the medium's clock shows more than the world's, in
+        seconds.
     """
 
     run: str
@@ -65,3 +66,4 @@ class MediumBrief:
     journal: str
     batch: int
     pace: Pace | None
+    clock_s: float

@@ -44,7 +44,9 @@ class Seen(NamedTuple):
 class MediumPorts:
     """The medium's place on the network: whom it hears, and how it says what was decided."""
 
-    def __init__(self, session: Session, brief: MediumBrief, relay: FaultedRelay) -> None:
+    def __init__(
+        self, session: Session, brief: MediumBrief, relay: FaultedRelay, lost: Callable[[str, int], None] | None = None
+    ) -> None:
         keys = Keys(brief.run)
         agents = range(1, brief.links.agents + 1)
         self._brief = brief
@@ -55,7 +57,7 @@ class MediumPorts:
         self.intake = Intake(brief.trust)
         neighbours = {agent: frozenset(brief.links.neighbours_of(agent)) for agent in agents}
         payloads = Payloads(brief.forms, neighbours, brief.dimension, brief.trust.foreign)
-        self.reader = Broadcasts(keys, agents, self.spoken, payloads, in_real_time=brief.pace is not None)
+        self.reader = Broadcasts(keys, agents, self.spoken, payloads, in_real_time=brief.pace is not None, lost=lost)
         self._senses = Senses(len(brief.links), brief.links.agents, brief.dimension)
         self._numbers = Numbering()
         self._journal = session.says(keys.journal)
@@ -132,8 +134,10 @@ class MediumPorts:
         rows = np.flatnonzero(arrived)  # links toward one agent stand together
         return Seen(rows, self._links.src[rows].tolist(), np.searchsorted(rows, self._ends).tolist())
 
-    def hand_out_measurements(self, sense: messages.Sense, awake: Iterable[int], seen: Seen) -> None:
-        """Tell those who are awake what they sense."""
+    def hand_out_measurements(
+        self, sense: messages.Sense, awake: Iterable[int], seen: Seen, began: float | None = None
+    ) -> None:
+        """Tell those who are awake what they sense, and in real time when the run began, by the medium's clock."""
         timeline = self._relay.timeline
         clock, gains = timeline.clock(sense.k).tolist(), timeline.gains(sense.k).tolist()
         links, neighbours, ends = seen
@@ -152,8 +156,8 @@ class MediumPorts:
                 position=position[agent - 1] if self._positioned[agent - 1] else None,
                 motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
-                began=sense.began,
-                gains=0.0 if sense.began is None else gains[agent - 1],
+                began=began,
+                gains=0.0 if began is None else gains[agent - 1],
             )
             self._inboxes[agent].say(messages.pack(inbox))
 

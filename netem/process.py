@@ -23,7 +23,7 @@ def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
     agents = range(1, brief.links.agents + 1)
     with dictionary(brief.passwords) as file:
         config = hub(brief.login, file, Keys(brief.run), agents, brief.hosts, brief.trust.largest_message)
-        return opened(config, brief.login, supervisor.lost)
+        return opened(config, brief.login, supervisor.lost, in_real_time=brief.pace is not None)
 
 
 def main() -> None:

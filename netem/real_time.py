@@ -40,7 +40,7 @@ class RealTimeNode:
         self._pace: Pace = brief.pace
         self._brief = brief
         self._relay = self._new_relay()
-        self._ports = MediumPorts(session, brief, self._relay)
+        self._ports = MediumPorts(session, brief, self._relay, supervisor.lost)
         supervisor.counts(lambda: self._ports.intake.refused)
         self._row = {name: row for row, name in enumerate(brief.channels)}
         self._ears = session.hears_all([self._keys.sense, self._keys.broadcast("*", "*")])
@@ -94,7 +94,7 @@ class RealTimeNode:
         if self._wall is None:
             if sense.began is None:
                 raise WireError("the world: Sense: began: a run in real time begins at a time (see docs/protocol.md)")
-            self._wall = WallTime(sense.began, self._pace.factor)
+            self._wall = WallTime(sense.began + self._brief.clock_s, self._pace.factor)
         self._tick = sense.k
         if sense.fired:
             self._relay.fire(sense.fired, sense.k)
@@ -103,7 +103,7 @@ class RealTimeNode:
         self._awake = frozenset(begun.awake)
         self._ports.welcome_back(sense.k)
         self._ports.call(sense.k, self._awake)
-        self._ports.hand_out_measurements(sense, begun.awake, self._ports.seen(begun.seen))
+        self._ports.hand_out_measurements(sense, begun.awake, self._ports.seen(begun.seen), self._wall.began)
         self._write_down()
         self._supervisor.waits(sense.k, "what it senses", lambda: (WORLD,))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -52,6 +52,8 @@ class Acts:
     in_real_time
         Whether what was decided in an earlier tick may come; what is awaited, and what was handed out by now, does not matter
         then.
+    lost
+        Told on which key, and how many acts are missing, if that is no reason to refuse the next one.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Acts:
         limit: float | None = None,
         *,
         in_real_time: bool = False,
+        lost: Callable[[str, int], None] | None = None,
     ) -> None:
         self._in_real_time = in_real_time
         self._speaking = {keys.act(agent): agent for agent in range(1, links.agents + 1)}
@@ -77,7 +80,8 @@ class Acts:
         ]
         self._reports = {name: Form(shape, truths=False) for name, shape in reports.items()}
         self._unsaid = [packed(np.full(shape, np.nan)) for shape in reports.values()]
-        self._streams = Sequences("agent")
+        of_act = {f"{agent} act": key for key, agent in self._speaking.items()}
+        self._streams = Sequences("agent", lost=lost and (lambda stream, number: lost(of_act[stream], number)))
         self._stream = {agent: f"{agent} act" for agent in self._speaking.values()}
         fields = ("input", "reports", *edge)
         self._whose = {name: [f"agent {agent}: Act: {name}" for agent in self._stream] for name in fields}

@@ -84,6 +84,7 @@ class ZenohCarrier:
             brief.trust.foreign,
             brief.limit,
             in_real_time=brief.pace is not None,
+            lost=None if brief.pace is None else supervisor.lost,
         )
         self._acts = session.hears_anybody(keys.act("*"), world.links.agents)
         self._verdicts = Sequences("the medium's")

@@ -109,6 +109,10 @@ def _of_time(
     return carrier, carrier.clock
 
 
+def _joined(supervisor: Supervisor, brief: WorldBrief) -> Session:
+    return opened(client(brief.login), brief.login, supervisor.lost, in_real_time=brief.pace is not None)
+
+
 def main() -> None:
     """Run the world until the last tick."""
     supervisor = Supervisor()
@@ -119,7 +123,7 @@ def main() -> None:
 
     do_without_pandas()
     out = Path(brief.out)
-    with supervisor.confessing(), opened(client(brief.login), brief.login, supervisor.lost) as session:
+    with supervisor.confessing(), _joined(supervisor, brief) as session:
         with (
             Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
             RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,

@@ -8,7 +8,14 @@ from netem.wire.session import Login
 
 
 def agent_brief(
-    plan: Plan, run: str, login: Login, number: int, *, checkpoint: str | None = None, remembers: bool = False
+    plan: Plan,
+    run: str,
+    login: Login,
+    number: int,
+    *,
+    checkpoint: str | None = None,
+    remembers: bool = False,
+    clock_s: float = 0.0,
 ) -> AgentBrief:
     """All that one agent of a plan is told.
 
@@ -20,6 +27,8 @@ def agent_brief(
         Which agent it is, from 1.
     checkpoint, remembers
         The file that keeps its state, if one is wanted, and whether it goes on from what is in there.
+    clock_s
+        How much the medium's clock shows more than that of its machine, in seconds.
     """
     row = number - 1
     return AgentBrief(
@@ -38,4 +47,5 @@ def agent_brief(
         checkpoint=checkpoint,
         remembers=remembers,
         timer=plan.timers[row] if plan.timers else None,
+        clock_s=clock_s,
     )

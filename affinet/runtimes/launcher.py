@@ -164,6 +164,10 @@ class Launcher:
             return {}
         return self._spread.report(seat_name(role, number))
 
+    def _clock_s(self, name: str) -> float:
+        """How much the medium's clock shows more than that of a process, in seconds."""
+        return 0.0 if self._spread is None else self._spread.coordinator.clock(name).offset_s
+
     def _start(self, group: ProcessGroup) -> None:
         _prepare_kernels(self._plan.world)
         group.start_nursery(self._private)
@@ -249,14 +253,23 @@ class Launcher:
         return range(1, self._plan.world.links.agents + 1)
 
     def _host_brief(self, host: int, carried: Sequence[int]) -> HostBrief:
-        login = self._logins[host_name(host)]
-        return HostBrief(host, tuple(agent_brief(self._plan, self._run, login, number) for number in carried))
+        login, clock_s = self._logins[host_name(host)], self._clock_s(host_name(host))
+        briefs = (agent_brief(self._plan, self._run, login, number, clock_s=clock_s) for number in carried)
+        return HostBrief(host, tuple(briefs))
 
     def _start_agent(self, group: ProcessGroup, number: int, remembers: bool = False) -> Child:
         login = self._logins[agent_name(number)]
         warm = number in self._plan.timeline.warm
         checkpoint = str(self._folder(agent_name(number), self._private) / f"agent-{number}.npz") if warm else None
-        brief = agent_brief(self._plan, self._run, login, number, checkpoint=checkpoint, remembers=remembers)
+        brief = agent_brief(
+            self._plan,
+            self._run,
+            login,
+            number,
+            checkpoint=checkpoint,
+            remembers=remembers,
+            clock_s=self._clock_s(agent_name(number)),
+        )
         program = self._programs.get(number)
         child = group.start("agent", program, brief, number) if program else group.fork("agent", brief, number)
         self._agents[number] = child
@@ -310,6 +323,7 @@ class Launcher:
             journal=str(self._folder(HUB, self._out) / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
             pace=self._plan.pace,
+            clock_s=self._clock_s(WORLD),
         )
 
     def _centre_brief(self, login: Login) -> CentreBrief:

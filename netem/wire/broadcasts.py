@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from math import isfinite
 
 from netem.core.plain import shown
@@ -26,6 +26,8 @@ class Broadcasts:
         What they may say there.
     in_real_time
         Whether they may speak of ticks that are over, and say when they do; what is awaited is nobody's matter then.
+    lost
+        Told on which key, and how many messages are missing, if that is no reason to refuse the next one.
     """
 
     def __init__(
@@ -36,11 +38,13 @@ class Broadcasts:
         payloads: Payloads,
         *,
         in_real_time: bool = False,
+        lost: Callable[[str, int], None] | None = None,
     ) -> None:
         self._in_real_time = in_real_time
         self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in channels}
         self._channels, self._payloads = list(channels), payloads
-        self._streams = Sequences("agent")
+        of_voice = {f"{agent} {name}": key for key, (agent, name) in self._speaking.items()}
+        self._streams = Sequences("agent", lost=lost and (lambda stream, number: lost(of_voice[stream], number)))
 
     def speaker(self, key: str) -> int:
         """Whose key it is."""

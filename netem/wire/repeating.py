@@ -300,6 +300,9 @@ class RepeatingSession(Session):
                 question.answer(voice.repeat(question.data))
 
 
-def opened(config: Mapping[str, Any], login: Login, lost: Lost) -> Session:
-    """The session of a process of a run: within one machine nothing is lost, and nothing is to be asked for again."""
-    return Session(config) if login.is_local else RepeatingSession(config, lost)
+def opened(config: Mapping[str, Any], login: Login, lost: Lost, *, in_real_time: bool = False) -> Session:
+    """The session of a process of a run.
+
+    Within one machine nothing is lost, and in real time nobody waits for what was: there nothing is asked for again.
+    """
+    return Session(config) if login.is_local or in_real_time else RepeatingSession(config, lost)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 
 from netem.wire.wrong import Wrong
 
@@ -39,6 +40,10 @@ class Numbering:
         self._next[stream] = number + 1
         return number
 
+    def skip(self, stream: str, number: int) -> None:
+        """Go on at this number."""
+        self._next[stream] = number
+
     def join(self, stream: str, number: int) -> None:
         """Begin at this number, where the stream has none yet."""
         self._next.setdefault(stream, number)
@@ -57,10 +62,13 @@ class Sequences:
         Whose streams they are.
     from_any
         Whether the first message of a stream may have any number: it began before anybody heard it.
+    lost
+        Told of a stream, and how many of its messages are missing, if that is no reason to refuse the next one: nobody waits
+        for them.
     """
 
-    def __init__(self, sender: str, *, from_any: bool = False) -> None:
-        self._sender, self._from_any = sender, from_any
+    def __init__(self, sender: str, *, from_any: bool = False, lost: Callable[[str, int], None] | None = None) -> None:
+        self._sender, self._from_any, self._lost = sender, from_any, lost
         self._expected = Numbering()
 
     def check(self, stream: str, number: int) -> None:
@@ -74,6 +82,10 @@ class Sequences:
         if self._from_any:
             self._expected.join(stream, number)
         expected = self._expected.due(stream)
+        if self._lost is not None and number > expected:
+            self._lost(stream, number - expected)
+            self._expected.skip(stream, number)
+            expected = number
         if number != expected:
             raise UninstructedLoss(
                 f"{self._sender} {stream}: message {number} came where {expected} was due; "
