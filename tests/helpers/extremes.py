@@ -212,7 +212,7 @@ def numeric_fields() -> set[str]:
     return {
         f"{section.__name__}.{name}"
         for section in _sections(Section)
-        if section.__module__ != "affinet.studies.study"
+        if section.__module__.startswith("affinet.scenario.")
         for name, field in section.model_fields.items()
         if _numeric(field.annotation) and _declared_in(section, name) == section.__name__
     }

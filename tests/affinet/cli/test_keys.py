@@ -11,7 +11,7 @@ from netem.wire.certificates import Certificates
 def test_keys_are_made_for_each_process_of_a_run(tmp_path, capsys):
     folder = tmp_path / "keys"
     assert main(["keys", str(folder), "--agents", "2", "--hosts", "1", "--hub", "10.0.0.1", "--days", "7"]) == 0
-    names = ["netem", "world", "centre", "control", "agent-1", "agent-2", "host-1"]
+    names = ["coordinator", "netem", "world", "centre", "control", "agent-1", "agent-2", "host-1"]
     assert {path.name for path in folder.iterdir()} == {
         f"{name}.{kind}" for name in ("authority", *names) for kind in ("pem", "key")
     }
