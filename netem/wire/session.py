@@ -194,7 +194,19 @@ def listening(
 ) -> dict[str, Any]:
     """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone.
 
-    Nobody may say more than a mebibyte at once on the keys that are `limited`.
+    Parameters
+    ----------
+    login, dictionary_file
+        Its own, and the file with everybody's password; None where certificates prove who they are.
+    rights
+        The rules of each who may log in.
+    limited
+        Keys on which nobody may say more than a mebibyte at once.
+
+    Raises
+    ------
+    NotTrusted
+        When it would listen beyond this machine without certificates, or these will not do.
     """
     login.check()
     certificates = login.certificates
