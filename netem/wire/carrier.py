@@ -274,8 +274,8 @@ class Session:
         """Hand over what is asked on a key, in a thread of the session's; whoever takes it answers in another."""
         self._session.declare_queryable(key, lambda query: take(Question(key, query)))
 
-    def ask_all(self, key: str, data: bytes, patience_s: float) -> list[bytes]:
-        """What all those answer within so many seconds who answer on a key."""
+    def ask_all(self, key: str, data: bytes, patience_s: float) -> list[tuple[str, bytes]]:
+        """What all those answer within so many seconds who answer on a key, each with the key it answers on."""
         try:
             answers = self._session.get(
                 key,
@@ -286,7 +286,7 @@ class Session:
             )
         except zenoh.ZError as error:
             raise NotCarried(str(error)) from error
-        return [reply.ok.payload.to_bytes() for reply in answers if reply.ok is not None]
+        return [(str(reply.ok.key_expr), reply.ok.payload.to_bytes()) for reply in answers if reply.ok is not None]
 
     def doorway(self, names: Iterable[str]) -> Doorway:
         """Watch who enters from now on, when these are expected."""

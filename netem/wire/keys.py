@@ -6,6 +6,7 @@ import re
 import secrets
 from dataclasses import dataclass
 
+_AGAIN = "/again"
 _PLAIN = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -16,7 +17,12 @@ def fresh() -> str:
 
 def again(key: str) -> str:
     """Queryable: what was said on a key last (between machines)."""
-    return f"{key}/again"
+    return f"{key}{_AGAIN}"
+
+
+def once(key: str) -> str:
+    """The key on which that was said which is asked for on this one."""
+    return key.removesuffix(_AGAIN)
 
 
 @dataclass(frozen=True)

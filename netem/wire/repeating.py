@@ -17,13 +17,13 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
 
-import msgpack
+import msgspec
 
 from netem.wire.carrier import Arrived, Ear, NotCarried, Question, Session, Voice, room_for
-from netem.wire.keys import again
+from netem.wire.keys import again, once
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import Login
-from netem.wire.wrong import Wrong
+from netem.wire.wrong import WireError, Wrong
 
 T = TypeVar("T")
 Lost = Callable[[str, int], None]  # on which key, and how many
@@ -94,18 +94,19 @@ class Incoming(Generic[T]):
         return turn
 
 
-class Repeated(NamedTuple):
-    """What a voice answers: who speaks, the number of what it says next, and what it has said from the number asked for on."""
+class Asked(msgspec.Struct, frozen=True, array_like=True):
+    """What an ear asks: by key who speaks there and which number is due; of those it does not know, from which number on."""
 
-    key: str
+    first: int
+    known: dict[str, tuple[bytes, int]]
+
+
+class Repeated(msgspec.Struct, frozen=True, array_like=True):
+    """What a voice answers: who speaks, the number of what it says next, and what it has said from the one asked for on."""
+
     speaker: bytes
     following: int
     said: list[tuple[int, bytes]]
-
-    @classmethod
-    def read(cls, data: bytes) -> Repeated:
-        """The answer in these bytes."""
-        return cls(*msgpack.unpackb(data))
 
 
 class KeepingVoice(Voice):
@@ -136,15 +137,20 @@ class KeepingVoice(Voice):
             self._following += 1
 
     def repeat(self, question: bytes) -> bytes:
-        """What is asked for."""
-        first, known = msgpack.unpackb(question)
-        speaker, due = known.get(self._key, (self._speaker, first))
+        """What is asked for.
+
+        Raises
+        ------
+        WireError
+            When it cannot be told what is.
+        """
+        asked = _read(Asked, question)
+        speaker, due = asked.known.get(self._key, (self._speaker, asked.first))
         if speaker != self._speaker:
             due = 0
         with self._saying:
             said = [(number, data) for number, data in self._kept if number >= due]
-            packed: bytes = msgpack.packb(Repeated(self._key, self._speaker, self._following, said))
-        return packed
+            return msgspec.msgpack.encode(Repeated(self._speaker, self._following, said))
 
 
 class AskingEar(Ear):
@@ -166,8 +172,8 @@ class AskingEar(Ear):
         self._turn: deque[Arrived | Again] = deque()
         self._incoming: dict[str, Incoming[Arrived | Again]] = {}
         session.hands(key, self._arrivals.put)
-        for answer in self._answers(_NONE_IS_DUE):  # who has spoken to a predecessor of this process goes on
-            self._incoming[answer.key] = Incoming(answer.speaker, answer.following)
+        for key, answer in self._answers(_NONE_IS_DUE):  # who has spoken to a predecessor of this process goes on
+            self._incoming[key] = Incoming(answer.speaker, answer.following)
 
     def next(self) -> Arrived | Again:  # type: ignore[override]
         """Wait for the next message.
@@ -176,6 +182,8 @@ class AskingEar(Ear):
         ------
         UninstructedLoss
             When one is lost, and who said it has it no more.
+        WireError
+            When who is asked answers what is no answer.
         NotCarried
             When the session is left.
         """
@@ -213,25 +221,34 @@ class AskingEar(Ear):
             self._ask()
 
     def _ask(self) -> None:
-        for answer in self._answers(0):
-            incoming = self._incoming.setdefault(answer.key, Incoming())
-            self._refuse_gaps(answer, incoming)
+        for key, answer in self._answers(0):
+            incoming = self._incoming.setdefault(key, Incoming())
+            _refuse_gaps(key, answer, incoming)
             for number, data in answer.said:
-                self._turn += incoming.repeated(answer.speaker, number, Again(answer.key, data))
+                self._turn += incoming.repeated(answer.speaker, number, Again(key, data))
 
-    def _answers(self, first: int) -> list[Repeated]:
-        known = {key: (one.speaker, one.due) for key, one in self._incoming.items()}
-        question = msgpack.packb((first, known))
-        return [Repeated.read(data) for data in self._session.ask_all(again(self._key), question, _ANSWERED_WITHIN_S)]
+    def _answers(self, first: int) -> list[tuple[str, Repeated]]:
+        """What those answer who may say such keys; on which they do, and no word of theirs, says who they are."""
+        asked = Asked(first, {key: (one.speaker, one.due) for key, one in self._incoming.items()})
+        answers = self._session.ask_all(again(self._key), msgspec.msgpack.encode(asked), _ANSWERED_WITHIN_S)
+        return [(once(key), _read(Repeated, data, once(key))) for key, data in answers]
 
-    def _refuse_gaps(self, answer: Repeated, incoming: Incoming[Arrived | Again]) -> None:
-        due = incoming.due if answer.speaker == incoming.speaker else 0
-        oldest = answer.said[0][0] if answer.said else answer.following
-        if oldest > due:
-            raise UninstructedLoss(
-                f"{answer.key}: the transport lost {oldest - due} messages from {due} on, and who said them has not kept them",
-                Wrong.SKIPPED,
-            )
+
+def _refuse_gaps(key: str, answer: Repeated, incoming: Incoming[Any]) -> None:
+    due = incoming.due if answer.speaker == incoming.speaker else 0
+    oldest = answer.said[0][0] if answer.said else answer.following
+    if oldest > due:
+        raise UninstructedLoss(
+            f"{key}: the transport lost {oldest - due} messages from {due} on, and who said them has not kept them",
+            Wrong.SKIPPED,
+        )
+
+
+def _read(kind: type[T], data: bytes, whose: str = "somebody") -> T:
+    try:
+        return msgspec.msgpack.decode(data, type=kind)
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        raise WireError(f"{whose}: {kind.__name__}: {error} (see docs/protocol.md)") from error
 
 
 class Again(NamedTuple):
@@ -297,7 +314,10 @@ class RepeatingSession(Session):
         while asked := self._asked.get():
             voice, question = asked
             with question:
-                question.answer(voice.repeat(question.data))
+                try:
+                    question.answer(voice.repeat(question.data))
+                except WireError as error:
+                    question.refuse(str(error))
 
 
 def opened(config: Mapping[str, Any], login: Login, lost: Lost, *, in_real_time: bool = False) -> Session:

@@ -210,7 +210,19 @@ def listening(
 ) -> dict[str, Any]:
     """Configuration of a router that listens on one endpoint, and lets those in by name who have rights, for these alone.
 
-    On the keys that are `limited` nobody is heard who says more than four times the `largest` at once.
+    Parameters
+    ----------
+    login, dictionary_file
+        Its own, and the file with everybody's password; None where certificates prove who they are.
+    rights
+        The rules of each who may log in.
+    limited, largest
+        Keys on which nobody is heard who says more than four times the largest at once, in bytes.
+
+    Raises
+    ------
+    NotTrusted
+        When it would listen beyond this machine without certificates, or these will not do.
     """
     login.check()
     certificates = login.certificates

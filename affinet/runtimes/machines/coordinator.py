@@ -223,15 +223,15 @@ class Coordinator:
         return time.monotonic() - self._given_up_s > _LAST_S
 
     def _note_life(self, arrived: Arrived) -> None:
-        self._guarded(arrived.key, lambda seat: seat.lives(arrived.data))
+        self._guarded(arrived, Seat.lives)
 
     def _note_presence(self, key: str, is_here: bool) -> None:
         self.seats[seats.seat_of(key)].is_here = is_here
 
-    def _guarded(self, key: str, take: Callable[[Seat], None]) -> None:
-        seat = self.seats[seats.seat_of(key)]
+    def _guarded(self, arrived: Arrived, take: Callable[[Seat, bytes], None]) -> None:
+        seat = self.seats[seats.seat_of(arrived.key)]
         try:
-            take(seat)
+            take(seat, arrived.data)
         except WireError as error:
             self._wrong = f"{seat.where}: {error}"
 
@@ -242,9 +242,8 @@ class Coordinator:
     def _listen(self, ear: Ear) -> None:
         try:
             while True:
-                arrived = ear.next()
-                self._guarded(arrived.key, lambda seat: seat.take(arrived.data))  # noqa: B023 - called at once
-        except UninstructedLoss as error:
+                self._guarded(ear.next(), Seat.take)
+        except (UninstructedLoss, WireError) as error:
             self._wrong = str(error)
         except NotCarried:  # the session is left
             return

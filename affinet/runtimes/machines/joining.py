@@ -135,7 +135,7 @@ class Part(_Message, frozen=True, kw_only=True, tag="part"):
 
 
 Down = Start | Say | Shut | Signal | Leave
-Wanted = Listing | Part
+Asked = Listing | Part
 Up = Started | Told | Logged | Ended | Failed
 
 _encoder = msgspec.msgpack.Encoder()

@@ -72,10 +72,6 @@ class CoordinatorGone(RuntimeError):
     """The coordinator has ended, or was not heard of for too long."""
 
 
-class _Told(SystemExit):
-    """A signal asked this command to end."""
-
-
 def serve(wanted: Wanted, tell: Callable[[str], None]) -> None:
     """Hold the seats until the run is over.
 
@@ -97,7 +93,7 @@ def serve(wanted: Wanted, tell: Callable[[str], None]) -> None:
 
 
 def _end(number: int, _frame: object) -> NoReturn:
-    raise _Told(128 + number)
+    raise SystemExit(128 + number)
 
 
 class Machine:
@@ -114,7 +110,7 @@ class Machine:
         self._stack = ExitStack()
         self._places: list[Place] = []
         self._nursery: Nursery | None = None
-        self._given: list[tuple[Place, Down | Question]] = []
+        self._given: list[tuple[Place, Down | Question | Exception]] = []
         self._taking = threading.Lock()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._over = threading.Event()
@@ -151,7 +147,8 @@ class Machine:
                     clock=place.clock(),
                 )
             )
-            place.beat()
+            for joined in self._places:  # to join takes a while where there are many
+                joined.beat()
             kernels |= admitted.kernels
         address = endpoints.over_machines(wanted.connect)
         threading.Thread(target=self._watch, args=(address, admitted.gone_after_s), daemon=True).start()
@@ -207,7 +204,7 @@ class Machine:
         if self._nursery.fileno() in found:
             self._nursery.hear()
 
-    def _take(self, place: Place, given: Down | Question) -> None:
+    def _take(self, place: Place, given: Down | Question | Exception) -> None:
         with self._taking:
             self._given.append((place, given))
         os.eventfd_write(self._wake, 1)
@@ -219,6 +216,8 @@ class Machine:
             match order:
                 case Question():
                     self._give(order)
+                case Exception():
+                    raise CoordinatorGone(f"the coordinator cannot be heard any more: {order}")
                 case Start(number=number, name=name):
                     self._start(place, number, name)
                 case Leave():
@@ -233,7 +232,7 @@ class Machine:
     def _give(self, question: Question) -> None:
         with question:
             try:
-                question.answer(of_folder(self._folder, joining.unpack(joining.Wanted, question.data)))
+                question.answer(of_folder(self._folder, joining.unpack(joining.Asked, question.data)))
             except (OSError, WireError) as error:
                 question.refuse(said(error) if isinstance(error, OSError) else str(error))
 

@@ -20,6 +20,7 @@ from affinet.runtimes.machines.coordinator import KEPT
 from affinet.runtimes.machines.joining import (
     Admitted,
     Alive,
+    Asked,
     Down,
     Ended,
     Joining,
@@ -28,7 +29,6 @@ from affinet.runtimes.machines.joining import (
     Started,
     Told,
     Up,
-    Wanted,
 )
 from netem.wire import offset, seats
 from netem.wire.carrier import Ear, NotCarried, Question
@@ -44,7 +44,7 @@ _ANSWERED_WITHIN_S = 10.0
 _ROOM = 4096
 _PART = 1 << 18
 _PSS_EVERY = 20  # beats: it costs milliseconds
-Given = Callable[["Place", Down | Question], None]
+Given = Callable[["Place", Down | Question | Exception], None]
 
 
 class Refused(RuntimeError):
@@ -59,7 +59,7 @@ class Place:
     login
         Where the coordinator listens, and as whom to join.
     given
-        Takes what the coordinator says, in a thread of its own.
+        Takes what the coordinator says, in a thread of its own, or why nothing it says can be heard any more.
     """
 
     def __init__(self, login: Login, given: Given) -> None:
@@ -200,11 +200,13 @@ class Place:
         try:
             while True:
                 self._given(self, joining.unpack(Down, ear.next().data))
-        except (NotCarried, UninstructedLoss, WireError):  # the session is left, or nothing can be made of it any more
+        except NotCarried:  # the session is left
             return
+        except (UninstructedLoss, WireError) as error:
+            self._given(self, error)
 
 
-def of_folder(folder: Path, asked: Wanted) -> bytes:
+def of_folder(folder: Path, asked: Asked) -> bytes:
     """What is asked for of a folder: the names of some files, or a part of one."""
     if isinstance(asked, Listing):
         return joining.pack(sorted(file.name for file in folder.iterdir() if file.name.startswith(asked.stem)))

@@ -1,14 +1,17 @@
 """What a link between machines lost is noticed and had again, in order; nothing is lost twice, or counted that came."""
 
+import queue
+import threading
 from datetime import timedelta
 
-import msgpack
+import msgspec
 import pytest
 
 from netem.wire import authority
+from netem.wire.arrays import WireError
 from netem.wire.carrier import await_heard
 from netem.wire.keys import Keys, again
-from netem.wire.repeating import Incoming, RepeatingSession, opened
+from netem.wire.repeating import Asked, Incoming, Repeated, RepeatingSession, opened
 from netem.wire.sequence import UninstructedLoss
 from netem.wire.session import HUB, WORLD, Login, agent_name, client, hub
 
@@ -163,6 +166,45 @@ def test_an_agent_cannot_ask_for_what_was_said_to_another(star):
         await_heard([voice])
         voice.say(b"private")
         assert ear.next().data == b"private"
-        question = msgpack.packb((0, {}))
+        question = msgspec.msgpack.encode(Asked(0, {}))
         assert two.ask_all(again(run.inbox(2)), question, 5.0)
         assert not one.ask_all(again(run.inbox(2)), question, 1.0)
+
+
+def test_rubbish_for_a_question_is_refused_and_the_next_one_answered(star):
+    run, medium, joined, _ = star
+    medium.says(run.inbox(1)).say(b"private")
+    with joined("agent-1") as one:
+        for rubbish in (b"", b"\xc1", msgspec.msgpack.encode("hello"), b"\x91" * 5000):
+            assert not one.ask_all(again(run.inbox(1)), rubbish, 5.0)
+        assert one.ask_all(again(run.inbox(1)), msgspec.msgpack.encode(Asked(0, {})), 5.0)
+
+
+def answering(agent, key, data):
+    """An agent that answers whatever it likes to who asks for what it said on a key."""
+    asked = queue.SimpleQueue()
+    agent.asks(again(key), asked.put)
+
+    def answer():
+        with asked.get() as question:
+            question.answer(data)
+
+    threading.Thread(target=answer, daemon=True).start()
+
+
+def test_rubbish_for_an_answer_ends_the_run_by_the_name_of_who_gave_it(star):
+    run, medium, joined, _ = star
+    ear = medium.hears(run.act("*"), 16)
+    with joined("agent-1") as agent:
+        answering(agent, run.act(1), b"rubbish")
+        with pytest.raises(WireError, match=f"{run.act(1)}: Repeated: "):
+            ear.next()
+
+
+def test_who_answers_speaks_on_its_own_key_alone(star):
+    run, medium, joined, _ = star
+    ear = medium.hears(run.act("*"), 16)
+    said = msgspec.msgpack.encode(Repeated(b"somebody", 1, [(0, b"as agent 2")]))
+    with joined("agent-1") as agent:
+        answering(agent, run.act(1), said)
+        assert ear.next().key == run.act(1)

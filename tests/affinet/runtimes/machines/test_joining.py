@@ -2,7 +2,7 @@
 
 from dataclasses import fields, replace
 
-import msgpack
+import msgspec
 import pytest
 from fleets import keys_in
 
@@ -15,7 +15,7 @@ from affinet.runtimes.machines.remote import RemoteProcess
 from netem.wire import seats
 from netem.wire.keys import again
 from netem.wire.offset import ClockOffset
-from netem.wire.repeating import RepeatingSession
+from netem.wire.repeating import Asked, RepeatingSession
 from netem.wire.session import COORDINATOR, HUB, Login, client
 
 OWN = identity.own()
@@ -118,7 +118,7 @@ def test_what_no_affinet_says_is_refused(place, coordinator):
 def test_a_seat_hears_what_is_for_it_and_nothing_that_is_for_another(coordinator, place, keys, free_endpoint):
     with place("agent-1") as at:
         at.join(asks("agent-1"))
-    question = msgpack.packb((0, {}))
+    question = msgspec.msgpack.encode(Asked(0, {}))
     coordinator.seats["agent-1"].say(joining.Start(1, "agent 1"))
     for seat, hears in (("agent-1", True), ("agent-2", False)):
         with RepeatingSession(client(Login(free_endpoint, seat, keys=keys), 60.0), lambda *_: None) as session:
