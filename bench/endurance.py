@@ -86,14 +86,24 @@ def _files(out: Path) -> dict[str, int]:
 
 
 def grown(seen: list[Look]) -> dict[str, float]:
-    """By which share the memory of each process has grown at most since it had settled."""
+    """By which share the memory of each process has grown at most since it had settled, while it flew."""
     first: dict[str, int] = {}
     most: dict[str, float] = {}
-    for look in seen:
-        for name, size in look.memory.items() if look.tick >= SETTLED else ():
+    for look in _flying(seen):
+        for name, size in look.memory.items():
             share = size / first.setdefault(name, size) - 1.0
             most[name] = max(most.get(name, 0.0), share)
     return most
+
+
+def judging(seen: list[Look]) -> int:
+    """How much more memory the launcher takes at the end, when it judges, in bytes."""
+    flying = _flying(seen) or seen[:1]
+    return max(look.memory.get("launcher", 0) for look in seen) - max(look.memory["launcher"] for look in flying)
+
+
+def _flying(seen: list[Look]) -> list[Look]:
+    return [look for look in seen if SETTLED <= look.tick < seen[-1].tick]
 
 
 def thinned(seen: list[Look], number: int = 400) -> list[Look]:
@@ -134,6 +144,7 @@ def fly(runtime: str, ticks: int, folder: Path) -> dict[str, Any]:
         "faults": len(summary["faults"]),
         "processes": len(summary["processes"]),
         "grown": grown(seen),
+        "judging": judging(seen),
         "looks": [asdict(look) for look in thinned(seen)],
     }
 
@@ -154,6 +165,7 @@ def main() -> int:
     for name, share in found["grown"].items():
         last = next(look["memory"][name] for look in reversed(found["looks"]) if name in look["memory"])
         print(f"| {name} | {settled['memory'].get(name, 0) / 1e6:.1f} | {last / 1e6:.1f} | {share:.1%} |")
+    print(f"\nTo judge, the launcher takes {found['judging'] / 1e6:.1f} MB more.")
     if options.keep:
         kept = json.loads(options.keep.read_text()) if options.keep.exists() else {}
         options.keep.write_text(json.dumps(kept | {options.runtime: found}) + "\n")

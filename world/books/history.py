@@ -303,7 +303,6 @@ def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = Fa
         _refuse_other_forms(whole)
     except ValueError as error:
         raise Damaged(folder, str(error)) from error
-    growing.let_go(whole)
     return whole if only is None else {name: whole[name] for name in only}
 
 
@@ -360,7 +359,8 @@ def _refuse_other_forms(arrays: Arrays) -> None:
         kind, axes = _BY_TICK.get(name, ("f", max(2, array.ndim)))
         if (array.dtype.kind, array.ndim) != (kind, axes):
             raise ValueError(f"{name} is {array.dtype} of shape {array.shape}")
-    if (largest := arrays["verdicts"].max(initial=0)) >= len(Verdict):
+    largest = max((int(span.max(initial=0)) for span in _spans(arrays["verdicts"])), default=0)
+    if largest >= len(Verdict):
         raise ValueError(f"verdicts has a {largest}, which is no verdict")
     if (columns := arrays["dropped"].shape[1]) != len(Verdict):
         raise ValueError(f"dropped counts {columns} verdicts, and there are {len(Verdict)}")
@@ -384,20 +384,23 @@ def digest(arrays: Arrays) -> str:
     total = hashlib.sha256()
     for name, array in _digested(arrays):
         total.update(f"{name}{array.dtype.str}{array.shape}".encode())
-        for first in range(0, len(array), _SPAN):
-            total.update(one_nan(array[first : first + _SPAN]).tobytes())
-            growing.let_go({name: array})
+        for span in _spans(array):
+            total.update(one_nan(span).tobytes())
     return total.hexdigest()
+
+
+def _spans(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    for first in range(0, len(array), _SPAN):
+        yield array[first : first + _SPAN]
+        growing.let_go({"it": array})
 
 
 def _digested(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
     """The arrays by name, and what was dropped under way by each reason that occurred: a new one changes no older run."""
     for name, array in sorted(arrays.items()):
         if name == "dropped":
-            yield from (
-                (f"{name} {Verdict(number).label}", array[:, number])
-                for number in np.flatnonzero(array.any(axis=0)).tolist()
-            )
+            occurred = {number for span in _spans(array) for number in np.flatnonzero(span.any(axis=0)).tolist()}
+            yield from ((f"{name} {Verdict(number).label}", array[:, number]) for number in sorted(occurred))
         else:
             yield name, array
 
