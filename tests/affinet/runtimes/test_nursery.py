@@ -182,7 +182,7 @@ def test_it_is_paused_resumed_and_killed(shared):
 
 
 def test_what_it_held_is_freed_in_launcher_and_nursery(shared):
-    holders = psutil.Process(), psutil.Process(shared.processes[-1].process.pid)
+    holders = psutil.Process(), psutil.Process(shared._nursery.child.process.pid)
     held = [holder.num_fds() for holder in holders]
     for _ in range(30):
         shared.kill(forked_by(shared, WAITS))
@@ -217,7 +217,7 @@ def test_a_nursery_that_dies_fails_the_run_in_a_line_and_nobody_is_left(crew):
         children = [forked_by(group, WAITS, number) for number in (1, 2)]
         group.await_ready(children)
         children[0].pause()
-        dead = group.processes[-1]
+        dead = group._nursery.child
         dead.process.kill()
         line = rf"^nursery \(pid {dead.process.pid}\) was killed by SIGKILL\. It had said nothing\.$"
         with pytest.raises(RunFailed, match=line):
@@ -227,14 +227,14 @@ def test_a_nursery_that_dies_fails_the_run_in_a_line_and_nobody_is_left(crew):
         with pytest.raises(RunFailed, match=line):  # who dies now, nobody can say how
             group.kill(children[1])
     await_true(lambda: not any(psutil.pid_exists(child.process.pid) for child in children), "somebody is left")
-    assert [child.report()["exit"] for child in group.processes] == [None, None, -signal.SIGKILL]
+    assert [report["exit"] for report in group.reports] == [None, None, -signal.SIGKILL]
 
 
 def test_a_nursery_that_is_stopped_is_named_with_its_state(crew):
     with crew(patience=0.3) as group:
         child = forked_by(group, WAITS)
         group.await_ready([child])
-        stopped = group.processes[-1]
+        stopped = group._nursery.child
         stopped.pause()
         await_true(lambda: psutil.Process(stopped.process.pid).status() == psutil.STATUS_STOPPED, "it goes on")
         named = rf"^nursery \(pid {stopped.process.pid}\) is stopped \(state T\), and had not answered after 0\.3 s$"
@@ -248,7 +248,7 @@ def test_a_nursery_that_is_stopped_is_named_with_its_state(crew):
 
 def test_it_leaves_with_a_launcher_that_is_gone(crew):
     with crew() as group:
-        left = group.processes[-1]
+        left = group._nursery.child
         group._nursery._connection.shutdown(socket.SHUT_RDWR)  # as the system does it
         assert left.process.wait(PATIENCE) == 0
 

@@ -39,6 +39,9 @@ def run(tmp_path_factory):
     return out
 
 
+ARRAY = "arrays/position.npy"
+
+
 def reads_scenario(path):
     loading.load(str(path))
 
@@ -54,14 +57,13 @@ def reads_trace(path):
 
 def reads_journal(path):
     table = journal.read(path)
-    journal.accounts(table)
-    journal.injected(table)
+    journal.told(path)
     journal.check(table, ("sense",), 20)
     journal.carried(table, LINKS, sensing=True)
 
 
 def reads_run(path):
-    reading.evidence(path.parent)
+    reading.evidence(path.parents[1] if path.parent.name == "arrays" else path.parent)
 
 
 def shipped(name, folder):
@@ -79,12 +81,12 @@ def read(run, tmp_path):
         "journal": ((run / JOURNAL).read_bytes(), tmp_path / JOURNAL, reads_journal),
         **{
             name: ((run / name).read_bytes(), flown / name, reads_run)
-            for name in ("scenario.json", "summary.json", "arrays.npz", JOURNAL)
+            for name in ("scenario.json", "summary.json", ARRAY, JOURNAL)
         },
     }
 
 
-KINDS = ("scenario", "study", "trace", "journal", "scenario.json", "summary.json", "arrays.npz", JOURNAL)
+KINDS = ("scenario", "study", "trace", "journal", "scenario.json", "summary.json", ARRAY, JOURNAL)
 
 
 def test_what_is_right_is_read(read):
