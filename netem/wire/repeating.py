@@ -321,8 +321,5 @@ class RepeatingSession(Session):
 
 
 def opened(config: Mapping[str, Any], login: Login, lost: Lost, *, in_real_time: bool = False) -> Session:
-    """The session of a process of a run.
-
-    Within one machine nothing is lost, and in real time nobody waits for what was: there nothing is asked for again.
-    """
+    """The session of a process: within one machine, and in real time, where nobody waits, nothing is asked for again."""
     return Session(config) if login.is_local or in_real_time else RepeatingSession(config, lost)

@@ -23,6 +23,7 @@ NUMBERS = {
     "listed": 13,
     "lost": 14,
     "overflow": 15,
+    "unsaid": 16,
 }
 
 
