@@ -47,7 +47,7 @@ def within(given: Array, limit: float | None, whose: str) -> None:
         When it is.
     """
     most = FASTEST if limit is None else limit
-    if not np.hypot.reduce(given) <= most * (1.0 + _ROUNDING):
+    if not sum(share * share for share in (given / most).tolist()) <= 1.0 + _ROUNDING:
         _refuse(f"{whose}: expected at most {most:g} in length (agents.limit), got {_shown(given)}")
 
 

@@ -21,7 +21,8 @@ EXEMPT = {
         netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
         netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
         netem.core.draws.DrawnAhead.at netem.medium.relay.Relay.decide netem.medium.relay.Relay.decide_on
-        netem.medium.relay.Relay.as_told netem.medium.relay.Relay.as_it_arrives
+        netem.medium.relay.FaultedRelay.as_told netem.medium.relay.FaultedRelay.as_it_arrives
+        netem.medium.real_time.RealTimeRelay.begin netem.faults.timeline.Timeline.gains
         netem.medium.own_losses.OwnLosses.lost
     """,
     WHOLE: """
@@ -44,7 +45,8 @@ EXEMPT = {
         world.books.history.Moments.ticks agents.loading.returned.estimate agents.loading.returned.said
         agents.arrivals.Arrivals.sensed agents.arrivals.Arrivals.heard agents.arrivals.Arrivals.told
         agents.batch.beside_others agents.batch.put_back agents.batch.come_back agents.algebra.late_news.blank
-        world.acts.Acts.together world.carrier.ProcessesActed.input
+        world.acts.Acts.together world.carrier.ProcessesActed.input world.carrier.entry_of
+        netem.wire.values.variances netem.wire.values.within
         world.physics.sensors.stray world.physics.bodies.flown world.physics.world.Scene.velocity
         world.physics.world.Scene.bodies world.physics.bodies.Integrators.rest world.physics.bodies.Integrators.coasting
         world.physics.bodies.Unicycle.rest world.physics.bodies.Unicycle.coasting
@@ -58,6 +60,7 @@ EXEMPT = {
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
         world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
         world.physics.world.World.odometry world.physics.world.World.step world.carrier.ZenohCarrier.carry world.flight.fly
+        world.real_time.RealTimeCarrier.carry
     """,
     ONCE: """
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
@@ -81,6 +84,9 @@ EXEMPT = {
     """,
     WRITTEN: """
         netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.in_flight.Entry.dropped_by_verdict
+        netem.medium.open_tick.OpenTick.close netem.medium.real_time.RealTimeRelay.closed
+        netem.ports.MediumPorts.as_it_arrives netem.ports.MediumPorts.hand_out_measurements
+        netem.ports.MediumPorts.journal netem.ports.MediumPorts.seen netem.ports.MediumPorts.where
         netem.medium.relay.Relayed.entry netem.medium.journal.Recorded.verdicts
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
