@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents.mailbox import Inboxes
-from agents.process import Roster
+from agents.node import Roster
 from netem.wire.arrays import packed
 from netem.wire.senses import Senses
 from netem.wire.sequence import UninstructedLoss

@@ -14,7 +14,7 @@ import zenoh
 sys.path.insert(0, str(Path(__file__).parents[1] / "helpers"))
 from hostile import catalogue
 
-from agents.process import AgentBrief, AgentsNode
+from agents.node import AgentBrief, AgentsNode
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.session import client

@@ -12,7 +12,7 @@ from msgspec import to_builtins
 
 from agents.arrivals import Arrivals
 from agents.mailbox import Inboxes
-from agents.process import Roster
+from agents.node import Roster
 from netem.core.links import Links
 from netem.faults.control import Answer, Order, OrderAction, obey
 from netem.faults.fault import Fault, Verb

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from agents.brief import Brief
 from agents.node import AgentBrief, HostBrief
+from agents.timer import Timer
 from analysis.models.affine import Manoeuvre
 from analysis.models.pursuit import Target
 from analysis.models.sensor import Sensor
 from netem.brief import MediumBrief
 from netem.core.links import Links
+from netem.core.pace import Pace
 from netem.core.plain import PlainError, from_plain, to_plain
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 from netem.faults.trigger import Trigger
@@ -440,6 +442,8 @@ MEDIUM = MediumBrief(
     trust=Trust("drop", 1 << 20, 100, foreign=frozenset({2})),
     journal="/tmp/run/journal.arrows",
     batch=50,
+    pace=Pace(dt=0.05, factor=0.5, late=1.0),
+    clock_s=-0.25,
 )
 
 
@@ -462,6 +466,8 @@ AGENT = AgentBrief(
     reports={"place": (3,)},
     checkpoint="/tmp/agent-2.npz",
     remembers=True,
+    timer=Timer(0.1, 0.02, 0.01, 1e-5, 0.04, 0.5, 2**64 - 1, 2),
+    clock_s=0.125,
 )
 
 
