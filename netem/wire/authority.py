@@ -71,6 +71,8 @@ def make(folder: Path, names: Iterable[str], addresses: Sequence[str], lasts: ti
     OSError
         When the folder cannot be written to.
     """
+    for address in addresses:
+        _general_name(address)  # before anything is made
     begins = datetime.now(UTC) - _ALLOWED_SKEW
     ends = begins + _ALLOWED_SKEW + lasts
     with about(folder):
