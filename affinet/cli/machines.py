@@ -76,7 +76,7 @@ def _spread(
 ) -> Spread:
     coordinator = Coordinator(
         Login(listen, COORDINATOR, keys=keys),
-        found.names,
+        found.machines,
         scenario=digest_of(plan.scenario),
         gone_after_s=gone_after_s,
         tell=_say,

@@ -87,7 +87,7 @@ def make(folder: Path, names: Iterable[str], addresses: Sequence[str], lasts: ti
         own = ec.generate_private_key(ec.SECP256R1())
         certificate = _builder(name, authority.subject, own, begins, ends)
         listens = name in (HUB, COORDINATOR)
-        certificate = _of_listener(certificate, addresses) if listens else _of_client(certificate)
+        certificate = _of_hub(certificate, addresses) if listens else _of_client(certificate)
         _keep(folder, name, certificate.sign(key, hashes.SHA256()), own)
     return Made(everybody, addresses, ends, renewed)
 
@@ -147,7 +147,7 @@ def _called(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
 
 
-def _of_listener(builder: x509.CertificateBuilder, addresses: Iterable[str]) -> x509.CertificateBuilder:
+def _of_hub(builder: x509.CertificateBuilder, addresses: Iterable[str]) -> x509.CertificateBuilder:
     names = x509.SubjectAlternativeName([_general_name(address) for address in addresses])
     both = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH  # the medium joins a coordinator, too
     return _for(builder, *both).add_extension(names, critical=False)

@@ -6,7 +6,7 @@ import math
 import queue
 import threading
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -46,7 +46,7 @@ class Coordinator:
     def __init__(
         self,
         login: Login,
-        names: Collection[str],
+        machines: Mapping[str, str | None],
         *,
         scenario: str,
         gone_after_s: float,
@@ -59,8 +59,8 @@ class Coordinator:
         ----------
         login
             Where to listen, and by which certificates.
-        names
-            Of the seats on other machines.
+        machines
+            By name of each seat elsewhere what its machine is called; None for what that calls itself.
         scenario
             The digest of what is flown.
         gone_after_s
@@ -70,7 +70,7 @@ class Coordinator:
         identity
             What all have to fly with; by default what this machine does.
         """
-        self._login, self._names = login, tuple(names)
+        self._login, self._machines = login, machines
         self._scenario, self._gone_after_s = scenario, gone_after_s
         self._tell, self._identity = tell, identity or own()
         self._asked: queue.SimpleQueue[tuple[str, Question] | None] = queue.SimpleQueue()
@@ -83,17 +83,17 @@ class Coordinator:
         self.seats: dict[str, Seat] = {}
 
     def __enter__(self) -> Coordinator:
-        config = seats.coordinator(self._login, self._names)
+        config = seats.coordinator(self._login, self._machines)
         try:
             session = self._session = RepeatingSession(config, lambda *_: None, KEPT)
         except NotCarried as error:
             raise RunFailed(f"the coordinator cannot listen at {self._login.endpoint}: {error}") from error
-        self.seats = {name: Seat(name, session.says(seats.down(name))) for name in self._names}
+        self.seats = {name: Seat(name, session.says(seats.down(name)), of) for name, of in self._machines.items()}
         up = session.hears(seats.up("*"), _ROOM)
         session.hands(seats.alive("*"), self._note_life)
         session.sees(seats.here("*"), self._note_presence)
         session.asks(seats.CLOCK, partial(self._put, _CLOCK))
-        for name in self._names:
+        for name in self._machines:
             session.asks(seats.join(name), partial(self._put, name))
         beat = session.says_once(seats.BEAT)
         for run, given in ((self._beat, beat), (self._answer, None), (self._listen, up)):
@@ -150,7 +150,7 @@ class Coordinator:
         """A new process in a seat: what to call it, and where its standard error goes."""
         seat = self.seats[name]
         seat.started += 1
-        process = seat.process = RemoteProcess(seat.started, _machine(seat), seat.say, self._is_over, log)
+        process = seat.process = RemoteProcess(seat.started, seat.machine or name, seat.say, self._is_over, log)
         seat.say(Start(seat.started, called))
         return process
 
@@ -283,8 +283,3 @@ class Coordinator:
         seat.looked_at(0.0)
         seat.silent_s, seat.joined = 0.0, asks
         return None
-
-
-def _machine(seat: Seat) -> str:
-    assert seat.joined is not None, "it has joined"
-    return seat.joined.machine

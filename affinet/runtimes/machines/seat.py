@@ -23,6 +23,8 @@ class Seat:
     ----------
     name
         Under which it logs in.
+    called
+        What its machine is called here; None for what it calls itself.
     joined
         What its machine joined with; None before it has.
     process, started
@@ -39,6 +41,7 @@ class Seat:
 
     name: str
     voice: Voice
+    called: str | None = None
     joined: Joining | None = None
     process: RemoteProcess | None = None
     failed: str | None = None
@@ -50,9 +53,14 @@ class Seat:
     _heard: threading.Event = field(default_factory=threading.Event)
 
     @property
+    def machine(self) -> str | None:
+        """What its machine is called, once it has joined."""
+        return None if self.joined is None else self.called or self.joined.machine
+
+    @property
     def where(self) -> str:
         """For people."""
-        return f"{self.name.replace('-', ' ')} on {self.joined.machine}" if self.joined else self.name
+        return f"{self.name.replace('-', ' ')} on {self.machine}" if self.joined else self.name
 
     @property
     def folder(self) -> Path:

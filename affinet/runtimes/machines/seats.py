@@ -19,13 +19,13 @@ class Seats(NamedTuple):
         Agents that are on one machine, for each.
     of_machines
         For each other machine the commands that hold its seats: the words behind `affinet`.
-    names
-        All seats on other machines, by the names under which they log in.
+    machines
+        By name of each seat on another machine what that is called; None for what it calls itself.
     """
 
     groups: tuple[tuple[int, ...], ...]
     of_machines: tuple[tuple[Machine, tuple[tuple[str, ...], ...]], ...]
-    names: tuple[str, ...]
+    machines: dict[str, str | None]
 
 
 def hosts_of(
@@ -51,7 +51,7 @@ def hosts_of(
 def by_hand(plan: Plan) -> Seats:
     """All but the world and a centre are elsewhere: their commands are typed by somebody."""
     hosts = hosts_of(plan, ())
-    return Seats((), (), (HUB, *_names(hosts, range(1, plan.world.links.agents + 1))))
+    return Seats((), (), dict.fromkeys((HUB, *_names(hosts, range(1, plan.world.links.agents + 1)))))
 
 
 def spread_over(plan: Plan, hosts: Hosts) -> Seats:
@@ -59,17 +59,17 @@ def spread_over(plan: Plan, hosts: Hosts) -> Seats:
     hosts.refuse_strangers(plan.world.links.agents)
     groups = tuple(tuple(machine.agents) for machine in hosts.machines)
     carried = hosts_of(plan, (), groups)
-    of_machines, names = [], list[str]()
+    of_machines, machines = [], dict[str, str | None]()
     for machine in hosts.machines:
         there = {host: agents for host, agents in carried.items() if agents[0] in machine.agents}
         seats = _names(there, machine.agents)
         commands = [_command(role, seats) for role in ("agent", "host")]
         if machine.netem is not None:
             commands.insert(0, ("netem", "--listen", machine.netem))
-            names.append(HUB)
-        names += seats
+            machines[HUB] = machine.name
+        machines |= dict.fromkeys(seats, machine.name)
         of_machines.append((machine, tuple(filter(None, commands))))
-    return Seats(groups, tuple(of_machines), tuple(names))
+    return Seats(groups, tuple(of_machines), machines)
 
 
 def _names(hosts: Mapping[int, Collection[int]], agents: Collection[int]) -> list[str]:

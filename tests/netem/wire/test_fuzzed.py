@@ -122,7 +122,7 @@ def reads_broadcast(channel, foreign):
         relayed = messages.unpack_inbox(messages.pack_exchange(TICK, 0, [data])).messages
         np.testing.assert_equal(to_builtins(relayed), to_builtins([said]))
         arrivals = Arrivals({1: (2, 3)}, width=2, dimension=D, forms=FORMS)
-        arrivals.heard(TICK, {1: messages.ExchangeInbox(k=TICK, src="netem", seq=0, messages=relayed)})
+        arrivals.heard(TICK, {1: relayed})
 
     return read
 
@@ -136,7 +136,7 @@ def reads_inbox(data):
     if isinstance(inbox, messages.SenseInbox):
         arrivals.sensed({2: inbox})
     if isinstance(inbox, messages.ExchangeInbox):
-        arrivals.heard(TICK, {2: inbox})
+        arrivals.heard(TICK, {2: inbox.messages})
 
 
 def reads_told(data):

@@ -234,7 +234,7 @@ def overheard(star):
 @both
 def test_an_agent_that_listens_is_not_taken_for_the_hub(certified, protected, monkeypatch):
     if not protected:  # certificates that are good for anything
-        monkeypatch.setattr(authority, "_for", lambda builder, _: builder)
+        monkeypatch.setattr(authority, "_for", lambda builder, *_: builder)
         monkeypatch.setattr(authority, "_of_client", lambda builder: authority._of_hub(builder, ["127.0.0.1"]))
         authority.make(Path(certified.login(HUB).keys), NAMES, [], timedelta(days=1))
 

@@ -130,7 +130,11 @@ def plainly(value):
 
 
 def message_fields(message):
-    return {name: getattr(message, name) for name in message.__struct_fields__}
+    """All but those of runs in real time that are left as they are."""
+    names, defaults = message.__struct_fields__, message.__struct_defaults__
+    unsaid = dict(zip(names[len(names) - len(defaults) :], defaults, strict=True))
+    said = {name: getattr(message, name) for name in names}
+    return {name: value for name, value in said.items() if name not in unsaid or value != unsaid[name]}
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if "phase" in plain(m)], ids=name)

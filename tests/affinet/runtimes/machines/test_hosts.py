@@ -35,7 +35,8 @@ def read(tmp_path, text=WHOLE):
 
 def test_each_machine_has_the_seats_that_the_file_gives_it(tmp_path):
     found = seats.spread_over(plan_of("corridor"), read(tmp_path))
-    assert found.names == (HUB, "agent-1", "agent-2", "agent-3", "agent-4", "agent-5")
+    on_b = dict.fromkeys((HUB, "agent-1", "agent-2", "agent-3"), "b")
+    assert found.machines == on_b | {"agent-4": "c", "agent-5": "c"}
     assert [commands for _, commands in found.of_machines] == [
         (("netem", "--listen", "tls/10.0.0.2:7448"), ("agent", "1", "2", "3")),
         (("agent", "4", "5"),),
@@ -44,7 +45,7 @@ def test_each_machine_has_the_seats_that_the_file_gives_it(tmp_path):
 
 def test_who_is_carried_together_is_on_one_machine(tmp_path):
     found = seats.spread_over(plan_of("corridor", "agents.per_process=2"), read(tmp_path))
-    assert found.names == (HUB, "host-1", "agent-3", "host-2")
+    assert found.machines == {HUB: "b", "host-1": "b", "agent-3": "b", "host-2": "c"}
     assert seats.hosts_of(plan_of("corridor", "agents.per_process=2"), (), found.groups) == {
         1: (1, 2),
         2: (4, 5),
@@ -53,7 +54,9 @@ def test_who_is_carried_together_is_on_one_machine(tmp_path):
 
 
 def test_by_hand_all_but_the_world_is_elsewhere():
-    assert seats.by_hand(plan_of("corridor", "agents.per_process=3")).names == (HUB, "host-1", "host-2", "agent-7")
+    assert dict.fromkeys((HUB, "host-1", "host-2", "agent-7")) == (
+        seats.by_hand(plan_of("corridor", "agents.per_process=3")).machines
+    )
 
 
 def test_the_medium_listens_at_the_next_port_unless_it_is_said(tmp_path):

@@ -37,7 +37,7 @@ def keys(tmp_path_factory):
 
 @pytest.fixture
 def coordinator(keys, free_endpoint):
-    names = [HUB, "agent-1", "agent-2"]
+    names = {HUB: None, "agent-1": None, "agent-2": "the second"}
     login = Login(free_endpoint, COORDINATOR, keys=keys)
     with Coordinator(login, names, scenario="this one", gone_after_s=20.0) as coordinator:
         yield coordinator
@@ -70,6 +70,9 @@ def test_who_is_the_same_gets_its_seat_and_is_awaited_no_more(coordinator, place
         assert at.join(asks("agent-1", scenario="this one")).gone_after_s == 20.0
         assert coordinator.awaited == [HUB, "agent-2"]
         assert coordinator.seats["agent-1"].where == "agent 1 on b"
+    with place("agent-2") as at:
+        at.join(asks("agent-2"))
+        assert coordinator.seats["agent-2"].where == "agent 2 on the second"
 
 
 OTHERS = {
@@ -174,7 +177,7 @@ def test_what_a_process_on_another_machine_says_comes_out_of_a_pipe(tmp_path):
 
 def test_an_address_that_is_taken_is_said(coordinator, keys):
     login = Login(coordinator._login.endpoint, COORDINATOR, keys=keys)
-    second = Coordinator(login, [HUB], scenario="this one", gone_after_s=20.0)
+    second = Coordinator(login, {HUB: None}, scenario="this one", gone_after_s=20.0)
     with pytest.raises(RunFailed, match=f"the coordinator cannot listen at {login.endpoint}: .*in use"):
         second.__enter__()
 
