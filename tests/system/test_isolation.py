@@ -104,4 +104,4 @@ def test_over_tls_a_swarm_flies_the_same_bits(out, tmp_path):
     launcher.login = lambda login: Login(endpoint, login.name, keys=str(tmp_path / "keys"))
     flight = launcher.fly()
     assert flight.failure is None
-    assert history.digest(history.load(out / "arrays.npz")) == digest_of("corridor", "time.duration=2")
+    assert history.digest(history.load(out / history.ARRAYS)) == digest_of("corridor", "time.duration=2")

@@ -5,7 +5,6 @@ import signal
 import socket
 from importlib.resources import files
 
-import numpy as np
 import pytest
 from awaiting import await_true
 from fleets import AFFINET, Fleet, ended, keys_in
@@ -14,6 +13,7 @@ from networks import network
 
 from affinet.verdicts import reading
 from netem.medium import journal
+from world.books import history
 
 pytestmark = PROCESSES
 
@@ -123,6 +123,7 @@ def test_typed_on_three_machines_world_medium_and_agents_fly_the_bits_of_one(fle
     assert all(0.0 < uncertainty_s < 1.0 for uncertainty_s in clocks)
 
 
+@pytest.mark.slow
 def test_a_machine_that_is_cut_off_and_comes_back_goes_on_and_what_was_lost_is_counted(fleet, swarm, keys, out):
     file = swarm(duration=3.0)
     with network("a", "b", "c") as machines:
@@ -162,6 +163,7 @@ def typed_here(fleet, swarm, keys, out, **options):
     return commands
 
 
+@pytest.mark.slow
 def test_when_the_coordinator_is_killed_its_machines_end_what_they_run(fleet, swarm, keys, out):
     commands = typed_here(fleet, swarm, keys, out)
     commands["world"].send_signal(signal.SIGKILL)
@@ -181,7 +183,7 @@ def test_when_the_command_of_a_machine_is_killed_the_run_ends_and_names_it(fleet
     assert f"agent 4 on {socket.gethostname()}" in said
     await_true(lambda: not fleet.running(), "something is left")
     assert flown(out) > 0
-    assert len(np.load(out / "arrays.npz")["error"]) > 0
+    assert len(history.load(out / history.ARRAYS)["error"]) > 0
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ def test_an_example_keeps_its_place_among_ours(example, out):
     plan = plan_of("corridor", *AIR, "network.availability=1", f"agents.programs={{ {example} }}", "agents.limit=0.5")
     outcome = fly(plan, "processes", out, lambda *_: None)
     assert outcome.verdict == "pass", outcome.reasons
-    arrays = history.load(out / "arrays.npz")
+    arrays = history.load(out / history.ARRAYS)
     away = np.linalg.norm((arrays["position"][:-1] - arrays["target"])[:, 4], axis=-1)
     assert away[-1] < 0.3 * away[0]
     assert np.linalg.norm(arrays["input"][:, 4], axis=-1).max() <= 0.5 * (1 + 1e-9)

@@ -32,8 +32,8 @@ from world.books import history, timing
 pytestmark = PROCESSES
 
 DT = 0.05
-# Ten times slower than the clock on the wall: a busy machine has half a second for a tick.
-SLOW = 'time.mode="real"', "time.real.factor=0.1", "time.real.late=60"
+# Four times slower than the clock on the wall: a busy machine has a fifth of a second for a tick.
+SLOW = 'time.mode="real"', "time.real.factor=0.25", "time.real.late=60"
 QUICK = 'time.mode="real"', "time.real.late=60"
 BASE = (f"time.dt={DT}", "time.duration=2", "network.availability=1", "record.enabled=false", 'agents.estimator="rkf"')
 WAYWARD = str(Path(__file__).parents[1] / "programs" / "wayward_agent.py")
@@ -61,7 +61,7 @@ def corridor(tmp_path_factory):
 
 def test_with_time_enough_for_everybody_the_answers_are_those_of_lockstep(tmp_path):
     calm = (f"time.dt={DT}", "time.duration=1", "record.enabled=false", 'agents.estimator="rkf"')
-    for number, factor in enumerate((0.2, 0.05, 0.02)):
+    for number, factor in enumerate((0.4, 0.1, 0.02)):
         slow = ('time.mode="real"', f"time.real.factor={factor}", "time.real.late=60")
         outcome = flown(tmp_path / str(number), "corridor", *calm, *slow)
         if not outcome.timing.missed and "unsaid" not in outcome.messages["dropped"]:
@@ -96,7 +96,7 @@ def test_no_message_arrives_before_it_is_due(corridor):
 
 
 def _verdicts(out):
-    return history.load(out / history.FILE)["verdicts"]
+    return history.load(out / history.ARRAYS)["verdicts"]
 
 
 def test_losses_are_those_of_lockstep_but_for_what_nobody_said(corridor):
@@ -153,6 +153,16 @@ FAULTS = {
 }
 
 
+TOGETHER = ("cut", "lose", "delay", "warm", "clock", "gust", "when")
+
+
+def test_faults_of_links_agents_and_conditions_bite_in_one_flight(out):
+    outcome = flown(out, "corridor", *BASE, *SLOW, timeline(*(fault for name in TOGETHER for fault in FAULTS[name])))
+    assert len(outcome.faults) == len(TOGETHER)
+    assert all(bite.touched for bite in outcome.faults)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_every_fault_bites(name, out):
     estimator = ('agents.estimator="ga-rkf"',) if name == "lie" else ()
@@ -170,6 +180,7 @@ def test_an_agent_whose_clock_runs_slow_acts_less_often_and_one_that_runs_fast_d
     assert moments["agent 5"] <= 40
 
 
+@pytest.mark.slow
 def test_timers_of_ones_own_are_kept(out):
     timers = "time.real.timers=[{agents=[4],rate=0.5,phase=0.9},{agents=[5],jitter=0.1,drift=-0.2}]"
     outcome = flown(out, "corridor", *BASE, *SLOW, timers)

@@ -9,7 +9,7 @@ from netem.medium import deliveries
 from netem.medium.verdict import Verdict
 from world.books import history
 
-pytestmark = PROCESSES
+pytestmark = [PROCESSES, pytest.mark.slow]
 
 DT = 0.05
 AIR = (
@@ -77,7 +77,7 @@ def real(tmp_path_factory):
         if outcome.messages["dropped"].get("unsaid", 0) < 0.01 * outcome.messages["offered"]:
             break
     taken = deliveries.read(out / deliveries.FILE)["taken_s"].to_numpy().astype(float)
-    return Distributions(history.load(out / history.FILE), taken)
+    return Distributions(history.load(out / history.ARRAYS), taken)
 
 
 def test_they_agree(real):
