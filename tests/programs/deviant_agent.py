@@ -55,7 +55,7 @@ inboxes = session.declare_subscriber(
     f"{base}/rx" if WRONG != "deaf" else f"{base}/told", zenoh.handlers.FifoChannel(64)
 )
 keys = {"input": "tx/input", "measurement": "tx/measurement", "strange": "tx/strange", "act": "act"}
-voices = {name: session.declarepublisher(f"{base}/{key}") for name, key in keys.items()}
+voices = {name: session.declare_publisher(f"{base}/{key}") for name, key in keys.items()}
 for name in ("input", "measurement", "act"):
     changes = voices[name].declare_matching_listener(zenoh.handlers.FifoChannel(4))
     while not voices[name].matching_status.matching:

@@ -30,7 +30,7 @@ class Speaking:
         self._mistakes = [one for one in catalogue() if one.on == on and (wanted == ["all"] or str(one) in wanted)]
         self._floods = on == "input" and wanted == ["floods"]
         # What is said here is not to be lost on the way because the way is busy.
-        self._voice = session._session.declarepublisher(
+        self._voice = session._session.declare_publisher(
             voice.publisher.key_expr, congestion_control=zenoh.CongestionControl.BLOCK
         )
         self.await_heard = voice.await_heard
