@@ -311,7 +311,7 @@ class TrustSection(Section):
     """
 
     wrong_messages: Literal["fail", "drop"] = "fail"
-    largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 24)] = 1 << 20
+    largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 22)] = 1 << 20
     messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = 100
 
 

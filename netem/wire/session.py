@@ -53,7 +53,7 @@ _LEASE_MS = 3_600_000
 # after many seconds. What is lost with a session is asked for again, so a process that is paused for longer loses nothing.
 _LEASE_BETWEEN_MS, _OPEN_BETWEEN_MS = 3_000, 10_000
 LARGEST = 2**20  # bytes that an agent may say at once, if nobody says otherwise
-_BEYOND = 4  # times as much the hub drops before anybody reads it; what is between is counted, and its agent named
+_BEYOND = 16  # times as much the hub drops before anybody reads it; what is between is counted, and its agent named
 _ASKING = 3  # sessions of those who inject, besides one
 _LARGEST_OF_ALL = 64 * 2**20  # the world's sensing of a hundred thousand agents
 
@@ -217,7 +217,7 @@ def listening(
     rights
         The rules of each who may log in.
     limited, largest
-        Keys on which nobody is heard who says more than four times the largest at once, in bytes.
+        Keys on which nobody is heard who says more than sixteen times the largest at once, in bytes.
 
     Raises
     ------
