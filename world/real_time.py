@@ -20,6 +20,8 @@ from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier, entry_of
 from world.physics.world import Scene
 
+_START_S = 30.0  # which a process may take to start that is new while a run flies, on a busy machine
+
 
 class TooLate(RuntimeError):
     """A process was later than a run in real time allows."""
@@ -32,7 +34,6 @@ class RealTimeCarrier(ZenohCarrier):
     ----------
     session, supervisor, brief, meanwhile
         As of a `ZenohCarrier`.
-
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class RealTimeCarrier(ZenohCarrier):
         self._pace: Pace = brief.pace
         self._newest: dict[int, messages.Act] = {}
         self._spoke: dict[int, int] = {}
+        self._slept: set[int] = set()
         self._journaled = 0
 
     @property
@@ -82,8 +84,11 @@ class RealTimeCarrier(ZenohCarrier):
         super()._move_processes(tick)
         for agent in self.timeline.killed(tick):
             self._newest.pop(agent, None)
-        for agent in (*self.timeline.restarted(tick), *self.timeline.resumed(tick)):
+        for agent in self.timeline.resumed(tick):
             self._spoke[agent] = tick
+            self._slept.add(agent)
+        for agent in self.timeline.restarted(tick):
+            self._spoke[agent] = tick + round(_START_S * self._pace.factor / self._world.dt)
 
     def _take_journals(self) -> None:
         for arrived in self._journal.waiting():
@@ -107,7 +112,9 @@ class RealTimeCarrier(ZenohCarrier):
                 continue
             self._newest[act.src] = act
             self._spoke[act.src] = tick
-            if act.punctuality is not None:
+            if act.src in self._slept:  # what it missed meanwhile is no fault of its own
+                self._slept.remove(act.src)
+            elif act.punctuality is not None:
                 self._keep(Kept(act.k, called(act.src), act.punctuality.late, act.punctuality.missed))
         for agent in (np.flatnonzero(~idle) + 1).tolist():
             silent = (tick - self._spoke.get(agent, 0)) * self._world.dt / self._pace.factor

@@ -68,7 +68,7 @@ class Deliveries:
     def book(self, tick: int, parcels: Sequence[Parcel[Any]], now_s: float) -> None:
         """Messages that were delivered in a tick, by now."""
         self._booked += [
-            (tick, parcel.link, parcel.channel, parcel.content, parcel.delay_s, now_s - parcel.said_s)
+            (tick, parcel.link, parcel.channel, parcel.content, parcel.due_s - parcel.said_s, now_s - parcel.said_s)
             for parcel in parcels
         ]
         if tick >= self._first + self._batch:

@@ -25,8 +25,8 @@ class Parcel(NamedTuple, Generic[Said]):
         The tick it speaks of.
     mark
         How it is corrupted.
-    said_s, delay_s
-        When it was said, and for how long the network was to delay it, in simulated seconds.
+    said_s
+        When it was said, in simulated seconds.
     origin
         What is known of the tick in which it was sent.
     said
@@ -41,7 +41,6 @@ class Parcel(NamedTuple, Generic[Said]):
     content: int
     mark: int
     said_s: float
-    delay_s: float
     origin: OpenTick
     said: Said
 

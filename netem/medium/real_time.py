@@ -88,6 +88,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         self._last_due: dict[tuple[int, int], float] = {}
         self._offered = np.zeros((channels, len(links)), dtype=np.int64)
         self._freed: list[Parcel[Said]] = []
+        self._freed_s = 0.0
         self._tick = -1
         self.in_flight = 0
         self.too_late = 0
@@ -99,6 +100,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
 
     def begin(self, tick: int, position: Array | None) -> Begun:
         """A tick begins, in which the agents are at a position, shape (N, D), in metres: judge what they will say in it."""
+        self._freed_s = tick * self._dt
         conditions = self.timeline.at(tick)
         self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick), position)
         waits = self._state.waits or _of_recorded(verdicts, tick, self._dt)
@@ -141,7 +143,11 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
     def arriving(self, now_s: float) -> list[Parcel[Said]]:
         """What arrives by now, in simulated seconds."""
         due = self._parcels.due(now_s, self._holds.__getitem__)
-        arrived, self._freed = self._freed + due, []
+        # What was held is due when it is let go.
+        arrived, self._freed = (
+            [parcel._replace(due_s=max(parcel.due_s, self._freed_s)) for parcel in self._freed] + due,
+            [],
+        )
         for parcel in arrived:
             self._arrive(parcel)
         return arrived
@@ -180,16 +186,14 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         if mark == _STALE and before != tick - 1:  # it has nothing old to say
             mark = 0
         content, what = (tick - 1, what_before) if mark == _STALE else (tick, said)
-        delay_s = spoken.wait_s[channel][link]
-        due_s = self._in_order(spoken, channel, link, said_s + delay_s)
+        due_s = self._in_order(spoken, channel, link, said_s + spoken.wait_s[channel][link])
         spoken.kind[channel, link], spoken.mark[channel, link] = _DELAYED, mark
         spoken.due[channel, link] = max(self._tick_of(due_s), tick)
-        self._parcels.put(Parcel(due_s, tick, link, channel, False, content, mark, said_s, delay_s, spoken, what))
+        self._parcels.put(Parcel(due_s, tick, link, channel, False, content, mark, said_s, spoken, what))
         if spoken.doubled[channel][link]:
-            delay_s = spoken.copy_wait_s[channel][link]
-            due_s = self._in_order(spoken, channel, link, said_s + delay_s)
+            due_s = self._in_order(spoken, channel, link, said_s + spoken.copy_wait_s[channel][link])
             spoken.copy_due[channel, link] = max(self._tick_of(due_s), tick)
-            self._parcels.put(Parcel(due_s, tick, link, channel, True, tick, 0, said_s, delay_s, spoken, said))
+            self._parcels.put(Parcel(due_s, tick, link, channel, True, tick, 0, said_s, spoken, said))
 
     def _in_order(self, spoken: OpenTick, channel: int, link: int, due_s: float) -> float:
         if not spoken.ordered[channel][link]:

@@ -162,6 +162,13 @@ def test_faults_of_links_agents_and_conditions_bite_in_one_flight(out):
     assert all(bite.touched for bite in outcome.faults)
 
 
+def test_who_was_stopped_by_the_script_was_not_late(out):
+    patient = [one if "late" not in one else "time.real.late=0.8" for one in SLOW]
+    stopped = timeline({"verb": "pause", "agents": [6], "at": 0.5}, {"verb": "resume", "agents": [6], "at": 1.25})
+    outcome = flown(out, "corridor", *BASE, *patient, stopped)  # for three seconds
+    assert outcome.timing.lateness["agent 6"].max_ms < 800.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_every_fault_bites(name, out):

@@ -42,6 +42,7 @@ def test_json_is_the_last_line_and_has_every_figure(out):
         "delivered",
         "dropped",
         "in_flight",
+        "transport_lost",
         "uninstructed",
     }
     assert set(summary["processes"][0]) == {"role", "id", "pid", "pss_mb", "exit"}
