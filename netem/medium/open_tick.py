@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from analysis.models.arrays import Integers
-from netem.faults.timeline import Conditions
 from netem.medium.in_flight import Entry, Verdicts, Waits, out_of_the_ordinary
 from netem.medium.verdict import Verdict
 
@@ -21,8 +20,8 @@ class OpenTick:
 
     Attributes
     ----------
-    tick, idle
-        Its number, and of each agent whether its process hears and speaks.
+    tick
+        Its number.
     decided, marks, doubled, wait_s, copy_wait_s, ordered
         What is decided of what is said in it, by channel and link: the verdict, how it is corrupted, whether it is doubled, how
         long it and its copy wait in seconds, and whether it waits for those sent before it.
@@ -37,9 +36,9 @@ class OpenTick:
         All faults injected so far, in plain form, when one was injected or healed.
     """
 
-    def __init__(self, tick: int, conditions: Conditions, verdicts: Verdicts, waits: Waits) -> None:
+    def __init__(self, tick: int, verdicts: Verdicts, waits: Waits) -> None:
         shape = verdicts.kind.shape
-        self.tick, self.idle = tick, conditions.idle.tolist()
+        self.tick = tick
         self.decided, self.marks = verdicts.kind.tolist(), verdicts.mark.tolist()
         self.doubled = (verdicts.copy_due >= 0).tolist()
         self.wait_s, self.copy_wait_s, self.ordered = (np.broadcast_to(of, shape).tolist() for of in waits)

@@ -91,7 +91,6 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         self._freed_s = 0.0
         self._tick = -1
         self.in_flight = 0
-        self.too_late = 0
 
     @property
     def next_s(self) -> float | None:
@@ -104,7 +103,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         conditions = self.timeline.at(tick)
         self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick), position)
         waits = self._state.waits or _of_recorded(verdicts, tick, self._dt)
-        now = self._open[tick] = OpenTick(tick, conditions, verdicts, waits)
+        now = self._open[tick] = OpenTick(tick, verdicts, waits)
         awake = (np.flatnonzero(~conditions.idle) + 1).tolist()
         now.unsaid = {(agent, channel) for agent in awake for channel in self._speaking}
         injected = self._newly_injected()
@@ -116,6 +115,8 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
 
     def say(self, agent: int, channel: int, tick: int, said_s: float, said: Said) -> bool:
         """An agent has said something on a channel of this row: send it on its way, if it is not too late for that.
+
+        It is where the tick is written down already, or the agent has spoken of a later one.
 
         Parameters
         ----------
@@ -129,9 +130,9 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
             What was said.
         """
         spoken = self._open.get(tick)
-        if spoken is None or spoken.idle[agent - 1] or (agent, channel) not in spoken.unsaid:
-            self.too_late += 1
+        if spoken is None or (agent, channel) not in spoken.unsaid:
             return False
+        self._give_up_before(tick, (agent, channel))
         spoken.unsaid.discard((agent, channel))
         for link in self._outgoing[agent]:
             kind = spoken.kind[channel, link] = spoken.decided[channel][link]
@@ -179,6 +180,12 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         for parcel in freed:
             now.released.append((parcel.origin, parcel.channel, parcel.link))
         self._freed += freed
+
+    def _give_up_before(self, tick: int, voice: Voice) -> None:
+        """Whoever speaks of a tick says nothing more of those before it."""
+        for earlier in range(self._last_said[voice][0] + 1 if voice in self._last_said else 0, tick):
+            if earlier in self._open:
+                self._open[earlier].unsaid.discard(voice)
 
     def _send(self, spoken: OpenTick, agent: int, channel: int, link: int, said_s: float, said: Said) -> None:
         tick, mark = spoken.tick, spoken.marks[channel][link]

@@ -5,6 +5,7 @@ import signal
 import socket
 from importlib.resources import files
 
+import numpy as np
 import pytest
 from awaiting import await_true
 from fleets import AFFINET, Fleet, ended, keys_in
@@ -13,7 +14,7 @@ from networks import network
 
 from affinet.verdicts import reading
 from netem.medium import journal
-from world.books import history
+from world.books import history, timing
 
 pytestmark = PROCESSES
 
@@ -161,6 +162,53 @@ def typed_here(fleet, swarm, keys, out, **options):
     commands = typed(fleet, keys, swarm(duration=600.0), out, endpoint(), endpoint(), **options)
     awaiting_flight(out, commands)
     return commands
+
+
+REAL = ("--set", 'time.mode="real"', "--set", "time.dt=0.05", "--set", "time.real.late=60")
+
+
+def test_in_real_time_they_fly_by_one_clock(fleet, swarm, keys, tmp_path, out):
+    swarm(duration=2.0)
+    machines = {"name": "one", "agents": [1, 2, 3]}, {"name": "other", "agents": [4, 5]}
+    hosts = hosts_file(tmp_path, keys, endpoint(), endpoint(), *machines)
+    status, said = ended(fleet.start("hosts", hosts, "--out", out, *REAL))
+    assert status == 0, said
+    told = summary(out)
+    assert told["verdict"] == "pass"
+    assert {f"agent {number}" for number in range(1, 8)} <= told["timing"]["lateness"].keys()
+    assert not fleet.running()
+
+
+@pytest.mark.slow
+def test_in_real_time_a_machine_that_is_cut_off_is_missed_and_comes_back(fleet, swarm, keys, tmp_path, out):
+    swarm(duration=12.0)
+    with network("a", "b") as machines:
+        addresses = [endpoint(machines.address("a"), port) for port in (PORT, PORT + 1)]
+        remote = {"name": "b", "agents": [4, 5, 6, 7], "command": machines.to("b")}
+        hosts = hosts_file(tmp_path, keys, *addresses, remote)
+        command = fleet.start("hosts", hosts, "--out", out, *REAL, to=machines.to("a"))
+        await_true(lambda: kept_by(out, "agent 4") or command.poll() is not None, "it never flew")
+        machines.cut("b")
+        await_true(lambda: not machines.connections("b"), "the cut was not noticed")
+        machines.mend("b")
+        _, said = ended(command)
+        assert not any(map(machines.running, machines.names))
+    told = summary(out)
+    assert told["verdict"].startswith("pass, transport lost "), said
+    assert told["messages"]["dropped"]["unsaid"] > 0
+    assert told["messages"]["ticks"] == 240
+    acted = kept_by(out, "agent 4")
+    assert np.diff(acted).max() > 10
+    assert acted[-1] > 230
+
+
+def kept_by(out, process):
+    """The ticks of which a process has told how it kept its time."""
+    file = out / timing.FILE
+    if not (file.exists() and file.stat().st_size):
+        return []
+    rows = timing.read(file)
+    return rows["tick"].to_numpy()[np.array(rows["process"].to_pylist()) == process].tolist()
 
 
 @pytest.mark.slow

@@ -193,9 +193,23 @@ def test_what_is_said_within_the_grace_is_heard_and_later_is_not():
     flight.deliver(0.5)
     flight.begin()
     assert not flight.say(2, channel=2, tick=0)
-    assert flight.relay.too_late == 1
     assert flight.end().entries[0].verdicts[1, LINKS.index[2, 1]] == Verdict.DELAYED
     assert closes(flight)
+
+
+def test_who_speaks_of_a_tick_has_nothing_more_to_say_of_those_before_and_holds_up_no_book():
+    flight = Flight()
+    for _ in range(3):
+        flight.begin()
+    for agent in (1, 2, 3, 4):
+        for channel in (1, 2):
+            assert flight.say(agent, 0.0, channel)
+    assert not flight.say(1, tick=1)
+    flight.begin()
+    assert len(flight.entries) == 3
+    assert [(entry.verdicts[1:] == Verdict.UNSAID).all() for entry in flight.entries] == [True, True, False]
+    flight.deliver(0.5)
+    assert closes(flight.end())
 
 
 @pytest.mark.parametrize("again", [1, 2])
