@@ -19,6 +19,7 @@ from agents.batch import beside_others, come_back, put_back
 from agents.brief import Brief, together
 from agents.mailbox import Mailbox
 from agents.timer import Timer
+from analysis.models.arrays import Mask
 from netem.core import channels
 from netem.loading.choice import Choice
 from netem.processes.supervised import Supervisor
@@ -193,19 +194,23 @@ class AgentsNode:
         return self._mailboxes[agent].next_inbox()
 
     def _live(self, tick: int, inboxes: Mapping[int, messages.SenseInbox]) -> None:
-        before, living = self._state, self._state
-        if some_idle := len(inboxes) < len(self._mailboxes):
-            idle = ~np.isin(self._numbers, [*inboxes])
-            living = beside_others(before, idle, tick)
+        living, idle = self._living(tick, inboxes)
         sensed = self._arrivals.sensed(inboxes)
         state = self._speak(tick, living, sensed, inboxes)
         self._supervisor.waits(tick, "its inbox", lambda: (HUB,))
         state, action = self._act(tick, state, sensed, [*inboxes])
-        self._state = put_back(idle, before, state) if some_idle else state
-        self._keep()
+        self._keep(state, idle)
         self._tell(tick, action, [*inboxes])
 
-    def _keep(self) -> None:
+    def _living(self, tick: int, awake: Collection[int]) -> tuple[AgentState, Mask | None]:
+        """The state with which a tick is lived, and who of them all is idle in it, if anybody is."""
+        if len(awake) == len(self._mailboxes):
+            return self._state, None
+        idle = ~np.isin(self._numbers, [*awake])
+        return beside_others(self._state, idle, tick), idle
+
+    def _keep(self, state: AgentState, idle: Mask | None) -> None:
+        self._state = state if idle is None else put_back(idle, self._state, state)
         if self._checkpoint:
             checkpoint.save(self._checkpoint, self._state)
 

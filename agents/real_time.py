@@ -6,10 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from math import ceil
 from typing import NamedTuple
 
-import numpy as np
-
 from agents.agent import AgentAction
-from agents.batch import beside_others, put_back
 from agents.loading import capabilities
 from agents.node import AgentBrief, AgentsNode
 from agents.timer import OwnClock
@@ -142,10 +139,7 @@ class RealTimeAgentsNode(AgentsNode):
         self, acts: float, tick: int, inboxes: Mapping[int, messages.SenseInbox]
     ) -> tuple[AgentAction, float]:
         """What they do in a tick, and by how much they were late to decide it, in simulated seconds."""
-        before, living = self._state, self._state
-        if some_idle := len(inboxes) < len(self._mailboxes):
-            idle = ~np.isin(self._numbers, [*inboxes])
-            living = beside_others(before, idle, tick)
+        living, idle = self._living(tick, inboxes)
         sensed = self._arrivals.sensed(inboxes)
         state = self._speak(tick, living, sensed, inboxes, self._wall.now())
         self._wall.wait_until(acts)
@@ -153,8 +147,7 @@ class RealTimeAgentsNode(AgentsNode):
         self._listen()
         heard = self._arrivals.heard(tick, self._heard_by(tick, inboxes))
         state, action = self._agents.act(state, sensed.clock, heard, sensed.position, sensed.motion, sensed.sighting)
-        self._state = put_back(idle, before, state) if some_idle else state
-        self._keep()
+        self._keep(state, idle)
         return action, late
 
     def _heard_by(self, tick: int, awake: Collection[int]) -> dict[int, list[messages.Broadcast]]:

@@ -139,7 +139,8 @@ class MediumPorts:
     ) -> None:
         """Tell those who are awake what they sense, and in real time when the run began, by the medium's clock."""
         timeline = self._relay.timeline
-        clock, gains = timeline.clock(sense.k).tolist(), timeline.gains(sense.k).tolist()
+        clock = timeline.clock(sense.k).tolist()
+        gains = [0.0] * len(clock) if began is None else timeline.gains(sense.k).tolist()
         links, neighbours, ends = seen
         measured, size = _rows(sense.measured, len(self._links), links)
         position = _parts(sense.position, len(self._inboxes))
@@ -157,7 +158,7 @@ class MediumPorts:
                 motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
                 began=began,
-                gains=0.0 if began is None else gains[agent - 1],
+                gains=gains[agent - 1],
             )
             self._inboxes[agent].say(messages.pack(inbox))
 

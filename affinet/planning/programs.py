@@ -1,4 +1,4 @@
-"""Agents that fly by programs of a user's own, in place of ours: there have to be such agents, and processes."""
+"""What needs processes: agents that fly by programs of a user's own, in place of ours, and runs in real time."""
 
 from __future__ import annotations
 
@@ -24,13 +24,19 @@ def refuse_strangers(programs: Mapping[str, str], agents: int) -> None:
 
 
 def refuse_in_process(plan: Plan) -> None:
-    """Refuse to fly in one process what programs have to.
+    """Refuse to fly in one process what needs several.
 
     Raises
     ------
+    ScenarioError
+        When it is to fly in real time.
     PlanError
-        When the plan has some.
+        When programs fly some of it.
     """
+    if plan.pace is not None:
+        raise ScenarioError(
+            "time.mode: a run in real time flies over processes (--runtime processes); in one process set it to 'lockstep'"
+        )
     if plan.programs:
         says = (
             f"agents {listed(plan.programs)} fly by programs of your own, each of them a process: fly over processes "

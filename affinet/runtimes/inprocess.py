@@ -14,7 +14,6 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.array_carrier import ArrayCarrier, BatchActed
-from affinet.scenario.sections import ScenarioError
 from analysis.models.arrays import Array, chosen
 from netem.core.clock import Lockstep
 from netem.faults.timeline import Timeline
@@ -37,15 +36,11 @@ class InProcessSwarm:
 
     Raises
     ------
-    ScenarioError
-        When it is to fly in real time.
+    ScenarioError, PlanError
+        When it needs several processes.
     """
 
     def __init__(self, plan: Plan) -> None:
-        if plan.pace is not None:
-            raise ScenarioError(
-                "time.mode: a run in real time flies over processes (--runtime processes); in one process set it to 'lockstep'"
-            )
         self._plan = plan
         self._carrier = ArrayCarrier(plan)
 

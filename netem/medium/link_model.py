@@ -137,11 +137,11 @@ class LinkModel:
         wait_s = impairments.delay_s if extra_s is None else impairments.delay_s + extra_s
         wait = self._wait(state, tick, impairments, None if extra_s is None else wait_s)
         kind, due = _decided(tick, self._measured, offered, imposed, held, wait)
-        mark, copy_due = self._unmarked, self._single
+        mark, copy_due, copy_s = self._unmarked, self._single, wait_s
         if self._corrupts:
             mark = _marked(self._measured, kind, impairments.mark, state.spoke)
-        copy_s = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
         if self._doubles:
+            copy_s = impairments.copy_delay_s if extra_s is None else impairments.copy_delay_s + extra_s
             copy_due = self._copies(tick, impairments.copied, kind, due, copy_s)
         return Memory(debt, chains), Verdicts(kind, due, mark, copy_due), Waits(wait_s, copy_s, self._ordered)
 

@@ -37,23 +37,14 @@ class Begun(NamedTuple):
 
     Parameters
     ----------
-    tick
-        Its number.
-    conditions
-        What the timeline imposes in it.
+    awake
+        Numbers of the agents that hear and speak.
     seen
         Links whose measurement reaches the agent that made it, shape (L,).
     """
 
-    tick: int
-    conditions: Conditions
+    awake: list[int]
     seen: Mask
-
-    @property
-    def awake(self) -> list[int]:
-        """Numbers of the agents that hear and speak."""
-        numbers: list[int] = (np.flatnonzero(~self.conditions.idle) + 1).tolist()
-        return numbers
 
 
 class RealTimeRelay(FaultedRelay, Generic[Said]):
@@ -111,7 +102,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         self._tick = tick
         if conditions is not self._conditions:
             self._face(conditions, now)
-        return Begun(tick, conditions, verdicts.kind[0] == _DELIVERED)
+        return Begun(awake, verdicts.kind[0] == _DELIVERED)
 
     def say(self, agent: int, channel: int, tick: int, said_s: float, said: Said) -> bool:
         """An agent has said something on a channel of this row: send it on its way, if it is not too late for that.

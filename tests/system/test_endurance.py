@@ -8,13 +8,13 @@ import shutil
 import socket
 import subprocess
 import sys
-from contextlib import contextmanager
 from math import prod
 
 import numpy as np
 import psutil
 import pytest
 from flying import PROCESSES, plan_of
+from limits import limit
 from paths import BENCH, ROOT
 
 from affinet.runtimes.run import fly
@@ -74,16 +74,6 @@ def test_no_process_grows_while_something_fails_every_second(runtime):
 
 
 # ---- what happens to the machine: the table of docs/endurance.md
-
-
-@contextmanager
-def limit(kind, value):
-    before = resource.getrlimit(kind)
-    resource.setrlimit(kind, (value, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(kind, before)
 
 
 def readable(out):

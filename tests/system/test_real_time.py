@@ -224,11 +224,12 @@ def test_who_does_not_act_any_more_fails_the_run_and_is_named(tmp_path):
     assert "agent 2 has not acted for" in launcher.fly().failure
 
 
-@pytest.mark.parametrize("fly_it", [rehearse])
-def test_in_one_process_there_is_no_real_time(fly_it):
+def test_in_one_process_there_is_no_real_time(out):
     plan = plan_of("corridor", *BASE, *SLOW)
-    with pytest.raises(ScenarioError, match=r"time\.mode: a run in real time flies over processes"):
-        fly_it(plan)
+    for fly_it in (rehearse, lambda plan: fly(plan, "inprocess", out, lambda *_: None)):
+        with pytest.raises(ScenarioError, match=r"time\.mode: a run in real time flies over processes"):
+            fly_it(plan)
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ import json
 import os
 import resource
 import subprocess
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from flying import PROCESSES, plan_of
+from limits import limit
 
 from affinet.cli.commands import main
 from affinet.runtimes import rerun_command
@@ -28,17 +28,6 @@ pytestmark = PROCESSES
 
 SHORT = ("time.dt=0.05", "time.duration=0.5")
 RUN = ["run", "corridor", "--set", "time.dt=0.05", "--duration", "0.5", "--runtime", "inprocess"]
-
-
-@contextmanager
-def limit(kind, value):
-    """A limit of this process and its children for as long as the block lasts: pytest itself may write to a file."""
-    before = resource.getrlimit(kind)
-    resource.setrlimit(kind, (value, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(kind, before)
 
 
 def in_one_line(capsys):
