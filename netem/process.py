@@ -11,6 +11,7 @@ from pathlib import Path
 
 from netem.brief import MediumBrief
 from netem.lockstep import LockstepNode
+from netem.processes.background import Background
 from netem.processes.supervised import Supervisor
 from netem.real_time import RealTimeNode
 from netem.wire.carrier import Session
@@ -29,7 +30,6 @@ def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:
 def main() -> None:
     """Run the medium until the run is over."""
     os.environ |= HUB_ENVIRONMENT
-    os.environ |= HUB_ENVIRONMENT
     supervisor = Supervisor()
     brief = supervisor.brief(MediumBrief)
     with supervisor.confessing(), _listening(supervisor, brief) as session:
@@ -47,7 +47,9 @@ def main() -> None:
                 node: LockstepNode | RealTimeNode = LockstepNode(session, supervisor, brief, writer)
             else:
                 deliveries = Deliveries(Path(brief.journal).parent, brief.links, brief.channels, brief.batch)
-                node = RealTimeNode(session, supervisor, brief, writer, stack.enter_context(deliveries))
+                stack.enter_context(deliveries)
+                background = stack.enter_context(Background())
+                node = RealTimeNode(session, supervisor, brief, writer, deliveries, background)
             node.await_everybody()
             supervisor.tell("ready")
             node.run()

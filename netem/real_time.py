@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from netem.medium.parcels import Parcel
 from netem.medium.real_time import RealTimeRelay
 from netem.medium.relay import changed_on_the_way
 from netem.ports import MediumPorts, medium_of
+from netem.processes.background import Background
 from netem.processes.supervised import Supervisor
 from netem.processes.wall_time import WallTime, be_prompt
 from netem.wire import messages
@@ -33,7 +35,13 @@ class RealTimeNode:
     """The medium of a run in real time."""
 
     def __init__(
-        self, session: Session, supervisor: Supervisor, brief: MediumBrief, journal: Writer, deliveries: Deliveries
+        self,
+        session: Session,
+        supervisor: Supervisor,
+        brief: MediumBrief,
+        journal: Writer,
+        deliveries: Deliveries,
+        background: Background,
     ) -> None:
         assert brief.pace is not None, "of a run in real time"
         self._keys, self._supervisor, self._written = Keys(brief.run), supervisor, journal
@@ -44,7 +52,7 @@ class RealTimeNode:
         supervisor.counts(lambda: self._ports.intake.refused)
         self._row = {name: row for row, name in enumerate(brief.channels)}
         self._ears = session.hears_all([self._keys.sense, self._keys.broadcast("*", "*")])
-        self._deliveries = deliveries
+        self._deliveries, self._background = deliveries, background
         self._handed = [0] * brief.links.agents
         self._awake: frozenset[int] = frozenset()
         self._wall: WallTime | None = None
@@ -131,7 +139,7 @@ class RealTimeNode:
                 self._handed[agent - 1] += len(parcels)
         now_s = self._wall.now()
         self._late = max(self._late, *(now_s - parcel.due_s for parcel in arriving))
-        self._deliveries.book(self._tick, arriving, now_s)
+        self._background.later(partial(self._deliveries.book, self._tick, arriving, now_s))
 
     def _as_it_arrives(self, parcel: Parcel[bytes]) -> bytes:
         if not changed_on_the_way(parcel.mark):
@@ -144,7 +152,8 @@ class RealTimeNode:
             handed, self._handed = self._handed, [0] * len(self._handed)
             kept = messages.Punctuality(late=self._late / self._pace.factor, missed=int(self._late > self._pace.dt))
             self._ports.tell_the_world(self._ports.journal(self._told, entry, handed, kept))
-            self._written.enter(entry, self._relay.in_flight, self._supervisor.lost_anywhere())
+            lost = self._supervisor.lost_anywhere()
+            self._background.later(partial(self._written.enter, entry, self._relay.in_flight, lost))
             self._told, self._late = self._told + 1, 0.0
 
 

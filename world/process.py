@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from netem.core.clock import Clock, Lockstep
+from netem.faults.timeline import Timeline
+from netem.medium.in_flight import Entry
 from netem.processes import system_errors
+from netem.processes.background import Background
 from netem.processes.supervised import Supervisor
 from netem.wire.carrier import Session
 from netem.wire.repeating import opened
@@ -17,6 +22,7 @@ from netem.wire.session import client
 from world import flight
 from world.books.archive import Archive
 from world.books.history import ARRAYS, UNTOLD, Moment, gather
+from world.books.kept import Kept
 from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier
 from world.flight import FlownTick
@@ -26,6 +32,10 @@ if TYPE_CHECKING:
     from world.recording.logbook import RunWriter
 
 
+Later = Callable[[Callable[[], None]], None]
+Written = tuple[FlownTick[ProcessesActed], Entry]
+
+
 class WorldNode:
     """The world of a run on the network.
 
@@ -33,16 +43,23 @@ class WorldNode:
     ----------
     session, supervisor, brief
         Where, watched by whom, and which world.
-    archive, logbook
-        Where it is written down.
+    archive, logbook, later
+        Where it is written down; and what calls something now, or as soon as there is time for it.
     """
 
     def __init__(
-        self, session: Session, supervisor: Supervisor, brief: WorldBrief, archive: Archive, logbook: RunWriter
+        self,
+        session: Session,
+        supervisor: Supervisor,
+        brief: WorldBrief,
+        archive: Archive,
+        logbook: RunWriter,
+        later: Later,
     ) -> None:
         self._world, self._supervisor, self._archive, self._logbook = brief.world, supervisor, archive, logbook
         self._carrier, self._clock = _of_time(session, supervisor, brief, self._meanwhile)
-        self._batch = brief.books.batch
+        self._batch, self._later = brief.books.batch, later
+        self._due = 0
         self._flown: dict[int, FlownTick[ProcessesActed]] = {}
 
     @property
@@ -65,39 +82,46 @@ class WorldNode:
         if tick % self._batch == 0:
             self._write_down()
 
-    def _moment(self, instant: FlownTick[ProcessesActed]) -> Moment:
-        acted, agents = instant.acted, range(1, self._world.links.agents + 1)
+    def _write_down(self) -> None:
+        entries, timeline, kept = self._carrier.entries, self._carrier.timeline, self._carrier.kept
+        due = []
+        while (tick := self._due + len(due)) in self._flown and tick in entries:
+            due.append((self._flown[tick], entries[tick]))
+        if not due:
+            return
+        self._later(partial(self._write, due, kept, timeline))
+        # At the end: a signal may come between any two lines.
+        self._carrier.kept = []
+        for tick in range(self._due, self._due + len(due)):
+            del self._flown[tick], entries[tick]
+        self._due += len(due)
+
+    def _write(self, due: Sequence[Written], kept: Sequence[Kept], timeline: Timeline) -> None:
+        first = due[0][0].tick
+        if first < self._archive.ticks:  # a signal came before it was noted that they are written
+            return
+        self._logbook.write_kept(kept)
+        moments = gather(timeline, first, [self._moment(flown, entry) for flown, entry in due])
+        self._archive.extend(moments, due[-1][0].following.position)
+        self._logbook.write(moments, timeline)
+        self._supervisor.tell("tick", k=self._archive.ticks, error=float(moments.error[-1]))
+
+    def _moment(self, flown: FlownTick[ProcessesActed], entry: Entry) -> Moment:
+        acted, agents = flown.acted, range(1, self._world.links.agents + 1)
         everybody = [acted.acts.get(agent) for agent in agents]
         return Moment(
-            position=instant.scene.position,
-            target=self._world.goal(instant.tick, instant.scene),
-            measured=instant.measured,
-            input=instant.input,
+            position=flown.scene.position,
+            target=self._world.goal(flown.tick, flown.scene),
+            measured=flown.measured,
+            input=flown.input,
             estimate=acted.done.estimate,
             known=acted.done.known,
             covariance=acted.done.covariance,
             psi=[np.nan if act is None else act.psi for act in everybody],
             feasible=[UNTOLD if act is None or act.feasible is None else int(act.feasible) for act in everybody],
             reports=acted.done.reports,
-            entry=self._carrier.entries[instant.tick],
+            entry=entry,
         )
-
-    def _write_down(self) -> None:
-        first, entries = self._archive.ticks, self._carrier.entries
-        following = first
-        while following in self._flown and following in entries:
-            following += 1
-        if following == first:
-            return
-        kept, self._carrier.kept = self._carrier.kept, []
-        self._logbook.write_kept(kept)
-        timeline = self._carrier.timeline
-        moments = gather(timeline, first, [self._moment(self._flown[tick]) for tick in range(first, following)])
-        self._archive.extend(moments, self._flown[following - 1].following.position)
-        self._logbook.write(moments, timeline)
-        self._supervisor.tell("tick", k=self._archive.ticks, error=float(moments.error[-1]))
-        for tick in range(first, following):  # at the end: a signal may come between any two lines
-            del self._flown[tick], entries[tick]
 
 
 def _of_time(
@@ -111,6 +135,16 @@ def _of_time(
 
 def _joined(supervisor: Supervisor, brief: WorldBrief) -> Session:
     return opened(client(brief.login), brief.login, supervisor.lost, in_real_time=brief.pace is not None)
+
+
+@contextmanager
+def _pace_of_writing(brief: WorldBrief) -> Iterator[Later]:
+    """In real time what is written must not keep the next tick waiting; in lockstep it is written while agents compute."""
+    if brief.pace is None:
+        yield lambda call: call()
+        return
+    with Background() as background:
+        yield background.later
 
 
 def main() -> None:
@@ -128,10 +162,10 @@ def main() -> None:
             Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
             RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,
         ):
-            node = WorldNode(session, supervisor, brief, archive, logbook)
-            node.await_everybody()
-            supervisor.tell("ready")
-            supervisor.await_order("go")
-            with supervisor.confessing():
+            with supervisor.confessing(), _pace_of_writing(brief) as later:
+                node = WorldNode(session, supervisor, brief, archive, logbook, later)
+                node.await_everybody()
+                supervisor.tell("ready")
+                supervisor.await_order("go")
                 node.run()
         supervisor.tell("done", uninstructed=node.uninstructed)

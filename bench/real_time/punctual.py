@@ -50,7 +50,7 @@ def busy(loops: int) -> Iterator[None]:
             process.join()
 
 
-def plan_of(agents: int, rate: float, seconds: float, heard: Path) -> Plan:
+def plan_of(agents: int, rate: float, seconds: float, heard: Path, per_process: int = 1) -> Plan:
     """A ring of agents with uniform delays of 5 to 45 ms, the last of which is the probe."""
     probe = json.dumps(f"{sys.executable} {_HERE / 'probe_agent.py'} {heard}")
     angles = 2.0 * np.pi * np.arange(agents) / agents
@@ -69,12 +69,13 @@ def plan_of(agents: int, rate: float, seconds: float, heard: Path) -> Plan:
         dt = {1.0 / rate}
         duration = {seconds}
         mode = "real"
-        real = {{ late = 60 }}
+        real = {{ late = 60, timers = [{{ phase = 0.5, listens = 0.3 }}] }}
         [sensing]
         sigma = 0.1
         [agents]
         estimator = "none"
         law = "rest"
+        per_process = {per_process}
         programs = {{ "{agents}" = {probe} }}
         [network]
         profile = "slow"
@@ -87,11 +88,11 @@ def plan_of(agents: int, rate: float, seconds: float, heard: Path) -> Plan:
     return making.make(loading.load(str(file)))
 
 
-def flown(agents: int, rate: float, seconds: float, loops: int) -> dict[str, Any]:
+def flown(agents: int, rate: float, seconds: float, loops: int, per_process: int) -> dict[str, Any]:
     """One run, and Zenoh alone beside it."""
     with tempfile.TemporaryDirectory() as folder:
         heard, out = Path(folder) / "heard", Path(folder) / "run"
-        plan = plan_of(agents, rate, seconds, heard)
+        plan = plan_of(agents, rate, seconds, heard, per_process)
         direct = [sys.executable, str(_HERE / "direct.py"), str(seconds), str(rate), "200"]
         with busy(loops), subprocess.Popen(direct, stdout=subprocess.PIPE, text=True) as alone:
             outcome = fly(plan, "processes", out, lambda *_: None)
@@ -127,14 +128,15 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=100.0, help="ticks in a second")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--busy", type=int, default=0, help="loops that compute meanwhile")
+    parser.add_argument("--per-process", type=int, default=1, help="agents that a process carries")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
-    runs = [flown(given.agents, given.rate, given.seconds, given.busy) for _ in range(given.repeat)]
+    runs = [flown(given.agents, given.rate, given.seconds, given.busy, given.per_process) for _ in range(given.repeat)]
     for run in runs:
         print(json.dumps(run))
     if given.out:
-        settings = {name: getattr(given, name) for name in ("agents", "rate", "seconds", "busy")}
+        settings = {name: getattr(given, name) for name in ("agents", "rate", "seconds", "busy", "per_process")}
         given.out.write_text(json.dumps({"settings": settings, "runs": runs}, indent=1) + "\n")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+_PLAIN = frozenset({int, float, bool, str, bytes})  # the commonest: to ask what else they may be takes longer
 
 def readonly(given: Any) -> Any:
     """The same value, with views that cannot be written to in place of its arrays; tuples and maps are gone through."""
@@ -19,10 +20,12 @@ def readonly(given: Any) -> Any:
             given = given.view()
             given.setflags(write=False)
         return given
+    if given is None or type(given) in _PLAIN:
+        return given
     if isinstance(given, tuple):
         parts = map(readonly, given)
         return type(given)(*parts) if hasattr(given, "_fields") else tuple(parts)
-    if isinstance(given, Mapping):
+    if isinstance(given, (dict, Mapping)):
         return {name: readonly(part) for name, part in given.items()}
     return given
 
@@ -32,10 +35,12 @@ def protect(given: Any) -> None:
     if isinstance(given, np.ndarray):
         if given.flags.writeable:  # asking costs less than telling
             given.setflags(write=False)
+    elif given is None or type(given) in _PLAIN:
+        return
     elif isinstance(given, tuple):
         for part in given:
             protect(part)
-    elif isinstance(given, Mapping):
+    elif isinstance(given, (dict, Mapping)):
         for part in given.values():
             protect(part)
     elif is_dataclass(given) and not isinstance(given, type):

@@ -69,9 +69,13 @@ class RealTime:
             yield tick
 
 
-def be_prompt() -> None:
-    """Have this process interrupt others as soon as its time has come, and collect no garbage that is not its own."""
+def interrupting() -> None:
+    """Have this process, and all threads that it starts from now on, interrupt others as soon as their time has come."""
     if sys.platform == "linux" and os.sched_getscheduler(0) == os.SCHED_BATCH:  # as the nursery has it
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def be_prompt() -> None:
+    """Collect no garbage that is not of the run itself."""
     gc.collect()
     gc.freeze()

@@ -19,6 +19,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 
+from netem.processes.wall_time import interrupting
 from netem.wire.carrier import Arrived, Ear, NotCarried, Question, Session, Voice, room_for
 from netem.wire.keys import again, once
 from netem.wire.sequence import UninstructedLoss
@@ -322,4 +323,6 @@ class RepeatingSession(Session):
 
 def opened(config: Mapping[str, Any], login: Login, lost: Lost, *, in_real_time: bool = False) -> Session:
     """The session of a process: within one machine, and in real time, where nobody waits, nothing is asked for again."""
+    if in_real_time:
+        interrupting()
     return Session(config) if login.is_local or in_real_time else RepeatingSession(config, lost)
