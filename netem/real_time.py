@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # A fault that is injected holds from so many ticks later on, by when the world has heard of it.
 _NOTICE = 3
+# What is due within less is handed on together.
+_AT_ONCE_S = 0.0005
 
 
 class RealTimeNode:
@@ -77,9 +79,17 @@ class RealTimeNode:
             arrived = self._ears.next(self._patience_s)
             while arrived is not None:
                 self._take(arrived)
+                if self._is_late:
+                    break
                 arrived = self._ears.next(0.0)
             if not self._over:
                 self._hand_out()
+
+    @property
+    def _is_late(self) -> bool:
+        """Whether what is due should be handed on before more is heard."""
+        due_s = self._relay.next_s
+        return due_s is not None and self._wall is not None and self._wall.now() > due_s + _AT_ONCE_S * self._pace.factor
 
     @property
     def _patience_s(self) -> float | None:
