@@ -120,7 +120,13 @@ class Agent:
         return state._replace(held=np.ones_like(state.held))
 
     def sense(
-        self, state: AgentState, tick: int, measured: Array, seen: Mask, motion: Array | None
+        self,
+        state: AgentState,
+        tick: int,
+        measured: Array,
+        seen: Mask,
+        motion: Array | None,
+        flown: Array | None = None,
     ) -> tuple[AgentState, Mapping[str, Fields]]:
         """Take in the measurements (..., n, D) of the edges seen (..., n); say what to broadcast on each channel.
 
@@ -141,8 +147,10 @@ class Agent:
             now on.
         motion
             Velocity and higher derivatives, shape (..., m - 1, D), of integrators of an order m above 1.
+        flown
+            What is flown, shape (..., D), where that is not what was commanded.
         """
-        state = self._caught_up(state, tick, motion)
+        state = self._caught_up(state, tick, motion, flown)
         protect((measured, seen))
         batch = seen.shape[:-1]
         with Calling(self.estimator, "sense"):
@@ -154,10 +162,11 @@ class Agent:
         moving = dict(zip(DERIVATIVES[: self.law.order], moves, strict=False))
         return AgentState(estimator, *state[1:]), {INPUT: moving, **said}
 
-    def _caught_up(self, state: AgentState, tick: int, motion: Array | None) -> AgentState:
+    def _caught_up(self, state: AgentState, tick: int, motion: Array | None, told_to_fly: Array | None) -> AgentState:
         """What it remembers, and knows of the ticks that it has missed."""
         estimator, law, told, sensed, held = state
         now, missed, flying, moved_on = _woken(sensed, held, told, tick)
+        flying = flying if told_to_fly is None else told_to_fly
         if self._counts_missed_ticks and missed.any():
             within = flying if motion is None else motion[..., 0, :]
             before = np.where(held[..., None], told, within) if self.law.order == 1 else within

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,8 @@ class Sensed(NamedTuple):
         Velocity and higher derivatives, shape (N, m - 1, D), of bodies that have them.
     sighting
         What their detectors say, if there is a target.
+    flown
+        What they fly just now, shape (N, D), in metres per second, where that is not what they commanded.
     """
 
     measured: Array
@@ -39,6 +41,7 @@ class Sensed(NamedTuple):
     position: Array | None
     motion: Array | None
     sighting: Sighting | None
+    flown: Array | None
 
 
 class Arrivals:
@@ -90,9 +93,10 @@ class Arrivals:
             measured,
             seen,
             self._clock(inboxes),
-            self._position(inboxes),
+            self._of_each(inboxes, "position"),
             self._motion(inboxes),
             self._sighting(inboxes),
+            self._of_each(inboxes, "flown"),
         )
 
     def heard(self, tick: int, arrived: Mapping[int, Sequence[messages.Broadcast]]) -> dict[str, Heard]:
@@ -152,13 +156,16 @@ class Arrivals:
         clocks[[self._rows[agent] for agent in inboxes]] = told
         return clocks
 
-    def _position(self, inboxes: Mapping[int, messages.SenseInbox]) -> Array | None:
-        told = {self._rows[agent]: inbox.position for agent, inbox in inboxes.items() if inbox.position is not None}
+    def _of_each(
+        self, inboxes: Mapping[int, messages.SenseInbox], what: Literal["position", "flown"]
+    ) -> Array | None:
+        """A vector of each agent that is told one."""
+        told = {self._rows[agent]: said for agent, inbox in inboxes.items() if (said := getattr(inbox, what)) is not None}
         if not told:
             return None
-        position = np.zeros((self._shape[0], self._dimension))
-        position[[*told]] = numbers(b"".join(told.values()), "SenseInbox: position", (len(told), self._dimension))
-        return position
+        of_all = np.zeros((self._shape[0], self._dimension))
+        of_all[[*told]] = numbers(b"".join(told.values()), f"SenseInbox: {what}", (len(told), self._dimension))
+        return of_all
 
     def _motion(self, inboxes: Mapping[int, messages.SenseInbox]) -> Array | None:
         told = {self._rows[agent]: inbox.motion for agent, inbox in inboxes.items() if inbox.motion is not None}

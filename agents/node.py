@@ -222,7 +222,7 @@ class AgentsNode:
         inboxes: Mapping[int, messages.SenseInbox],
         at: float | None = None,
     ) -> AgentState:
-        state, said = self._agents.sense(state, tick, sensed.measured, sensed.seen, sensed.motion)
+        state, said = self._agents.sense(state, tick, sensed.measured, sensed.seen, sensed.motion, sensed.flown)
         for row, (agent, mailbox) in enumerate(self._mailboxes.items()):
             if (inbox := inboxes.get(agent)) is None:
                 continue

@@ -42,6 +42,8 @@ class MediumBrief:
         What is taken from agents.
     journal, batch
         The file to write down every verdict in, and how many ticks at once.
+    gaps
+        Whether sensors may say nothing: where they are not simulated.
     pace, clock_s
         How time goes in a run in real time, None in lockstep; and how much the medium's clock shows more than the world's, in
         seconds.
@@ -65,5 +67,6 @@ class MediumBrief:
     trust: Trust
     journal: str
     batch: int
+    gaps: bool
     pace: Pace | None
     clock_s: float

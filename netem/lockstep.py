@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from analysis.models.arrays import Array, Integers
+from analysis.models.arrays import Array, Integers, Mask
 from netem.brief import MediumBrief
 from netem.medium.in_flight import Entry
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
@@ -78,7 +78,7 @@ class LockstepNode:
         self._relay = Relay[Spoken](medium_of(brief))
         self._ports = MediumPorts(session, brief, self._relay)
         supervisor.counts(lambda: self._ports.intake.refused)
-        self._channels = len(brief.channels)
+        self._channels, self._has_gaps = len(brief.channels), brief.gaps
         self._agents = np.arange(1, brief.links.agents + 2)
         self._voices = [(agent, name) for agent in self._agents[:-1].tolist() for name in brief.channels]
         self._awaited: set[tuple[int, str]] = set()
@@ -91,7 +91,7 @@ class LockstepNode:
 
     def run(self) -> None:
         """Relay tick after tick until the world says that it was the last."""
-        decided = self._decide(0, None) if self._relay.ahead else None
+        decided = self._decide(0, None) if self._ahead else None
         tick = 0
         while True:
             self._supervisor.waits(tick, "what it senses", lambda: (WORLD,))
@@ -104,7 +104,7 @@ class LockstepNode:
             if sense.fired:
                 self._relay.fire(sense.fired, sense.k)
             if decided is None:
-                decided = self._decide(sense.k, self._ports.where(sense))
+                decided = self._decide(sense.k, self._ports.where(sense), self._ports.sensed(sense))
             self._ports.welcome_back(sense.k)
             self._ports.call(sense.k, set(decided.awake))
             self._ports.hand_out_measurements(sense, decided.awake, decided.seen)
@@ -116,11 +116,16 @@ class LockstepNode:
             self._relay.finish(sense.k)
             self._written.enter(decided.entry, self._relay.in_flight, self._supervisor.lost_anywhere())
             tick = sense.k + 1
-            decided = self._decide(tick, None) if self._relay.ahead else None
+            decided = self._decide(tick, None) if self._ahead else None
 
-    def _decide(self, tick: int, position: Array | None) -> Decided:
+    @property
+    def _ahead(self) -> bool:
+        """Whether a tick can be decided before anything is sensed in it."""
+        return self._relay.ahead and not self._has_gaps
+
+    def _decide(self, tick: int, position: Array | None, sensed: Mask | None = None) -> Decided:
         self._ports.obey_orders(tick)
-        relayed = self._relay.decide(tick, position)
+        relayed = self._relay.decide(tick, position, sensed)
         heard, entry = self._heard(relayed.arriving), relayed.entry
         journal = self._ports.journal(tick, entry, np.diff(heard.ends).tolist())
         awake = tuple((np.flatnonzero(relayed.awake) + 1).tolist())

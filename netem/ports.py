@@ -89,6 +89,13 @@ class MediumPorts:
         position: Array = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
         return position
 
+    def sensed(self, sense: messages.Sense) -> Mask | None:
+        """Links whose sensors said something, shape (L,), where not all do."""
+        if not self._brief.gaps:
+            return None
+        measured = numbers(sense.measured, "the world: Sense: measured", (len(self._links), self._brief.dimension))
+        return ~np.isnan(measured).any(axis=-1)
+
     def refuse_strangers(self) -> None:
         """Look who has come in."""
         self._doorway.refuse_strangers()
@@ -145,6 +152,7 @@ class MediumPorts:
         measured, size = _rows(sense.measured, len(self._links), links)
         position = _parts(sense.position, len(self._inboxes))
         motion = None if sense.motion is None else _parts(sense.motion, len(self._inboxes))
+        flown = None if sense.flown is None else _parts(sense.flown, len(self._inboxes))
         for agent in awake:
             start, end = ends[agent - 1], ends[agent]
             inbox = messages.SenseInbox(
@@ -157,6 +165,7 @@ class MediumPorts:
                 position=position[agent - 1] if self._positioned[agent - 1] else None,
                 motion=None if motion is None else motion[agent - 1],
                 sighting=None if sense.sightings is None else sense.sightings[agent - 1],
+                flown=None if flown is None else flown[agent - 1],
                 began=began,
                 gains=gains[agent - 1],
             )

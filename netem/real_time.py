@@ -117,7 +117,7 @@ class RealTimeNode:
         if sense.fired:
             self._relay.fire(sense.fired, sense.k)
         self._ports.obey_orders(sense.k + _NOTICE)
-        begun = self._relay.begin(sense.k, self._ports.where(sense))
+        begun = self._relay.begin(sense.k, self._ports.where(sense), self._ports.sensed(sense))
         self._awake = frozenset(begun.awake)
         self._ports.welcome_back(sense.k)
         self._ports.call(sense.k, self._awake)

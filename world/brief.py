@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from analysis.models.arrays import Array, Mask
 from netem.core.pace import Pace
 from netem.faults.fault import Fault
 from netem.faults.trigger import Trigger
@@ -63,6 +64,8 @@ class WorldBrief:
         The longest input that agents command, if the scenario sets one.
     trust
         What is taken from agents.
+    is_outside, positioned
+        Whether a driver flies the bodies, and who is to be told by it where he is, shape (N,).
     books
         How it writes that down.
     pace
@@ -79,5 +82,52 @@ class WorldBrief:
     reports: Mapping[str, tuple[int, ...]]
     limit: float | None
     trust: Trust
+    is_outside: bool
+    positioned: Mask
     books: RecordOptions
     pace: Pace | None
+
+
+@dataclass(frozen=True)
+class DriverBrief:
+    """All that the driver of robots outside is told.
+
+    Parameters
+    ----------
+    run, login
+        Where it connects, and as whom.
+    neighbours
+        Of each agent, from 1, the agents it may measure.
+    nominal
+        Its place in the formation, shape (N, D), in metres.
+    positioned
+        Whose position has to be known, shape (N,).
+    dt, ticks
+        Tick, in seconds, and how many there are.
+    factor
+        Simulated seconds in a second, in a run in real time; None in lockstep, which waits for the driver in each tick.
+    """
+
+    run: str
+    login: Login
+    neighbours: tuple[tuple[int, ...], ...]
+    nominal: Array
+    positioned: Mask
+    dt: float
+    ticks: int
+    factor: float | None
+
+    @classmethod
+    def of(cls, run: str, login: Login, world: World, positioned: Mask, pace: Pace | None) -> DriverBrief:
+        """What is told of a world."""
+        links = world.links
+        return cls(
+            run,
+            login,
+            tuple(links.neighbours_of(agent) for agent in range(1, links.agents + 1)),
+            world.formation.nominal,
+            positioned,
+            world.dt,
+            world.ticks,
+            None if pace is None else pace.factor,
+        )

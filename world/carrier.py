@@ -65,6 +65,8 @@ class ZenohCarrier:
         What became of the messages of ticks; whoever has written it down takes it out.
     kept
         How everybody kept their time, in a run in real time; likewise.
+    intake
+        What becomes of wrong messages.
     """
 
     def __init__(
@@ -73,8 +75,8 @@ class ZenohCarrier:
         keys, world = Keys(brief.run), brief.world
         self._world, self._supervisor, self._meanwhile = world, supervisor, meanwhile
         self.timeline = Timeline(world.links, brief.faults, brief.triggers)
-        self._intake = Intake(brief.trust)
-        supervisor.counts(lambda: self._intake.refused)
+        self.intake = Intake(brief.trust)
+        supervisor.counts(lambda: self.intake.refused)
         dimension = world.formation.dimension
         self._reader = Acts(
             keys,
@@ -153,6 +155,7 @@ class ZenohCarrier:
             position=scene.position,
             motion=self._world.odometry(scene),
             sightings=self._sightings(tick, scene),
+            flown=self._world.told(tick),
             fired=fired,
         )
 
@@ -164,6 +167,7 @@ class ZenohCarrier:
         position: Array,
         motion: Array | None = None,
         sightings: list[messages.Sighted] | None = None,
+        flown: Array | None = None,
         fired: Sequence[int] = (),
         last: bool = False,
     ) -> None:
@@ -177,6 +181,7 @@ class ZenohCarrier:
             motion=None if motion is None else packed(motion),
             sightings=sightings,
             fired=list(fired),
+            flown=None if flown is None else packed(flown),
             began=self._began,
         )
         self._sense.say(messages.pack(sense))
@@ -207,7 +212,7 @@ class ZenohCarrier:
         self._supervisor.waits(tick, "its act", self._idle)
         acts = {}
         while self._awaited:
-            act = self._intake.take(self._acts.next(), tick, self._awaited, self._reader)
+            act = self.intake.take(self._acts.next(), tick, self._awaited, self._reader)
             if act is not None:
                 self._awaited.remove(act.src)
                 acts[act.src] = act
@@ -220,7 +225,7 @@ class ZenohCarrier:
         """Whoever has heard less than it was handed is counted: the transport has lost it, or the agent is wrong."""
         for agent, act in acts.items():
             if unheard := self._reader.unheard(act):
-                self._intake.note(agent, Wrong.UNHEARD, unheard)
+                self.intake.note(agent, Wrong.UNHEARD, unheard)
                 self.uninstructed += unheard
 
 

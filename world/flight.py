@@ -10,9 +10,9 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from analysis.models.arrays import Array
 from netem.core.clock import Clock
-from netem.faults.timeline import Timeline
+from netem.faults.timeline import Conditions, Timeline
 from world.books.history import ErrorMonitor
-from world.physics.world import Scene, World
+from world.physics.world import Scene
 
 
 class Acted(Protocol):
@@ -41,6 +41,25 @@ class Carrier(Protocol[Act_co]):
         """Hand over what is sensed in a tick, shape (L, D), in metres, and get back what comes of it."""
 
 
+class Physics(Protocol):
+    """What a swarm flies in: simulated, recorded, or outside."""
+
+    def begin(self) -> Scene:
+        """The scene in tick 0."""
+
+    def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
+        """What sensors say of every directed link, shape (L, D)."""
+
+    def flown(self, tick: int, scene: Scene, commanded: Array, now: Conditions) -> Array:
+        """What bodies fly when their agents command this, shape (N, D)."""
+
+    def goal(self, tick: int, scene: Scene) -> Array:
+        """Where every agent should be, shape (N, D), in metres."""
+
+    def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
+        """The scene of the next tick."""
+
+
 class FlownTick(NamedTuple, Generic[Act]):
     """A tick as it was flown.
 
@@ -66,7 +85,7 @@ class FlownTick(NamedTuple, Generic[Act]):
     acted: Act
 
 
-def fly(world: World, clock: Clock, carrier: Carrier[Act]) -> Iterator[FlownTick[Act]]:
+def fly(world: Physics, clock: Clock, carrier: Carrier[Act]) -> Iterator[FlownTick[Act]]:
     """Tick after tick; a swarm that diverges overflows, and whoever flies it knows."""
     scene, monitor = world.begin(), ErrorMonitor(world)
     for tick in clock:
@@ -75,7 +94,7 @@ def fly(world: World, clock: Clock, carrier: Carrier[Act]) -> Iterator[FlownTick
         measured = world.measure(tick, scene, carrier.timeline.at(tick))
         acted = carrier.carry(tick, scene, measured)
         now = carrier.timeline.at(tick)
-        flown = world.flown(scene, acted.input, now)
+        flown = world.flown(tick, scene, acted.input, now)
         monitor.see(tick, scene, carrier.timeline)
         following = world.step(tick, scene, measured, flown, now)
         yield FlownTick(tick, scene, following, measured, flown, acted)

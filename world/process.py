@@ -25,6 +25,7 @@ from world.books.history import ARRAYS, UNTOLD, Moment, gather
 from world.books.kept import Kept
 from world.brief import WorldBrief
 from world.carrier import ProcessesActed, ZenohCarrier
+from world.driven import DrivenWorld
 from world.flight import FlownTick
 from world.real_time import RealTimeCarrier
 
@@ -58,6 +59,7 @@ class WorldNode:
     ) -> None:
         self._world, self._supervisor, self._archive, self._logbook = brief.world, supervisor, archive, logbook
         self._carrier, self._clock = _of_time(session, supervisor, brief, self._meanwhile)
+        self._outside = DrivenWorld(session, supervisor, brief, self._carrier.intake) if brief.is_outside else None
         self._batch, self._later = brief.books.batch, later
         self._due = 0
         self._flown: dict[int, FlownTick[ProcessesActed]] = {}
@@ -70,12 +72,16 @@ class WorldNode:
     def await_everybody(self) -> None:
         """Wait until the medium listens."""
         self._carrier.await_everybody()
+        if self._outside is not None:
+            self._outside.await_everybody()
 
     def run(self) -> None:
         """Fly all ticks, and write them down: also those before whatever ends the run early."""
         with system_errors.afterwards(self._write_down):
-            for instant in flight.fly(self._world, self._clock, self._carrier):
+            for instant in flight.fly(self._outside or self._world, self._clock, self._carrier):
                 self._flown[instant.tick] = instant
+            if self._outside is not None:
+                self._outside.end()
             self._carrier.end()
 
     def _meanwhile(self, tick: int) -> None:

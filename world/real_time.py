@@ -107,7 +107,7 @@ class RealTimeCarrier(ZenohCarrier):
     def _take_acts(self, tick: int) -> None:
         idle = self.timeline.at(tick).idle
         for arrived in self._acts.waiting():
-            act = self._intake.take(arrived, tick, (), self._reader)
+            act = self.intake.take(arrived, tick, (), self._reader)
             if act is None or idle[act.src - 1]:  # what it said before it was stopped
                 continue
             self._newest[act.src] = act

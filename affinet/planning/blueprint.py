@@ -95,6 +95,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         start=given.formation.start,
         spread=given.formation.spread,
         swarms=1,
+        flight=None,
     )
 
 

@@ -15,9 +15,11 @@ import psutil
 from affinet.planning import (
     algorithms,
     checks,
+    flight_logs,
     lateness,
     limits,
     network,
+    outside,
     own_losses,
     phases,
     recordings,
@@ -144,6 +146,8 @@ def _make(given: Scenario) -> Plan:
     findings.append(limits.run(first, given.time, memory))
     _refuse_fatal(findings)
     world = world_of(given, formation)
+    outside.refuse(given, world, played.faults)
+    world = replace(world, flight=flight_logs.of(given, world))
     bits = network.message_bits(names, spoken, world.links, brief.dimension)
     _refuse_fatal(limits.messages(bits, world, reports, given.trust))
     own, aired = network.plan(given, formation, world.links, bits)

@@ -129,7 +129,17 @@ class Plan:
     @cached_property
     def positioned(self) -> Mask:
         """Which agents are told where they are, shape (N,): leaders, and all where estimator or law want it."""
-        return self.world.formation.is_leader | self.wants.position
+        return (self.world.formation.is_leader | self.wants.position) & self.knows_positions
+
+    @property
+    def may_have_gaps(self) -> bool:
+        """Whether sensors may say nothing, and it may not be known where agents are: where physics is not simulated."""
+        return self.scenario.world != "simulated"
+
+    @property
+    def knows_positions(self) -> bool:
+        """Whether somebody may be told where he is: all but in a recorded flight without a reference."""
+        return self.world.flight is None or self.world.flight.has_reference
 
     @cached_property
     def told_mission(self) -> Mask:

@@ -37,6 +37,10 @@ def refuse_in_process(plan: Plan) -> None:
         raise ScenarioError(
             "time.mode: a run in real time flies over processes (--runtime processes); in one process set it to 'lockstep'"
         )
+    if plan.scenario.world == "external":
+        raise ScenarioError(
+            "world: robots outside are flown over processes (--runtime processes); in one process it is 'simulated', or 'recorded'"
+        )
     if plan.programs:
         says = (
             f"agents {listed(plan.programs)} fly by programs of your own, each of them a process: fly over processes "

@@ -56,6 +56,7 @@ class ArrayCarrier:
         refuse_in_process(plan)
         self._world = plan.world
         self._links = plan.world.links
+        self._may_have_gaps, self._knows_positions = plan.may_have_gaps, plan.knows_positions
         self._agents = plan.agents
         self._numbers = np.arange(1, self._links.agents + 1)
         self._fields = self._agents.channels()
@@ -97,21 +98,22 @@ class ArrayCarrier:
 
     def _tick(self, tick: int, scene: Scene, sensed: Array) -> BatchActed:
         before = self._welcomed_back(tick)
-        relayed = self._relay.decide(tick, scene.position)
+        relayed = self._relay.decide(tick, scene.position, _there(sensed) if self._may_have_gaps else None)
         idle, living = relayed.conditions.idle, before
         some_idle = idle.any()
         if some_idle:
             living = beside_others(before, idle, tick)
         measured, seen = by_slot.sensed(sensed, relayed.seen, self._links)
         motion = self._world.odometry(scene)
-        state, said = self._agents.sense(living, tick, measured, seen, motion)
+        state, said = self._agents.sense(living, tick, measured, seen, motion, self._world.told(tick))
         told = {name: self._relay.as_told(tick, name, self._numbers, fields) for name, fields in said.items()}
         self._relay.keep(tick, told)
         heard = self._hear(tick, relayed.delivery)
         if self._centre:
             heard[channels.CENTRE] = self._from_the_centre(self._centre, measured, seen, self._steered(said))
         sighting = self._world.sighting(tick, scene)
-        state, action = self._agents.act(state, self._reading(tick), heard, scene.position, motion, sighting)
+        position = scene.position if self._knows_positions else None
+        state, action = self._agents.act(state, self._reading(tick), heard, position, motion, sighting)
         self._state = put_back(idle, before, state) if some_idle else state
         self._relay.finish(tick)
         steered = np.where(idle[:, None], 0.0, action.input) if some_idle else action.input
@@ -173,6 +175,10 @@ class ArrayCarrier:
         for name, field in wrong.items():
             arriving[name][struck] = field
         return arriving
+
+
+def _there(measured: Array) -> Mask:
+    return np.asarray(~np.isnan(measured).any(axis=-1))
 
 
 def _protected(given: Any) -> Any:

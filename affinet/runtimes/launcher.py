@@ -24,6 +24,7 @@ from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.private import private_folder
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.runtimes.told import Event
+from affinet.scenario.programs import words
 from affinet.verdicts.refused import in_words
 from agents.arrivals import forms_of
 from agents.centre.process import CentreBrief
@@ -37,8 +38,8 @@ from netem.processes.supervised import LOST
 from netem.processes.system_errors import afterwards, said
 from netem.wire import keys
 from netem.wire.intake import Trust
-from netem.wire.session import CENTRE, CONTROL, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
-from world.brief import WorldBrief
+from netem.wire.session import CENTRE, CONTROL, DRIVER, HUB, WORLD, Login, agent_name, clients, host_name, seat_name
+from world.brief import DriverBrief, WorldBrief
 from world.physics.world import World
 
 
@@ -181,6 +182,8 @@ class Launcher:
         if self._plan.centre:
             login = self._logins[CENTRE]
             group.fork("centre", self._centre_brief(login))
+        if (external := self._plan.scenario.external) is not None:
+            group.start("driver", words(external.driver), self._driver_brief(self._logins[DRIVER]))
         for host, carried in self._hosts.items():
             group.fork("host", self._host_brief(host, carried), host, carrying=carried)
         for number in self._lone:
@@ -298,6 +301,8 @@ class Launcher:
             reports=self._plan.reports,
             limit=self._plan.scenario.agents.limit,
             trust=self._trust,
+            is_outside=self._plan.scenario.external is not None,
+            positioned=self._plan.positioned,
             books=self._plan.books(self._viewer),
             pace=self._plan.pace,
         )
@@ -322,9 +327,14 @@ class Launcher:
             trust=self._trust,
             journal=str(self._folder(HUB, self._out) / JOURNAL),
             batch=self._plan.books(self._viewer).batch,
+            gaps=self._plan.may_have_gaps,
             pace=self._plan.pace,
             clock_s=self._clock_s(WORLD),
         )
+
+    def _driver_brief(self, login: Login) -> DriverBrief:
+        plan = self._plan
+        return DriverBrief.of(self._run, login, plan.world, plan.positioned, plan.pace)
 
     def _centre_brief(self, login: Login) -> CentreBrief:
         return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm, self._trust)
@@ -334,7 +344,7 @@ def _prepare_kernels(world: World) -> None:
     """Call what the world calls: planning has called what agents do, and the nursery loads what was called."""
     first = world.begin()
     paused = Timeline(world.links, [Fault(Verb.PAUSE, 0, 1, agents=(1,))]).at(0)
-    world.step(0, first, world.measure(0, first, paused), world.flown(first, first.velocity, paused), paused)
+    world.step(0, first, world.measure(0, first, paused), world.flown(0, first, first.velocity, paused), paused)
     tracking_error(first.position, world.goal(0, first), np.ones(len(first.position), dtype=bool))
 
 

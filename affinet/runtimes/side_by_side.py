@@ -74,6 +74,7 @@ def together(flights: Sequence[Flight]) -> Plan:
             formation=_formation(world.formation, number),
             links=world.links.side_by_side(number),
             swarms=number,
+            flight=None if world.flight is None else world.flight.side_by_side(number),
         ),
         profiles=tuple(
             _profile([(flight.plan.profiles[place], len(flight.seeds)) for flight in flights])

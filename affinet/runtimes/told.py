@@ -71,6 +71,7 @@ MAY_SAY: Mapping[str, Mapping[str, Mapping[str, Check]]] = {
     "agent": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "host": {**_OF_ALL, "user-code": {"reason": _is_text}, "done": {}},
     "netem": {**_OF_ALL, **_REFUSED, "user-code": {"reason": _is_text}, "done": {}},
+    "driver": {**_OF_ALL, "done": {}},
     "centre": {**_OF_ALL, **_REFUSED, "user-code": {"reason": _is_text}, "done": {}},
     "world": {
         **_OF_ALL,

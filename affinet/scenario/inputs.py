@@ -24,6 +24,8 @@ from netem.medium.medium import JOURNAL
 FOLDER = "inputs"  # in a run directory
 SCENARIO = "scenario.json"  # in a run directory, as resolved
 _BOOK = "inputs.json"
+# What is read of a run directory that stands in for a world.
+FLIGHT = tuple(f"arrays/{name}.npy" for name in ("measured", "position", "input"))
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,10 @@ def keep(given: Scenario, journal: Path | None, out: Path) -> Scenario:
         The run directory.
     """
     copies = _Copies(out / FOLDER)
-    told = _placed(given.model_dump(mode="json", exclude_none=True), lambda path: f"{FOLDER}/{copies.of(Path(path))}")
+    said, flight = given.model_dump(mode="json", exclude_none=True), given.recorded
+    told = _placed(said | {"recorded": None}, lambda path: f"{FOLDER}/{copies.of(Path(path))}")
+    if flight is not None:
+        told["recorded"] = {"flight": f"{FOLDER}/{copies.of_flight(Path(flight.flight))}"}
     folders = {name: copies.of_modules(name, folder) for name, folder in given.own_modules.items()}
     verdicts = None if journal is None else copies.of_journal(journal)
     if copies.originals:
@@ -175,6 +180,15 @@ class _Copies:
         self._copy_parts(path, copy)
         return f"{copy}/{path.name}"
 
+    def of_flight(self, path: Path) -> str:
+        """Where the copy of a flight lies in the folder: of a run directory, what stands in for a world."""
+        if not path.is_dir():
+            return self.of(path)
+        copy = self._files[path] = self._name(path)
+        for file in (SCENARIO, *FLIGHT):
+            self._copy(path / file, f"{copy}/{file}")
+        return copy
+
     def of_modules(self, name: str, folder: Path) -> str:
         """Where the copies of all modules lie that came from a folder."""
         if folder not in self._shelves:
@@ -202,6 +216,8 @@ class _Copies:
 
 def _placed(said: Any, place: Callable[[str], str]) -> Any:
     """A scenario, or a part of it, with its paths put elsewhere; what is malformed stays for others to complain of."""
+    if _table(said, "recorded"):
+        said = said | {"recorded": _with_path(said["recorded"], "flight", place)}
     profiles = _table(_table(said, "network"), "profiles")
     if not profiles:
         return said

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from affinet.scenario.events import Links
+from affinet.scenario.outside import ExternalSection, RecordedSection
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.programs import of_agents
 from affinet.scenario.real_time import RealTimeSection
@@ -334,6 +335,9 @@ class Scenario(Section):
     sensing: SensingSection
     dynamics: DynamicsSection = DynamicsSection()
     target: TargetSection | None = None
+    world: Literal["simulated", "recorded", "external"] = "simulated"
+    recorded: RecordedSection | None = None
+    external: ExternalSection | None = None
     agents: AgentsSection
     network: NetworkSection = NetworkSection()
     timeline: list[AnyEvent] = Field(default_factory=list)
@@ -341,6 +345,14 @@ class Scenario(Section):
     record: RecordSection = RecordSection()
     _source: Source | None = PrivateAttr(default=None)
     _own: dict[str, Path] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _of_its_world(self) -> Scenario:
+        for name, says in (("recorded", 'flight = "FILE"'), ("external", 'driver = "COMMAND"')):
+            if (getattr(self, name) is None) == (self.world == name):
+                missing = f'world = "{name}" needs a table [{name}] with {says}'
+                raise ValueError(missing if self.world == name else f'[{name}] is of world = "{name}", not of "{self.world}"')
+        return self
 
     @property
     def own_modules(self) -> dict[str, Path]:

@@ -11,8 +11,10 @@ from analysis.models.arrays import Array
 from analysis.models.information import reported
 from netem.core import channels
 from netem.faults.timeline import Timeline
-from world.books.history import Arrays
+from world.books.history import Arrays, by_span
 from world.books.localized import FirstMeasurements
+from world.physics import sensors
+from world.physics.world import World
 
 Figures = dict[str, float | None]
 
@@ -27,12 +29,16 @@ def figures(values: Array) -> Figures:
 
 
 def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]:
-    """The errors that matter, in metres, of agents that find out where they are, or pursue a target; none of others.
+    """The errors that matter, in metres, of agents that find out where they are, pursue a target, or fly outside; none of others.
 
-    `localization_error` is that of the checker `localized`, in the ticks in which there is one; `goal_distance` how far agents
+    `edge_error` is that of estimated relative positions, of a flight that was not simulated, where it is known where its agents
+    were: a root mean square. `localization_error` is that of the checker `localized`, in the ticks in which there is one; `goal_distance` how far agents
     are from their places about the target, `target_error` how far the target is from where they steer for: root mean squares.
     """
     with np.errstate(over="ignore", invalid="ignore"):
+        if plan.may_have_gaps:
+            off = np.concatenate([_edge_error(plan.world, span) for span in by_span(arrays)])
+            return {"edge_error": figures(off[~np.isnan(off)])}
         if channels.PLACE in plan.reports:
             known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
             off = localization.distance(arrays[channels.PLACE], known.edges())
@@ -43,3 +49,12 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
             missed = root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
             return {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
     return {}
+
+
+def _edge_error(world: World, span: Arrays) -> Array:
+    """How far off estimated relative positions are in each tick, shape (T,), in metres; NaN where none is known, or no truth."""
+    ticks = len(span["error"])
+    true = sensors.relative(span["position"][:ticks], world.links)[:, world.links.slots]
+    off, known = span["estimate"] - true, span["known"] & ~np.isnan(true).any(axis=-1)
+    agents, slots, dimension = off.shape[1:]
+    return root_mean_square(off.reshape(ticks, agents * slots, dimension), known.reshape(ticks, agents * slots))

@@ -97,6 +97,9 @@ METRICS: Mapping[str, Metric] = {
 }
 
 
+_OF_POSITIONS = frozenset({"procrustes", "estimation_error", "nees"})  # of a flight without a reference nobody knows them
+
+
 def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any]) -> Seen:
     """What is looked at of the swarms of a world.
 
@@ -129,5 +132,7 @@ def of_run(evidence: Evidence, name: str, span: range) -> Array:
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
     looked_at = seen(evidence.plan.world, evidence.present[part], arrays["verdicts"][part, 0], whole)
     value, there = METRICS[name].of(looked_at)[..., 0], METRICS[name].there(looked_at)[..., 0]
+    if evidence.plan.may_have_gaps and name in _OF_POSITIONS:
+        there = there & ~np.isnan(whole["position"]).any(axis=(-2, -1))
     of_something: Array = np.where(there, np.where(np.isnan(value), np.inf, value), np.nan)
     return of_something

@@ -162,10 +162,10 @@ def judge(
     faults = [] if arrays is None else bites(plan, timeline, arrays)
     wrong = [failure] if failure else []
     if not failure:
-        wrong += _what_is_wrong(arrays, booked, uninstructed)
+        wrong += _what_is_wrong(plan, arrays, booked, uninstructed)
     idle = [bite for bite in faults if not bite.touched]
     empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
-    empty += _untracked(arrays)
+    empty += _untracked(plan, arrays)
     verdict: RunVerdict = "fail" if wrong else "vacuous" if empty else "pass"
     said = f"{verdict}, transport lost {lost}" if verdict == "pass" and lost else verdict
     reasons = wrong or empty
@@ -249,9 +249,11 @@ def _messages(booked: Accounts, uninstructed: int | None, lost: int) -> dict[str
     return {"ticks": booked.ticks} | vars(booked.ledger) | after
 
 
-def _what_is_wrong(arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:
+def _what_is_wrong(
+    plan: Plan, arrays: Arrays | None, booked: Accounts, uninstructed: int | None
+) -> list[str]:
     wrong = []
-    if arrays is None or not _all(arrays, lambda span: np.isfinite(span["position"])):
+    if arrays is None or not (plan.may_have_gaps or _all(arrays, lambda span: np.isfinite(span["position"]))):
         wrong.append("the swarm diverged: a position is not a number any more")
     elif np.isinf(arrays["error"]).any():
         wrong.append("the swarm diverged: its tracking error is too large for a number")
@@ -275,11 +277,11 @@ def accounts_of(arrays: Arrays, in_flight: int) -> Accounts:
     return Accounts(len(arrays["error"]), ledger, in_flight)
 
 
-def _untracked(arrays: Arrays | None) -> list[str]:
+def _untracked(plan: Plan, arrays: Arrays | None) -> list[str]:
     if arrays is None or not len(arrays["error"]):
         return ["no tick was flown: it proved nothing"]
     ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
-    if nobody:
+    if nobody and not plan.may_have_gaps:
         return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
     if _all(arrays, lambda span: span["verdicts"][:, 1:] == Verdict.SILENT):
         return ["nobody was awake in any tick: it proved nothing"]

@@ -57,7 +57,12 @@ class Sensor:
             return true + _turned(true, np.linalg.norm(true, axis=-1, keepdims=True) * noise)
         if self.reads == "direction":
             return _swung(true, noise)
-        return _cartesian(_polar(true) + noise) / _shrinking(self._variances)
+        return self.of_polar(_polar(true) + noise)
+
+    def of_polar(self, read: Array) -> Array:
+        """What it says where range and bearing were read, and azimuth and elevation in three dimensions, shape (..., D)."""
+        position = _cartesian(read)
+        return position / _shrinking(self._variances) if self.reads == "range-bearing" else position
 
     @property
     def says_positions(self) -> bool:

@@ -120,9 +120,18 @@ class Medium:
         """The state before the first tick."""
         return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
 
-    def offered(self, tick: int) -> Mask:
-        """Where messages are offered in a tick, shape (C, L): who is awake speaks on all its links, and all sensors sense."""
-        return self._under(self.timeline.at(tick)).offered
+    def offered(self, tick: int, sensed: Mask | None = None) -> Mask:
+        """Where messages are offered in a tick, shape (C, L): who is awake speaks on all its links, and all sensors sense.
+
+        Parameters
+        ----------
+        tick
+            Its number.
+        sensed
+            Links whose sensors said something, shape (L,), where not all do.
+        """
+        offered = self._under(self.timeline.at(tick)).offered
+        return offered if sensed is None else offered & (sensed | ~self._sensing)
 
     def judge(
         self, state: MediumState, tick: int, offered: Mask, position: Array | None

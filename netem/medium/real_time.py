@@ -88,11 +88,21 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         """When the next message is due, in simulated seconds."""
         return self._freed[0].due_s if self._freed else self._parcels.next_s
 
-    def begin(self, tick: int, position: Array | None) -> Begun:
-        """A tick begins, in which the agents are at a position, shape (N, D), in metres: judge what they will say in it."""
+    def begin(self, tick: int, position: Array | None, sensed: Mask | None = None) -> Begun:
+        """A tick begins: judge what will be said in it.
+
+        Parameters
+        ----------
+        tick
+            Its number.
+        position
+            The agents', shape (N, D), in metres; only a spatial profile needs them.
+        sensed
+            Links whose sensors said something, shape (L,), where not all do.
+        """
         self._freed_s = tick * self._dt
         conditions = self.timeline.at(tick)
-        self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick), position)
+        self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick, sensed), position)
         waits = self._state.waits or _of_recorded(verdicts, tick, self._dt)
         now = self._open[tick] = OpenTick(tick, verdicts, waits)
         awake = (np.flatnonzero(~conditions.idle) + 1).tolist()

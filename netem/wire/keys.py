@@ -55,6 +55,14 @@ class Keys:
         """Who of a host's agents takes part in a tick (medium to host)."""
         return f"affinet/{self.run}/host/{host}/roster"
 
+    def measured(self, agent: int | str) -> str:
+        """What is measured on an agent's robot (driver to world), where robots fly outside."""
+        return f"affinet/{self.run}/robot/{agent}/measured"
+
+    def command(self, agent: int | str) -> str:
+        """What an agent's robot is to fly (world to driver)."""
+        return f"affinet/{self.run}/robot/{agent}/command"
+
     @property
     def sense(self) -> str:
         """The world's raw sensing of a tick (world to medium)."""

@@ -49,5 +49,6 @@ class Senses:
             len(sense.measured) == self._measured
             and len(sense.position) == everybody
             and (motion is None or len(motion) % everybody == 0)
+            and (sense.flown is None or len(sense.flown) == everybody)
             and (sightings is None or [len(one.position) for one in sightings] == [self._place] * self._agents)
         )

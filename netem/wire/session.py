@@ -24,6 +24,7 @@ WORLD = "world"
 CONTROL = "control"
 COORDINATOR = "coordinator"
 CENTRE = "centre"
+DRIVER = "driver"
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
@@ -77,7 +78,7 @@ def clients(agents: Iterable[int], hosts: Mapping[int, Iterable[int]]) -> list[s
     """The names of all who log in at the hub; agents that a host carries do not."""
     carried = {agent for of_host in hosts.values() for agent in of_host}
     lone = [agent for agent in agents if agent not in carried]
-    return [WORLD, CENTRE, CONTROL, *map(host_name, hosts), *map(agent_name, lone)]
+    return [WORLD, CENTRE, CONTROL, DRIVER, *map(host_name, hosts), *map(agent_name, lone)]
 
 
 def identity(name: str) -> str:
@@ -197,7 +198,7 @@ def hub(
     NotTrusted
         When it would listen beyond this machine without certificates, or these will not do.
     """
-    limited = [keys.broadcast("*", "**"), keys.act("*"), keys.control]
+    limited = [keys.broadcast("*", "**"), keys.act("*"), keys.measured("*"), keys.control]
     return listening(login, dictionary_file, _rights_of_all(keys, agents, hosts), limited, largest)
 
 
@@ -292,7 +293,12 @@ def _rights_of_all(
     carried = {agent for of_host in hosts.values() for agent in of_host}
     return dict(
         [
-            _rights(WORLD, says=[keys.sense], hears=[keys.act("*"), keys.journal], learns=[keys.sense]),
+            _rights(
+                WORLD,
+                says=[keys.sense, keys.command("*")],
+                hears=[keys.act("*"), keys.journal, keys.measured("*")],
+                learns=[keys.sense, keys.command("*")],
+            ),
             *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
             *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
             _rights(
@@ -301,6 +307,7 @@ def _rights_of_all(
                 hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
                 learns=[keys.told("*")],
             ),
+            _rights(DRIVER, says=[keys.measured("*")], hears=[keys.command("*")], learns=[keys.measured("*")]),
             _controls(keys),
         ]
     )

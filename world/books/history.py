@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tokenize import TokenError
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 from urllib.parse import quote, unquote
 
 import numpy as np
@@ -173,10 +173,17 @@ def _newest(ticks: Integers, verdicts: VerdictCodes, entries: Sequence[Entry]) -
     return newest.astype(np.int32)
 
 
+class Goals(Protocol):
+    """What says where agents should be."""
+
+    def goal(self, tick: int, scene: Scene) -> Array:
+        """Shape (N, D), in metres."""
+
+
 class ErrorMonitor:
     """Follows the tracking error tick by tick, where a fault waits for it: as far back as one does."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: Goals) -> None:
         self._world = world
         self._errors: Array = np.empty(0)
 

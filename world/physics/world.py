@@ -21,6 +21,7 @@ from world.physics import bodies, sensors
 from world.physics.bodies import Body, BodyModel, Motion
 from world.physics.disturbance import Disturbance
 from world.physics.noise import normal
+from world.physics.recorded import RecordedFlight
 from world.physics.target import MovingTarget, PursuitState
 
 
@@ -85,6 +86,8 @@ class World:
         Standard deviation of that scatter, per axis, in metres.
     swarms
         How many swarms fly side by side, each with its own disturbances.
+    flight
+        What was flown before, where that stands in for bodies and sensors.
     """
 
     run_seed: int
@@ -101,6 +104,7 @@ class World:
     start: Literal["targets", "origin"]
     spread: float
     swarms: int
+    flight: RecordedFlight | None
 
     def __getstate__(self) -> dict[str, object]:
         """What it was made of: what it has worked out since can be worked out again, wherever it is taken."""
@@ -119,6 +123,8 @@ class World:
         position = offset
         if self.start == "targets":
             position = self.target(0) + np.where(self.formation.is_leader[:, None], 0.0, offset)
+        if self.flight is not None:
+            position = self.flight.position[0]
         still, rest = np.zeros_like(position), self._body.rest(position)
         chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
         seen = self.sensor.exact(sensors.relative(position, self.links))
@@ -143,11 +149,19 @@ class World:
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
         """y_ij of every directed link, shape (L, D), in metres, or a unit vector, as the sensor says it."""
-        measured = self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
+        return self.astray(tick, scene, self._sensed(tick, scene), now)
+
+    def astray(self, tick: int, scene: Scene, measured: Array, now: Conditions) -> Array:
+        """What sensors say that measured this, shape (L, D), with those that fail in this tick."""
         if not now.acting or not (now.bias.any() or now.outlier.any() or now.frozen.any()):
             return measured
         size = self._normal(Purpose.OUTLIER_SIZE, tick, self.formation.dimension)
         return sensors.astray(measured, scene.measured, self.outliers(tick, now), size, now)
+
+    def _sensed(self, tick: int, scene: Scene) -> Array:
+        if self.flight is not None:
+            return self.flight.measured[tick]
+        return self.sensor.measured(sensors.relative(scene.position, self.links), self._sensor_noise.at(tick))
 
     def outliers(self, tick: int, now: Conditions) -> Mask:
         """Which measurements of a tick are outliers, shape (L,)."""
@@ -155,16 +169,24 @@ class World:
         draw = uniform(self.links.seeds(self.seed), Purpose.OUTLIER, tick=tick, src=src, dst=dst)[..., 0]
         return sensors.stray(draw, now)
 
-    def flown(self, scene: Scene, commanded: Array, now: Conditions) -> Array:
+    def flown(self, tick: int, scene: Scene, commanded: Array, now: Conditions) -> Array:
         """The inputs that the bodies fly when their agents command these, shape (N, D)."""
+        if self.flight is not None:
+            return self.flight.input[tick]
         return bodies.flown(commanded, self._body.coasting(scene.bodies), now) if now.acting else commanded
 
     def odometry(self, scene: Scene) -> Array | None:
         """The derivatives that agents are told, as in `Scene`, shape (N, K, D), unless their input says all."""
         return scene.motion if self._body.odometry else None
 
+    def told(self, tick: int) -> Array | None:
+        """What agents are told that they fly when a tick begins, shape (N, D), where that is not what they commanded."""
+        return None if self.flight is None else self.flight.flown_before(tick)
+
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
+        if self.flight is not None:
+            return scene._replace(position=self.flight.position[tick + 1], measured=measured)
         noise, chase = self._disturb(tick, scene), scene.chase
         moved = self._body.moved(scene.bodies, flown, now.push, self.dt)
         position, motion, pose = moved.position + noise, moved.derivatives, moved.pose

@@ -1,0 +1,196 @@
+"""The log of a flight as a CSV file: what was measured, what was flown, and where everybody was, in rows as they were noted.
+
+A row with a neighbour is a measurement, one without what an agent says of itself; empty cells are gaps. A tick takes the last
+measurement since the tick before, and the last input by then; positions are interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from affinet.scenario.words import among
+from analysis.models.arrays import Array, Integers, Mask
+from netem.core.listing import listed
+from world.physics.recorded import RecordedFlight
+from world.physics.world import World
+
+_AXES = "xyz"
+_POLAR = ("range", "bearing", "elevation")
+_ROUNDING = 1e-6  # ticks by which a time that is one may be off
+_WHO = ("time", "agent", "neighbour")
+
+
+def read(path: Path, world: World) -> RecordedFlight:
+    """The flight in a file, by the ticks, agents and links of a world.
+
+    Raises
+    ------
+    OSError
+        When there is no such file.
+    ValueError
+        When it is no log of this formation's, or ends too early.
+    """
+    log = _Log(path, world)
+    log.refuse_what_is_short()
+    return RecordedFlight(log.measured(), log.position(), log.input())
+
+
+class _Log:
+    """The rows of a file, sorted by time, as columns (m,); NaN where a cell is empty."""
+
+    def __init__(self, path: Path, world: World) -> None:
+        self._path, self._world = path, world
+        self._dimension = world.formation.dimension
+        columns = _columns(path, self._known)
+        for name in ("time", "agent"):
+            self._refuse(np.isnan(columns[name]), f"there is no {name}", columns)
+        in_order = np.argsort(columns["time"], kind="stable")
+        self._line = in_order + 2  # the first is the heading
+        self._columns = {name: column[in_order] for name, column in columns.items()}
+        first = self._columns["time"][0] if len(in_order) else 0.0
+        self._tick = (self._columns["time"] - first) / world.dt
+        self._agent = self._numbers("agent")
+        self._says_measured = ~np.isnan(self._columns["neighbour"])
+
+    @property
+    def _known(self) -> Sequence[str]:
+        axes = _AXES[: self._dimension]
+        own = (f"{what}_{axis}" for what in ("relative", "input", "position") for axis in axes)
+        return (*_WHO, *_POLAR[: self._dimension], *own)
+
+    def refuse_what_is_short(self) -> None:
+        """Fail where it ends before the run does."""
+        has = float(self._tick[-1]) if len(self._tick) else 0.0
+        if has < self._world.ticks - 1 - _ROUNDING:
+            ends = has * self._world.dt
+            raise ValueError(f"{self._path}: it ends after {ends:g} s: set time.duration to that, or less")
+
+    def measured(self) -> Array:
+        """What is measured on each link in each tick, shape (T, L, D); NaN where nothing is."""
+        ticks, links = self._world.ticks, self._world.links
+        measured = np.full((ticks, len(links), self._dimension), np.nan)
+        rows = np.flatnonzero(self._says_measured)
+        said, there = self._said(rows)
+        tick = np.ceil(self._tick[rows] - _ROUNDING).astype(np.int64)
+        kept = there & (tick < ticks)
+        place = (tick * len(links) + self._links(rows))[kept]
+        _, last = np.unique(place[::-1], return_index=True)  # of those of a tick and link the last stays
+        measured.reshape(-1, self._dimension)[place[::-1][last]] = said[kept][::-1][last]
+        return measured
+
+    def input(self) -> Array:
+        """What everybody flies from each tick on, shape (T, N, D); 0 before the log says."""
+        now = np.arange(self._world.ticks) + _ROUNDING
+        flown = np.zeros((self._world.ticks, self._world.links.agents, self._dimension))
+        for agent, when, said in self._of_each("input"):
+            last = np.searchsorted(when, now, side="right") - 1
+            flown[:, agent - 1] = np.where(last[:, None] >= 0, said[last], 0.0)
+        return flown
+
+    def position(self) -> Array:
+        """Where everybody is in each tick, shape (T + 1, N, D); NaN of all where the log does not say it of all."""
+        now = np.arange(self._world.ticks + 1)
+        position = np.full((len(now), self._world.links.agents, self._dimension), np.nan)
+        for agent, when, said in self._of_each("position"):
+            self._refuse_what_does_not_span(agent, when)
+            for axis in range(self._dimension):
+                position[:, agent - 1, axis] = np.interp(now, when, said[:, axis])
+        without = (np.flatnonzero(np.isnan(position).any(axis=(0, 2))) + 1).tolist()
+        if 0 < len(without) < self._world.links.agents:
+            agents = listed(without)
+            raise ValueError(f"{self._path}: it says where some agents are, and not where {agents}: say it of all, or none")
+        return position
+
+    def _refuse_what_does_not_span(self, agent: int, when: Array) -> None:
+        if when[0] > _ROUNDING or when[-1] < self._world.ticks - 1 - _ROUNDING:
+            span = f"from {when[0] * self._world.dt:g} to {when[-1] * self._world.dt:g} s"
+            raise ValueError(f"{self._path}: it says where agent {agent} is {span} only: a reference is of the whole run")
+
+    def _said(self, rows: Integers) -> tuple[Array, Mask]:
+        """y_ij = z_i - z_j of each row, shape (m, D), and where there is one (000, eq. 7): a log says where the neighbour is."""
+        relative, polar = self._vectors("relative", rows), self._polar(rows)
+        sensor = self._world.sensor
+        if not sensor.says_positions:
+            polar = polar.copy()
+            polar[:, 0] = 1.0
+            relative = relative / np.linalg.norm(relative, axis=-1, keepdims=True)
+        by_angle = sensor.of_polar(polar)
+        there = ~np.isnan(relative).any(axis=-1)
+        said = -np.where(there[:, None], relative, by_angle)
+        is_half = np.isnan(said).any(axis=-1) & ~np.isnan(self._all_of(rows)).all(axis=-1)
+        self._refuse_rows(rows, is_half, "it measures half of a relative position: give all of it, or nothing")
+        return said, ~np.isnan(said).any(axis=-1)
+
+    def _polar(self, rows: Integers) -> Array:
+        columns = [self._columns[name][rows] for name in _POLAR[: self._dimension]]
+        return np.stack(columns, axis=-1)
+
+    def _all_of(self, rows: Integers) -> Array:
+        return np.concatenate([self._vectors("relative", rows), self._polar(rows)], axis=-1)
+
+    def _links(self, rows: Integers) -> Integers:
+        index, neighbour = self._world.links.index, self._numbers("neighbour", rows)
+        pairs = list(zip(neighbour.tolist(), self._agent[rows].tolist(), strict=True))
+        strange = np.array([pair not in index for pair in pairs], dtype=bool)
+        self._refuse_rows(rows, strange, "it measures a neighbour that is none in this formation")
+        return np.array([index[pair] for pair in pairs], dtype=np.int64)
+
+    def _of_each(self, what: str) -> Iterable[tuple[int, Array, Array]]:
+        """Of each agent that says it, in which ticks, shape (m,), and what, shape (m, D)."""
+        rows = np.flatnonzero(~self._says_measured)
+        said = self._vectors(what, rows)
+        empty = np.isnan(said)
+        self._refuse_rows(rows, empty.any(axis=-1) & ~empty.all(axis=-1), f"it says half of {what}: give all, or nothing")
+        for agent in range(1, self._world.links.agents + 1):
+            own = (self._agent[rows] == agent) & ~empty.any(axis=-1)
+            if own.any():
+                yield agent, self._tick[rows[own]], said[own]
+
+    def _vectors(self, what: str, rows: Integers) -> Array:
+        return np.stack([self._columns[f"{what}_{axis}"][rows] for axis in _AXES[: self._dimension]], axis=-1)
+
+    def _numbers(self, name: str, rows: Integers | None = None) -> Integers:
+        rows = np.arange(len(self._tick)) if rows is None else rows
+        column, agents = self._columns[name][rows], self._world.links.agents
+        wrong = (column != np.round(column)) | (column < 1) | (column > agents)
+        self._refuse_rows(rows, wrong, f"its {name} is none of 1 to {agents}")
+        return column.astype(np.int64)
+
+    def _refuse_rows(self, rows: Integers, wrong: Mask, why: str) -> None:
+        if wrong.any():
+            raise ValueError(f"{self._path}: line {self._line[rows[int(np.argmax(wrong))]]}: {why}")
+
+    def _refuse(self, wrong: Mask, why: str, columns: dict[str, Array]) -> None:
+        if not len(columns["time"]):
+            raise ValueError(f"{self._path}: it has no rows")
+        if wrong.any():
+            raise ValueError(f"{self._path}: line {int(np.argmax(wrong)) + 2}: {why}")
+
+
+def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
+    """The columns of a file by name, of numbers, NaN in empty cells; those that it has not are empty."""
+    import pyarrow as pa  # it takes a while to import
+    from pyarrow import csv
+
+    options = csv.ConvertOptions(column_types=dict.fromkeys(known, pa.float64()), null_values=[""], strings_can_be_null=True)
+    try:
+        table = csv.read_csv(path, convert_options=options)
+    except pa.ArrowInvalid as error:
+        raise ValueError(f"{path}: no CSV file of numbers: {' '.join(str(error).split())}") from error
+    if strange := [name for name in table.column_names if name not in known]:
+        raise ValueError(f"{path}: no column {strange[0]!r} in such a log; {among(strange[0], known)}")
+    if twice := [name for name in known if table.column_names.count(name) > 1]:
+        raise ValueError(f"{path}: it has more than one column {twice[0]!r}")
+    if missing := [name for name in _WHO[:2] if name not in table.column_names]:
+        raise ValueError(f"{path}: it has no column {missing[0]!r}")
+    nothing = np.full(len(table), np.nan)
+    columns: dict[str, Any] = {name: nothing for name in known}
+    for name in table.column_names:
+        columns[name] = table[name].fill_null(np.nan).to_numpy()
+    if infinite := [name for name, column in columns.items() if np.isinf(column).any()]:
+        raise ValueError(f"{path}: {infinite[0]} is infinite in line {int(np.argmax(np.isinf(columns[infinite[0]]))) + 2}")
+    return columns
