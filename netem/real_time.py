@@ -53,7 +53,7 @@ class RealTimeNode:
         self._ports = MediumPorts(session, brief, self._relay, supervisor.lost)
         supervisor.counts(lambda: self._ports.intake.refused)
         self._row = {name: row for row, name in enumerate(brief.channels)}
-        self._ears = session.hears_all([self._keys.sense, self._keys.broadcast("*", "*")])
+        self._ears = session.hears_both(self._keys.sense, self._keys.broadcast("*", "*"))
         self._deliveries, self._background = deliveries, background
         self._handed = [0] * brief.links.agents
         self._awake: frozenset[int] = frozenset()
@@ -89,7 +89,9 @@ class RealTimeNode:
     def _is_late(self) -> bool:
         """Whether what is due should be handed on before more is heard."""
         due_s = self._relay.next_s
-        return due_s is not None and self._wall is not None and self._wall.now() > due_s + _AT_ONCE_S * self._pace.factor
+        return (
+            due_s is not None and self._wall is not None and self._wall.now() > due_s + _AT_ONCE_S * self._pace.factor
+        )
 
     @property
     def _patience_s(self) -> float | None:

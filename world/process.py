@@ -90,7 +90,7 @@ class WorldNode:
 
     def _write_down(self) -> None:
         entries, timeline, kept = self._carrier.entries, self._carrier.timeline, self._carrier.kept
-        due = []
+        due: list[Written] = []
         while (tick := self._due + len(due)) in self._flown and tick in entries:
             due.append((self._flown[tick], entries[tick]))
         if not due:
@@ -163,15 +163,16 @@ def main() -> None:
 
     do_without_pandas()
     out = Path(brief.out)
-    with supervisor.confessing(), _joined(supervisor, brief) as session:
-        with (
-            Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
-            RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,
-        ):
-            with supervisor.confessing(), _pace_of_writing(brief) as later:
-                node = WorldNode(session, supervisor, brief, archive, logbook, later)
-                node.await_everybody()
-                supervisor.tell("ready")
-                supervisor.await_order("go")
-                node.run()
+    with (
+        supervisor.confessing(),
+        _joined(supervisor, brief) as session,
+        Archive(out / ARRAYS, brief.world, len(brief.channels), brief.reports) as archive,
+        RunWriter(out, brief.run, brief.world, brief.channels, brief.reports, brief.books, brief.pace) as logbook,
+    ):
+        with supervisor.confessing(), _pace_of_writing(brief) as later:
+            node = WorldNode(session, supervisor, brief, archive, logbook, later)
+            node.await_everybody()
+            supervisor.tell("ready")
+            supervisor.await_order("go")
+            node.run()
         supervisor.tell("done", uninstructed=node.uninstructed)

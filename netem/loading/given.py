@@ -13,6 +13,7 @@ import numpy as np
 
 _PLAIN = frozenset({int, float, bool, str, bytes})  # the commonest: to ask what else they may be takes longer
 
+
 def readonly(given: Any) -> Any:
     """The same value, with views that cannot be written to in place of its arrays; tuples and maps are gone through."""
     if isinstance(given, np.ndarray):

@@ -54,7 +54,7 @@ class Background:
             while not self._is_over.wait(_EVERY_S):
                 self._call_all()
             self._call_all()
-        except BaseException as error:  # whoever gave the call is told, whatever it is
+        except BaseException as error:  # noqa: BLE001 - raised where it is given the next call, or at the end
             self._error = error
 
     def _call_all(self) -> None:

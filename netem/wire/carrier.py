@@ -74,16 +74,25 @@ class Ears:
     """Hears several keys at once, for whoever has a time to keep."""
 
     def __init__(self) -> None:
-        self._samples: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+        self._samples: queue.SimpleQueue[zenoh.Sample | None] = queue.SimpleQueue()
+        self._urgent: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
 
     def take(self, sample: zenoh.Sample) -> None:
         """Something has arrived."""
         self._samples.put(sample)
 
+    def take_first(self, sample: zenoh.Sample) -> None:
+        """Something has arrived for which all else is to wait."""
+        self._urgent.put(sample)
+        self._samples.put(None)  # who waits for anything is to look
+
     def next(self, patience_s: float | None) -> Arrived | None:
         """The next message on any of them, if one comes within so many seconds; None waits for ever."""
         try:
-            return Arrived(self._samples.get(timeout=patience_s))
+            while self._urgent.empty():
+                if (sample := self._samples.get(timeout=patience_s)) is not None:
+                    return Arrived(sample)
+            return Arrived(self._urgent.get())
         except queue.Empty:
             return None
 
@@ -230,11 +239,11 @@ class Session:
         """Hear a key; so many messages may wait."""
         return Ear(self._session.declare_subscriber(key, zenoh.handlers.FifoChannel(room)))
 
-    def hears_all(self, keys: Iterable[str]) -> Ears:
-        """Hear several keys at once."""
+    def hears_both(self, urgent: str, key: str) -> Ears:
+        """Hear two keys at once, of which one comes first."""
         ears = Ears()
-        for key in keys:
-            self._session.declare_subscriber(key, zenoh.handlers.Callback(ears.take, indirect=False))
+        for of, take in ((urgent, ears.take_first), (key, ears.take)):
+            self._session.declare_subscriber(of, zenoh.handlers.Callback(take, indirect=False))
         return ears
 
     def hands(self, key: str, take: Callable[[Arrived], None]) -> None:
