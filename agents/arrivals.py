@@ -156,11 +156,11 @@ class Arrivals:
         clocks[[self._rows[agent] for agent in inboxes]] = told
         return clocks
 
-    def _of_each(
-        self, inboxes: Mapping[int, messages.SenseInbox], what: Literal["position", "flown"]
-    ) -> Array | None:
+    def _of_each(self, inboxes: Mapping[int, messages.SenseInbox], what: Literal["position", "flown"]) -> Array | None:
         """A vector of each agent that is told one."""
-        told = {self._rows[agent]: said for agent, inbox in inboxes.items() if (said := getattr(inbox, what)) is not None}
+        told = {
+            self._rows[agent]: said for agent, inbox in inboxes.items() if (said := getattr(inbox, what)) is not None
+        }
         if not told:
             return None
         of_all = np.zeros((self._shape[0], self._dimension))

@@ -18,6 +18,7 @@ from netem.wire.sequence import Numbering
 from netem.wire.session import DRIVER, WORLD
 from world.brief import WorldBrief
 from world.physics.world import Scene
+from world.real_time import TooLate
 from world.robots import OnRobot, Robots
 
 
@@ -35,7 +36,7 @@ class DrivenWorld:
     def __init__(self, session: Session, supervisor: Supervisor, brief: WorldBrief, intake: Intake) -> None:
         keys, world = Keys(brief.run), brief.world
         self._world, self._supervisor, self._intake = world, supervisor, intake
-        self._in_real_time = brief.pace is not None
+        self._pace, self._in_real_time = brief.pace, brief.pace is not None
         self._agents = range(1, world.links.agents + 1)
         self._reader = Robots(
             keys,
@@ -47,7 +48,7 @@ class DrivenWorld:
         )
         self._ear = session.hears_anybody(keys.measured("*"), world.links.agents)
         self._voices = {agent: session.says(keys.command(agent)) for agent in self._agents}
-        self._numbers = Numbering()
+        self._numbers, self._heard = Numbering(), dict.fromkeys(self._agents, 0)
         self._measured = np.full((len(world.links), world.formation.dimension), np.nan)
         self._position = np.full((world.links.agents, world.formation.dimension), np.nan)
 
@@ -104,10 +105,22 @@ class DrivenWorld:
     def _since(self, tick: int) -> list[OnRobot]:
         """News that has come by now."""
         read = (self._intake.take(arrived, tick, (), self._reader) for arrived in self._ear.waiting())
-        return [said for said in read if said is not None]
+        news = [said for said in read if said is not None]
+        self._heard |= {said.agent: tick for said in news}
+        self._refuse_the_silent(tick)
+        return news
+
+    def _refuse_the_silent(self, tick: int) -> None:
+        assert self._pace is not None, "of a run in real time"
+        agent = min(self._heard, key=self._heard.__getitem__)
+        silent = (tick - self._heard[agent]) * self._pace.dt / self._pace.factor
+        if silent > self._pace.late:
+            raise TooLate(
+                f"the robot of agent {agent} has said nothing for {silent:.3f} s; time.real.late is {self._pace.late:g} s"
+            )
 
     def _take_in(self, news: Iterable[OnRobot]) -> None:
-        """What was measured since the tick before, the newest of each link; who says nothing of where he is, is where he was."""
+        """What was measured since the tick before, the newest of each link; who does not say where he is, is where he was."""
         self._measured, self._position = np.full_like(self._measured, np.nan), self._position.copy()
         for said in news:
             self._measured[said.links] = said.measured

@@ -1,4 +1,4 @@
-"""What is measured on robots outside, read from the wire: checked against the swarm they are, and a wrong one names its agent."""
+"""What is measured on robots outside, read from the wire: checked against the swarm, and a wrong one names its agent."""
 
 from __future__ import annotations
 

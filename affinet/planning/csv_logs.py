@@ -52,7 +52,7 @@ class _Log:
         self._line = in_order + 2  # the first is the heading
         self._columns = {name: column[in_order] for name, column in columns.items()}
         first = self._columns["time"][0] if len(in_order) else 0.0
-        self._tick = (self._columns["time"] - first) / world.dt
+        self._tick = _whole((self._columns["time"] - first) / world.dt)
         self._agent = self._numbers("agent")
         self._says_measured = ~np.isnan(self._columns["neighbour"])
 
@@ -75,7 +75,7 @@ class _Log:
         measured = np.full((ticks, len(links), self._dimension), np.nan)
         rows = np.flatnonzero(self._says_measured)
         said, there = self._said(rows)
-        tick = np.ceil(self._tick[rows] - _ROUNDING).astype(np.int64)
+        tick = np.ceil(self._tick[rows]).astype(np.int64)
         kept = there & (tick < ticks)
         place = (tick * len(links) + self._links(rows))[kept]
         _, last = np.unique(place[::-1], return_index=True)  # of those of a tick and link the last stays
@@ -84,7 +84,7 @@ class _Log:
 
     def input(self) -> Array:
         """What everybody flies from each tick on, shape (T, N, D); 0 before the log says."""
-        now = np.arange(self._world.ticks) + _ROUNDING
+        now = np.arange(self._world.ticks)
         flown = np.zeros((self._world.ticks, self._world.links.agents, self._dimension))
         for agent, when, said in self._of_each("input"):
             last = np.searchsorted(when, now, side="right") - 1
@@ -102,16 +102,20 @@ class _Log:
         without = (np.flatnonzero(np.isnan(position).any(axis=(0, 2))) + 1).tolist()
         if 0 < len(without) < self._world.links.agents:
             agents = listed(without)
-            raise ValueError(f"{self._path}: it says where some agents are, and not where {agents}: say it of all, or none")
+            raise ValueError(
+                f"{self._path}: it says where some agents are, and not where {agents}: say it of all, or none"
+            )
         return position
 
     def _refuse_what_does_not_span(self, agent: int, when: Array) -> None:
         if when[0] > _ROUNDING or when[-1] < self._world.ticks - 1 - _ROUNDING:
             span = f"from {when[0] * self._world.dt:g} to {when[-1] * self._world.dt:g} s"
-            raise ValueError(f"{self._path}: it says where agent {agent} is {span} only: a reference is of the whole run")
+            raise ValueError(
+                f"{self._path}: it says where agent {agent} is {span} only: a reference is of the whole run"
+            )
 
     def _said(self, rows: Integers) -> tuple[Array, Mask]:
-        """y_ij = z_i - z_j of each row, shape (m, D), and where there is one (000, eq. 7): a log says where the neighbour is."""
+        """y_ij = z_i - z_j of each row, shape (m, D), and which there are (000, eq. 7); logs say where neighbours are."""
         relative, polar = self._vectors("relative", rows), self._polar(rows)
         sensor = self._world.sensor
         if not sensor.says_positions:
@@ -119,11 +123,12 @@ class _Log:
             polar[:, 0] = 1.0
             relative = relative / np.linalg.norm(relative, axis=-1, keepdims=True)
         by_angle = sensor.of_polar(polar)
-        there = ~np.isnan(relative).any(axis=-1)
+        there = np.asarray(~np.isnan(relative).any(axis=-1))
         said = -np.where(there[:, None], relative, by_angle)
-        is_half = np.isnan(said).any(axis=-1) & ~np.isnan(self._all_of(rows)).all(axis=-1)
+        unsaid = np.asarray(np.isnan(said).any(axis=-1))
+        is_half = np.asarray(unsaid & ~np.isnan(self._all_of(rows)).all(axis=-1))
         self._refuse_rows(rows, is_half, "it measures half of a relative position: give all of it, or nothing")
-        return said, ~np.isnan(said).any(axis=-1)
+        return said, ~unsaid
 
     def _polar(self, rows: Integers) -> Array:
         columns = [self._columns[name][rows] for name in _POLAR[: self._dimension]]
@@ -144,7 +149,8 @@ class _Log:
         rows = np.flatnonzero(~self._says_measured)
         said = self._vectors(what, rows)
         empty = np.isnan(said)
-        self._refuse_rows(rows, empty.any(axis=-1) & ~empty.all(axis=-1), f"it says half of {what}: give all, or nothing")
+        is_half = np.asarray(empty.any(axis=-1) & ~empty.all(axis=-1))
+        self._refuse_rows(rows, is_half, f"it says half of {what}: give all, or nothing")
         for agent in range(1, self._world.links.agents + 1):
             own = (self._agent[rows] == agent) & ~empty.any(axis=-1)
             if own.any():
@@ -156,7 +162,7 @@ class _Log:
     def _numbers(self, name: str, rows: Integers | None = None) -> Integers:
         rows = np.arange(len(self._tick)) if rows is None else rows
         column, agents = self._columns[name][rows], self._world.links.agents
-        wrong = (column != np.round(column)) | (column < 1) | (column > agents)
+        wrong = np.asarray((column != np.round(column)) | (column < 1) | (column > agents))
         self._refuse_rows(rows, wrong, f"its {name} is none of 1 to {agents}")
         return column.astype(np.int64)
 
@@ -171,12 +177,20 @@ class _Log:
             raise ValueError(f"{self._path}: line {int(np.argmax(wrong)) + 2}: {why}")
 
 
+def _whole(ticks: Array) -> Array:
+    """Times in ticks, without the rounding of those that are whole ones."""
+    nearest = np.round(ticks)
+    return np.where(np.abs(ticks - nearest) <= _ROUNDING, nearest, ticks)
+
+
 def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     """The columns of a file by name, of numbers, NaN in empty cells; those that it has not are empty."""
     import pyarrow as pa  # it takes a while to import
     from pyarrow import csv
 
-    options = csv.ConvertOptions(column_types=dict.fromkeys(known, pa.float64()), null_values=[""], strings_can_be_null=True)
+    options = csv.ConvertOptions(
+        column_types=dict.fromkeys(known, pa.float64()), null_values=[""], strings_can_be_null=True
+    )
     try:
         table = csv.read_csv(path, convert_options=options)
     except pa.ArrowInvalid as error:
@@ -188,9 +202,11 @@ def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     if missing := [name for name in _WHO[:2] if name not in table.column_names]:
         raise ValueError(f"{path}: it has no column {missing[0]!r}")
     nothing = np.full(len(table), np.nan)
-    columns: dict[str, Any] = {name: nothing for name in known}
+    columns: dict[str, Any] = dict.fromkeys(known, nothing)
     for name in table.column_names:
         columns[name] = table[name].fill_null(np.nan).to_numpy()
     if infinite := [name for name, column in columns.items() if np.isinf(column).any()]:
-        raise ValueError(f"{path}: {infinite[0]} is infinite in line {int(np.argmax(np.isinf(columns[infinite[0]]))) + 2}")
+        raise ValueError(
+            f"{path}: {infinite[0]} is infinite in line {int(np.argmax(np.isinf(columns[infinite[0]]))) + 2}"
+        )
     return columns

@@ -40,7 +40,9 @@ def of(given: Scenario, world: World) -> RecordedFlight | None:
 def _of_run(out: Path, given: Scenario, links: Links) -> RecordedFlight:
     before = loading.resolved(out)
     if abs(before.time.dt - given.time.dt) > _TOLERANCE * given.time.dt:
-        raise ValueError(f"{out}: it was flown at dt {before.time.dt:g} s, and this is {given.time.dt:g} s: set time.dt alike")
+        raise ValueError(
+            f"{out}: it was flown at dt {before.time.dt:g} s, and this is {given.time.dt:g} s: set time.dt alike"
+        )
     flown = formation_of(before)
     if Links.both_ways(flown.agents, flown.edges).index != links.index:
         raise ValueError(f"{out}: it was flown over other links: leave the formation as it was")
@@ -57,7 +59,9 @@ def _array(file: Path) -> NDArray[np.float64]:
     try:
         array = growing.read(file)
     except FileNotFoundError as error:
-        raise ValueError(f"{file.parent.parent}: no run wrote {file.name} there: name the directory of a run") from error
+        raise ValueError(
+            f"{file.parent.parent}: no run wrote {file.name} there: name the directory of a run"
+        ) from error
     if array.dtype != np.float64 or array.ndim != 3:
         raise ValueError(f"{file}: not what a run wrote there: {array.dtype} of shape {array.shape}")
     return np.array(array)

@@ -19,7 +19,7 @@ def refuse(given: Scenario, world: World, faults: Sequence[Fault]) -> None:
     """
     if given.world == "simulated":
         return
-    where = f'a world that is {given.world}'
+    where = f"a world that is {given.world}"
     if world.body.build().order != 1 or given.dynamics.model != "single-integrator":
         raise ScenarioError(f"dynamics.model: in {where} the input is a velocity: leave it a single-integrator")
     if given.target is not None:

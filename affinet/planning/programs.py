@@ -39,7 +39,7 @@ def refuse_in_process(plan: Plan) -> None:
         )
     if plan.scenario.world == "external":
         raise ScenarioError(
-            "world: robots outside are flown over processes (--runtime processes); in one process it is 'simulated', or 'recorded'"
+            "world: robots outside are flown over processes (--runtime processes); in one process leave it 'simulated'"
         )
     if plan.programs:
         says = (

@@ -351,7 +351,9 @@ class Scenario(Section):
         for name, says in (("recorded", 'flight = "FILE"'), ("external", 'driver = "COMMAND"')):
             if (getattr(self, name) is None) == (self.world == name):
                 missing = f'world = "{name}" needs a table [{name}] with {says}'
-                raise ValueError(missing if self.world == name else f'[{name}] is of world = "{name}", not of "{self.world}"')
+                raise ValueError(
+                    missing if self.world == name else f'[{name}] is of world = "{name}", not of "{self.world}"'
+                )
         return self
 
     @property

@@ -29,10 +29,10 @@ def figures(values: Array) -> Figures:
 
 
 def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]:
-    """The errors that matter, in metres, of agents that find out where they are, pursue a target, or fly outside; none of others.
+    """The errors that matter, in metres, of who finds out where it is, pursues a target, or flies outside; none of others.
 
-    `edge_error` is that of estimated relative positions, of a flight that was not simulated, where it is known where its agents
-    were: a root mean square. `localization_error` is that of the checker `localized`, in the ticks in which there is one; `goal_distance` how far agents
+    `edge_error` is that of estimated relative positions, where physics is not simulated and it is known where agents are.
+    `localization_error` is that of the checker `localized`, in the ticks in which there is one; `goal_distance` how far agents
     are from their places about the target, `target_error` how far the target is from where they steer for: root mean squares.
     """
     with np.errstate(over="ignore", invalid="ignore"):
@@ -52,7 +52,7 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
 
 
 def _edge_error(world: World, span: Arrays) -> Array:
-    """How far off estimated relative positions are in each tick, shape (T,), in metres; NaN where none is known, or no truth."""
+    """How far off estimated relative positions are in each tick, shape (T,), in metres; NaN without any, or a truth."""
     ticks = len(span["error"])
     true = sensors.relative(span["position"][:ticks], world.links)[:, world.links.slots]
     off, known = span["estimate"] - true, span["known"] & ~np.isnan(true).any(axis=-1)

@@ -97,7 +97,9 @@ METRICS: Mapping[str, Metric] = {
 }
 
 
-_OF_POSITIONS = frozenset({"procrustes", "estimation_error", "nees"})  # of a flight without a reference nobody knows them
+_OF_POSITIONS = frozenset(
+    {"procrustes", "estimation_error", "nees"}
+)  # of a flight without a reference nobody knows them
 
 
 def seen(world: World, present: Mask, verdicts: Any, of_agents: Mapping[str, Any]) -> Seen:

@@ -249,9 +249,7 @@ def _messages(booked: Accounts, uninstructed: int | None, lost: int) -> dict[str
     return {"ticks": booked.ticks} | vars(booked.ledger) | after
 
 
-def _what_is_wrong(
-    plan: Plan, arrays: Arrays | None, booked: Accounts, uninstructed: int | None
-) -> list[str]:
+def _what_is_wrong(plan: Plan, arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:
     wrong = []
     if arrays is None or not (plan.may_have_gaps or _all(arrays, lambda span: np.isfinite(span["position"]))):
         wrong.append("the swarm diverged: a position is not a number any more")

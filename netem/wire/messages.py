@@ -24,7 +24,7 @@ _Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # that is to s
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Named fields, each of its type: what is anything else is no message. Those with a default are left out where they have it."""
+    """Named fields, each of its type: what is anything else is no message. Defaults are left out."""
 
 
 class Sighted(_Message, frozen=True, kw_only=True):
@@ -46,9 +46,8 @@ class Sense(_Message, frozen=True, kw_only=True):
     (N, D), both in metres; `motion` the true velocities and higher derivatives, shape (N, m - 1, D), where the bodies are
     integrators of an order m above 1; `sightings` what each agent's detector says of a target, as in `SenseInbox`, if there
     is one; `fired` are the numbers of the triggers that fire in this tick. Where physics is not simulated `measured` has NaN in
-    gaps, `position` where it is not known, and of a flight that was recorded `flown` is what everybody flies when the tick begins,
-    shape (N, D), in metres per second. In real time `began` is when the run did, in seconds
-    of the monotonic clock.
+    gaps, `position` where it is not known, and of a recorded flight `flown` is what everybody flies when the tick begins, shape
+    (N, D), in metres per second. In real time `began` is when the run did, in seconds of the monotonic clock.
     """
 
     k: int
@@ -82,9 +81,9 @@ class SenseInbox(_Message, frozen=True, kw_only=True, tag_field="phase", tag="se
     relative positions z_i - z_j, shape (m, D), in metres; `position` is the agent's own, shape (D,), and only leaders, who have
     positioning, get it; `motion` its own velocity and higher derivatives, shape (m - 1, D), in metres per second, per second
     squared ..., if it integrates its input m > 1 times to a position; `sighting` what its detector says of a target, if there
-    is one; `flown` the input it flies just now, shape (D,), in metres per second, where that is not what it commanded, as in a flight
-    that was recorded. In real time `began` is when the run did, in seconds of the monotonic clock, and `gains` by how much the agent's
-    clock gains just now, in seconds per second, beside what its timer says.
+    is one; `flown` the input it flies just now, shape (D,), in metres per second, where that is not what it commanded, as in a
+    recorded flight. In real time `began` is when the run did, in seconds of the monotonic clock, and `gains` by how much the
+    agent's clock gains just now, in seconds per second, beside what its timer says.
     """
 
     k: int
@@ -171,9 +170,9 @@ class Act(_Message, frozen=True, kw_only=True):
 class Measured(_Message, frozen=True, kw_only=True):
     """Driver to world: what is measured on the robot of an agent, where robots fly outside.
 
-    `k` is the tick after that of the last command, 0 before the first; `neighbours` are the agents measured, shape (m,), `measured`
-    their relative positions z_i - z_j as the sensor says them, shape (m, D), in metres; `position` is where the robot is, shape
-    (D,), in metres, where that is known: leaders have positioning, of the others it is what estimates are held against.
+    `k` is the tick after that of the last command, 0 before the first; `neighbours` are the agents measured, shape (m,), and
+    `measured` their relative positions z_i - z_j as the sensor says them, shape (m, D), in metres; `position` is its place,
+    shape (D,), in metres, where that is known: leaders have positioning, of others estimates are held against it.
     """
 
     k: int

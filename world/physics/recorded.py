@@ -18,7 +18,7 @@ class RecordedFlight:
     measured
         What the sensors said of every directed link, shape (T, L, D), in metres or as a unit vector; NaN in gaps.
     position
-        Where everybody was, shape (T + 1, N, D), in metres, for what estimates are held against; NaN where the log has no reference.
+        Where everybody was, shape (T + 1, N, D), in metres, what estimates are held against; NaN without a reference.
     input
         What everybody flew from each tick on, shape (T, N, D), in metres per second.
     """
@@ -38,4 +38,6 @@ class RecordedFlight:
 
     def side_by_side(self, number: int) -> RecordedFlight:
         """The same flight, flown so many times beside itself."""
-        return RecordedFlight(*(np.tile(of_all, (1, number, 1)) for of_all in (self.measured, self.position, self.input)))
+        return RecordedFlight(
+            *(np.tile(of_all, (1, number, 1)) for of_all in (self.measured, self.position, self.input))
+        )

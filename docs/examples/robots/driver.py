@@ -1,4 +1,4 @@
-"""A driver made with a Zenoh client and a MessagePack codec alone, by docs/hardware.md: its robots are points that obey at once.
+"""A driver made with a Zenoh client and a MessagePack codec alone, by docs/hardware.md, of simulated robots.
 
 Put in place of `Robots` what your robots are: what is measured on each, and how one is told to fly.
 """
@@ -18,7 +18,7 @@ SIGMA, SEES = 0.05, 6.0  # m: how wrong measurements are, and how far robots see
 
 
 class Robots:
-    """Simulated ones: they are where they should be, but for up to a metre; they fly what they are told, until told otherwise."""
+    """Points that begin within a metre of where they should be, and fly what they are told."""
 
     def __init__(self, brief):
         self.neighbours, self.dt = brief["neighbours"], brief["dt"]
@@ -27,9 +27,11 @@ class Robots:
         self.flying = [[0.0] * len(place) for place in self.places]
 
     def fly(self, robot, velocity):
+        """From now on it flies so."""
         self.flying[robot] = velocity
 
     def move(self):
+        """A tick later."""
         for place, velocity in zip(self.places, self.flying, strict=True):
             place[:] = [x + self.dt * v for x, v in zip(place, velocity, strict=True)]
 
@@ -79,7 +81,12 @@ def say(tick, number):
     for agent in agents:
         seen = robots.measured(agent - 1)
         measured = floats([x for away in seen.values() for x in away])
-        said = {"agent": agent, "neighbours": [*seen], "measured": measured, "position": floats(robots.places[agent - 1])}
+        said = {
+            "agent": agent,
+            "neighbours": [*seen],
+            "measured": measured,
+            "position": floats(robots.places[agent - 1]),
+        }
         voices[agent].put(msgpack.packb({"k": tick, "src": "driver", "seq": number, **said}))
 
 
