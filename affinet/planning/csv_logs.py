@@ -20,7 +20,7 @@ from world.physics.world import World
 
 _AXES = "xyz"
 _POLAR = ("range", "bearing", "elevation")
-_ROUNDING = 1e-6  # ticks by which a time that is one may be off
+_ROUNDING = 1e-3  # of a tick: as exact as clocks of seconds since 1970 are in ticks of a millisecond
 _WHO = ("time", "agent", "neighbour")
 
 
