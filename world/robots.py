@@ -25,7 +25,7 @@ class OnRobot(NamedTuple):
     agent, tick
         Of whom, and of which tick it speaks.
     links, measured
-        Rows of the links measured, shape (m,), and what the sensors said, shape (m, D).
+        Rows of the links measured, shape (m,), and y of each, shape (m, D).
     position
         Where it is, shape (D,), in metres, if that is known.
     """
@@ -124,4 +124,5 @@ class Robots:
             says = "agents that are told where they are need one of their robots"
             raise WireError(f"{whose}: position: {says} (see docs/hardware.md)", Wrong.SHAPE)
         links = np.array([self._links.index[pair] for pair in pairs], dtype=np.int64)
-        return OnRobot(agent, said.k, links, measured, position)
+        # A robot says where its neighbour is; y_ij = z_i - z_j is where it is from there (000, eq. 7).
+        return OnRobot(agent, said.k, links, -measured, position)

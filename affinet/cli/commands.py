@@ -44,7 +44,7 @@ from netem.processes.leaving import leave, status_of
 from netem.processes.system_errors import about, said
 from netem.processes.user_code import UserCodeError
 from netem.wire.certificates import NotTrusted
-from netem.wire.session import CENTRE, CONTROL, COORDINATOR, HUB, WORLD, agent_name, host_name
+from netem.wire.session import CENTRE, CONTROL, COORDINATOR, DRIVER, HUB, WORLD, agent_name, host_name
 from world.books import history
 
 if TYPE_CHECKING:
@@ -341,7 +341,7 @@ def _keys(parsed: argparse.Namespace) -> int:
     from netem.wire import authority  # its library takes a while to import
 
     agents, hosts = range(1, parsed.agents + 1), range(1, (parsed.hosts or 0) + 1)
-    names = [COORDINATOR, HUB, WORLD, CENTRE, CONTROL, *map(agent_name, agents), *map(host_name, hosts)]
+    names = [COORDINATOR, HUB, WORLD, CENTRE, CONTROL, DRIVER, *map(agent_name, agents), *map(host_name, hosts)]
     made = authority.make(parsed.directory, names, parsed.hub, timedelta(days=parsed.days))
     show.keys(parsed.directory, made)
     return PASS

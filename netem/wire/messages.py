@@ -171,8 +171,8 @@ class Measured(_Message, frozen=True, kw_only=True):
     """Driver to world: what is measured on the robot of an agent, where robots fly outside.
 
     `k` is the tick after that of the last command, 0 before the first; `neighbours` are the agents measured, shape (m,), and
-    `measured` their relative positions z_i - z_j as the sensor says them, shape (m, D), in metres; `position` is its place,
-    shape (D,), in metres, where that is known: leaders have positioning, of others estimates are held against it.
+    `measured` says where they are from the robot, z_j - z_i as its sensor has it, shape (m, D), in metres; `position` is its
+    place, shape (D,), in metres, where that is known: leaders have positioning, of others estimates are held against it.
     """
 
     k: int

@@ -71,7 +71,7 @@ class Driver:
                 "seq": tick,
                 "agent": agent,
                 "neighbours": self.world.links.src[rows].tolist(),
-                "measured": measured[rows].tobytes(),
+                "measured": (-measured[rows]).tobytes(),
                 "position": position[agent - 1].tobytes(),
             }
             strikes = self.wrong and (agent, tick) == (NUMBER, TICK)

@@ -129,8 +129,7 @@ class Recorder:
         """Write consecutive ticks; the first must be one that is recorded, a multiple of `every`."""
         if self._path.exists() and self._path.stat().st_size >= LARGEST:
             self._begin()
-        for tick in moments.ticks.tolist():
-            self._log_events(tick, timeline)
+        self._log_events(moments, timeline)
         kept = slice(None, None, self._every)
         time = [rr.TimeColumn(TIMELINE, duration=(moments.ticks[kept] * self._dt).tolist())]
         position, target = moments.position[kept] - self._origin, moments.target[kept] - self._origin
@@ -250,15 +249,12 @@ class Recorder:
         for path, what in static:
             self._stream.log(path, what, static=True)
 
-    def _log_events(self, tick: int, timeline: Timeline) -> None:
-        started = [fault.describe() for fault in timeline.starting(tick)]
-        ended = [fault.describe_end() for fault in timeline.ending(tick)]
-        if started or ended:
-            self._stream.set_time(TIMELINE, duration=tick * self._dt)
-            for text in started:
-                self._stream.log("events", rr.TextLog(text, level="WARN"))
-            for text in ended:
-                self._stream.log("events", rr.TextLog(text, level="INFO"))
+    def _log_events(self, moments: Moments, timeline: Timeline) -> None:
+        said = [(tick, *line) for tick in moments.ticks.tolist() for line in _said_of(timeline, tick)]
+        if said:  # all at once: of each row that is logged by itself the library keeps something to the end of the run
+            ticks, texts, levels = zip(*said, strict=True)
+            time = [rr.TimeColumn(TIMELINE, duration=[tick * self._dt for tick in ticks])]
+            self._stream.send_columns("events", time, rr.TextLog.columns(text=texts, level=levels))
 
     def _log_realised(self, time: list[rr.TimeColumn], realised: Realised) -> None:
         # Sensing and the last channel stand for their classes: channels that share their verdicts are alike.
@@ -340,6 +336,12 @@ class Recorder:
 def _refuse_what_breaks_off(path: Path) -> None:
     if wrong := wrong_with(path):
         raise NotRecorded(wrong)
+
+
+def _said_of(timeline: Timeline, tick: int) -> list[tuple[str, str]]:
+    """What begins and ends in a tick, and at which level that is said."""
+    started = [(fault.describe(), "WARN") for fault in timeline.starting(tick)]
+    return started + [(fault.describe_end(), "INFO") for fault in timeline.ending(tick)]
 
 
 def _shown(world: World, reports: Reports) -> list[type[Layer]]:

@@ -36,10 +36,10 @@ class Robots:
             place[:] = [x + self.dt * v for x, v in zip(place, velocity, strict=True)]
 
     def measured(self, robot):
-        """The neighbours in sight, and where this robot is from each of them: its own place less theirs."""
+        """The neighbours in sight, and where they are from this robot: their places less its own."""
         own, seen = self.places[robot], {}
         for neighbour in self.neighbours[robot]:
-            away = [x - y for x, y in zip(own, self.places[neighbour - 1], strict=True)]
+            away = [theirs - x for x, theirs in zip(own, self.places[neighbour - 1], strict=True)]
             if sum(x * x for x in away) <= SEES * SEES:
                 seen[neighbour] = [x + self.chance.gauss(0.0, SIGMA) for x in away]
         return seen

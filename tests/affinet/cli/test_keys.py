@@ -18,7 +18,7 @@ def test_keys_are_made_for_each_process_of_a_run(tmp_path, capsys):
     for name in names:
         Certificates(str(folder), name).check()
     said = capsys.readouterr().out
-    assert re.match(rf"{folder}: certificates of a new authority for 8 names until .* UTC; .*, 10\.0\.0\.1\n", said)
+    assert re.match(rf"{folder}: certificates of a new authority for 9 names until .* UTC; .*, 10\.0\.0\.1\n", said)
     assert main(["keys", str(folder)]) == 0
     assert "certificates of the authority that was there for 16 names" in capsys.readouterr().out
 
