@@ -39,13 +39,19 @@ def read(path: Path, world: World) -> RecordedFlight:
     return RecordedFlight(log.measured(), log.position(), log.input())
 
 
+def columns_of(dimension: int) -> tuple[str, ...]:
+    """The columns that a log may have."""
+    vectors = (f"{what}_{axis}" for what in ("relative", "input", "position") for axis in _AXES[:dimension])
+    return (*_WHO, *_POLAR[:dimension], *vectors)
+
+
 class _Log:
     """The rows of a file, sorted by time, as columns (m,); NaN where a cell is empty."""
 
     def __init__(self, path: Path, world: World) -> None:
         self._path, self._world = path, world
         self._dimension = world.formation.dimension
-        columns = _columns(path, self._known)
+        columns = _columns(path, columns_of(self._dimension))
         for name in ("time", "agent"):
             self._refuse(np.isnan(columns[name]), f"there is no {name}", columns)
         in_order = np.argsort(columns["time"], kind="stable")
@@ -55,12 +61,6 @@ class _Log:
         self._tick = _whole((self._columns["time"] - first) / world.dt)
         self._agent = self._numbers("agent")
         self._says_measured = ~np.isnan(self._columns["neighbour"])
-
-    @property
-    def _known(self) -> Sequence[str]:
-        axes = _AXES[: self._dimension]
-        own = (f"{what}_{axis}" for what in ("relative", "input", "position") for axis in axes)
-        return (*_WHO, *_POLAR[: self._dimension], *own)
 
     def refuse_what_is_short(self) -> None:
         """Fail where it ends before the run does."""

@@ -11,7 +11,7 @@ from netem.wire.certificates import Certificates
 def test_keys_are_made_for_each_process_of_a_run(tmp_path, capsys):
     folder = tmp_path / "keys"
     assert main(["keys", str(folder), "--agents", "2", "--hosts", "1", "--hub", "10.0.0.1", "--days", "7"]) == 0
-    names = ["coordinator", "netem", "world", "centre", "control", "agent-1", "agent-2", "host-1"]
+    names = ["coordinator", "netem", "world", "centre", "control", "driver", "agent-1", "agent-2", "host-1"]
     assert {path.name for path in folder.iterdir()} == {
         f"{name}.{kind}" for name in ("authority", *names) for kind in ("pem", "key")
     }
@@ -20,7 +20,7 @@ def test_keys_are_made_for_each_process_of_a_run(tmp_path, capsys):
     said = capsys.readouterr().out
     assert re.match(rf"{folder}: certificates of a new authority for 9 names until .* UTC; .*, 10\.0\.0\.1\n", said)
     assert main(["keys", str(folder)]) == 0
-    assert "certificates of the authority that was there for 16 names" in capsys.readouterr().out
+    assert "certificates of the authority that was there for 17 names" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

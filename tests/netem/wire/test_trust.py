@@ -19,6 +19,7 @@ from netem.wire.keys import Keys
 from netem.wire.session import (
     CENTRE,
     CONTROL,
+    DRIVER,
     HUB,
     LARGEST,
     WORLD,
@@ -32,7 +33,8 @@ from netem.wire.session import (
 
 KEYS = Keys("now")
 AGENTS = (1, 2)
-NAMES = (HUB, WORLD, CENTRE, CONTROL, *map(agent_name, AGENTS))
+OWN = KEYS.broadcast(2, "input")
+NAMES = (HUB, WORLD, CENTRE, CONTROL, DRIVER, *map(agent_name, AGENTS))
 SOON = 0.7
 ROOM = 4096
 BLOCK = zenoh.CongestionControl.BLOCK
@@ -75,7 +77,7 @@ class Star:
         # An agent learns of these alone, and so knows when it is heard.
         self._ears = [
             self.hub.declare_subscriber(key, zenoh.handlers.RingChannel(1))
-            for key in (KEYS.broadcast("*", "*"), KEYS.sense)
+            for key in (KEYS.broadcast("*", "*"), KEYS.sense, KEYS.measured("*"))
         ]
         return self
 
@@ -89,11 +91,11 @@ class Star:
             return False
         return True
 
-    def gets_through(self, session, say):
-        """Whether what is said arrives at the hub, in any form, before what is said rightly after it."""
-        awaited(session.declare_publisher(KEYS.broadcast(2, "input")))
+    def gets_through(self, session, say, own=OWN):
+        """Whether what is said arrives at the hub, in any form, before what is said rightly after it, on a key of one's own."""
+        awaited(session.declare_publisher(own))
         say(session)
-        session.put(KEYS.broadcast(2, "input"), b"rightly", congestion_control=BLOCK)
+        session.put(own, b"rightly", congestion_control=BLOCK)
         return arrived(self.everything, b"rightly")
 
 
@@ -269,6 +271,8 @@ SPOKEN = {
     "as the medium": KEYS.journal,
     "into another's inbox": KEYS.inbox(1),
     "as the centre": KEYS.told(1),
+    "as the driver": KEYS.measured(2),
+    "to a robot": KEYS.command(2),
     "into an earlier run": Keys("earlier").broadcast(2, "input"),
     "to everybody": "affinet/**",
 }
@@ -291,6 +295,25 @@ def test_an_agent_deletes_nothing_on_its_own_keys_either(star, protected):
     assert star.gets_through(agent, lambda session: session.delete(KEYS.broadcast(2, "input"))) is not protected
 
 
+NOT_OF_A_DRIVER = {
+    "as an agent": KEYS.act(1),
+    "in the air": KEYS.broadcast(1, "input"),
+    "as the world": KEYS.sense,
+    "to its own robots": KEYS.command(1),
+    "into an inbox": KEYS.inbox(1),
+    "into an earlier run": Keys("earlier").measured(1),
+}
+
+
+@both
+@pytest.mark.parametrize("key", NOT_OF_A_DRIVER.values(), ids=NOT_OF_A_DRIVER.keys())
+def test_a_driver_says_what_is_measured_alone(star, key, protected):
+    star.listen(None if protected else without_access_control)
+    driver = star.join(DRIVER)
+    lies = star.gets_through(driver, lambda session: session.put(key, b"a lie"), KEYS.measured(1))
+    assert lies is not protected
+
+
 HEARD = {
     "another's inbox": (KEYS.inbox(1), KEYS.inbox(1)),
     "inboxes": (KEYS.inbox("*"), KEYS.inbox(1)),
@@ -300,6 +323,8 @@ HEARD = {
     "what others do": (KEYS.act("*"), KEYS.act(1)),
     "the truth": (KEYS.sense, KEYS.sense),
     "the verdicts": (KEYS.journal, KEYS.journal),
+    "what robots measure": (KEYS.measured("*"), KEYS.measured(2)),
+    "what robots are told": (KEYS.command("*"), KEYS.command(2)),
 }
 
 
