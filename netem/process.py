@@ -17,7 +17,8 @@ from netem.real_time import RealTimeNode
 from netem.wire.carrier import Session
 from netem.wire.keys import Keys
 from netem.wire.repeating import opened
-from netem.wire.session import HUB_ENVIRONMENT, dictionary, hub
+from netem.wire.rights import hub
+from netem.wire.session import HUB_ENVIRONMENT, dictionary
 
 
 def _listening(supervisor: Supervisor, brief: MediumBrief) -> Session:

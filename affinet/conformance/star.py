@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from netem.wire import keys
 from netem.wire.carrier import Arrived, Session
 from netem.wire.keys import Keys
-from netem.wire.session import HUB, Login, agent_name, dictionary, hub
+from netem.wire.rights import hub
+from netem.wire.session import HUB, Login, agent_name, dictionary
 
 
 class Published(NamedTuple):

@@ -134,7 +134,8 @@ class Zenoh:
         import zenoh
 
         from netem.wire.keys import Keys
-        from netem.wire.session import Login, client, hub
+        from netem.wire.rights import hub
+        from netem.wire.session import Login, client
 
         self._keys, given = Keys("floor"), Login(*login)
         config = hub(given, users, self._keys, range(1, agents + 1), {}) if routes else client(given)

@@ -209,7 +209,7 @@ class Session:
     Parameters
     ----------
     config
-        Where to connect or listen, and as whom: `session.client` or `session.hub`.
+        Where to connect or listen, and as whom: `session.client` or `rights.hub`.
 
     Raises
     ------

@@ -11,7 +11,8 @@ from netem.wire import authority
 from netem.wire.carrier import NotCarried, Session, joined
 from netem.wire.certificates import Certificates, NotTrusted
 from netem.wire.keys import Keys
-from netem.wire.session import HUB, Login, agent_name, client, hub
+from netem.wire.rights import hub
+from netem.wire.session import HUB, Login, agent_name, client
 
 KEYS = Keys("r")
 SOON = 1.0

@@ -12,8 +12,9 @@ from netem.wire.arrays import WireError
 from netem.wire.carrier import await_heard
 from netem.wire.keys import Keys, again
 from netem.wire.repeating import Asked, Incoming, Repeated, RepeatingSession, opened
+from netem.wire.rights import hub
 from netem.wire.sequence import UninstructedLoss
-from netem.wire.session import HUB, WORLD, Login, agent_name, client, hub
+from netem.wire.session import HUB, WORLD, Login, agent_name, client
 
 ONE, OTHER = b"one", b"other"
 

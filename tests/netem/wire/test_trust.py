@@ -16,6 +16,7 @@ from netem.wire import authority
 from netem.wire import session as session_config
 from netem.wire.carrier import Session, StrangerEntered
 from netem.wire.keys import Keys
+from netem.wire.rights import hub
 from netem.wire.session import (
     CENTRE,
     CONTROL,
@@ -27,7 +28,6 @@ from netem.wire.session import (
     agent_name,
     client,
     dictionary,
-    hub,
     identity,
 )
 
