@@ -58,7 +58,7 @@ def _rights_of_all(
     carried = {agent for of_host in hosts.values() for agent in of_host}
     return dict(
         [
-            _rights(
+            of_process(
                 WORLD,
                 says=[keys.sense, keys.command("*")],
                 hears=[keys.act("*"), keys.journal, keys.measured("*")],
@@ -66,20 +66,20 @@ def _rights_of_all(
             ),
             *(_of_agents(agent_name(agent), keys, [agent], []) for agent in agents if agent not in carried),
             *(_of_agents(host_name(host), keys, of_host, [keys.roster(host)]) for host, of_host in hosts.items()),
-            _rights(
+            of_process(
                 CENTRE,
                 says=[keys.told("*")],
                 hears=[keys.broadcast("*", channel) for channel in (MEASUREMENT, INPUT)],
                 learns=[keys.told("*")],
             ),
-            _rights(DRIVER, says=[keys.measured("*")], hears=[keys.command("*")], learns=[keys.measured("*")]),
+            of_process(DRIVER, says=[keys.measured("*")], hears=[keys.command("*")], learns=[keys.measured("*")]),
             _controls(keys),
         ]
     )
 
 
 def _of_agents(name: str, keys: Keys, agents: Iterable[int], roster: list[str]) -> tuple[str, list[dict[str, Any]]]:
-    return _rights(
+    return of_process(
         name,
         says=[key for agent in agents for key in (keys.broadcast(agent, "*"), keys.act(agent))],
         hears=roster + [key for agent in agents for key in (keys.inbox(agent), keys.told(agent))],
@@ -87,13 +87,14 @@ def _of_agents(name: str, keys: Keys, agents: Iterable[int], roster: list[str]) 
     )
 
 
-def _rights(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:
+def of_process(name: str, *, says: list[str], hears: list[str], learns: list[str]) -> tuple[str, list[dict[str, Any]]]:
+    """Who it is, and the rules by which it says and hears keys, and learns who hears its own."""
     return name, [
-        _allow(f"{name}-says", "put", "ingress", says),
-        _allow(f"{name}-hears", "put", "egress", hears),
-        _allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
+        allow(f"{name}-says", "put", "ingress", says),
+        allow(f"{name}-hears", "put", "egress", hears),
+        allow(f"{name}-asks", "declare_subscriber", "ingress", hears),
         # That somebody subscribes: without this a declared publisher believes that nobody listens, and sends nothing.
-        _allow(f"{name}-learns", "declare_subscriber", "egress", learns),
+        allow(f"{name}-learns", "declare_subscriber", "egress", learns),
         *_repeats(f"{name}-again", hears, says, learns),
     ]
 
@@ -102,24 +103,26 @@ def _repeats(name: str, hears: list[str], says: list[str], learns: list[str]) ->
     """Between machines, a message that was lost is asked for again: in one question of all who speak on such a key."""
     answered = [again(key) for key in says]
     return [
-        *_asks(name, [again(key) for key in hears]),
-        _allow(f"{name}-asked", "query", "egress", [again(key) for key in learns]),
-        _allow(f"{name}-answers", "reply", "ingress", answered),
-        _allow(f"{name}-can", "declare_queryable", "ingress", answered),
+        *asks(name, [again(key) for key in hears]),
+        allow(f"{name}-asked", "query", "egress", [again(key) for key in learns]),
+        allow(f"{name}-answers", "reply", "ingress", answered),
+        allow(f"{name}-can", "declare_queryable", "ingress", answered),
     ]
 
 
 def _controls(keys: Keys) -> tuple[str, list[dict[str, Any]]]:
-    return CONTROL, _asks(CONTROL, [keys.control])
+    return CONTROL, asks(CONTROL, [keys.control])
 
 
-def _asks(name: str, keys: list[str]) -> list[dict[str, Any]]:
+def asks(name: str, keys: list[str]) -> list[dict[str, Any]]:
+    """The rules by which it asks on keys, and hears the answers."""
     return [
-        _allow(f"{name}-asks", "query", "ingress", keys),
-        _allow(f"{name}-hears", "reply", "egress", keys),
-        _allow(f"{name}-learns", "declare_queryable", "egress", keys),
+        allow(f"{name}-asks", "query", "ingress", keys),
+        allow(f"{name}-hears", "reply", "egress", keys),
+        allow(f"{name}-learns", "declare_queryable", "egress", keys),
     ]
 
 
-def _allow(name: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
+def allow(name: str, message: str, flow: str, keys: list[str]) -> dict[str, Any]:
+    """A rule, as Zenoh has it: which message on which keys may come in (ingress) or go out (egress)."""
     return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": keys}

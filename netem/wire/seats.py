@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from netem.wire.session import Login, _allow, _asks, _rights, listening
+from netem.wire.rights import allow, asks, of_process
+from netem.wire.session import Login, listening
 
 BEAT = "affinet/machines/beat"  # the coordinator lives (coordinator to all)
 CLOCK = "affinet/machines/clock"  # queryable: what the coordinator's clock shows
@@ -62,16 +63,16 @@ def coordinator(login: Login, seats: Iterable[str]) -> dict[str, Any]:
 
 
 def _of_seat(seat: str) -> tuple[str, list[dict[str, Any]]]:
-    name, own = _rights(seat, says=[up(seat)], hears=[down(seat)], learns=[up("*")])
+    name, own = of_process(seat, says=[up(seat)], hears=[down(seat)], learns=[up("*")])
     return name, [
         *own,
-        *_asks(f"{seat}-joins", [join(seat), CLOCK]),
-        _allow(f"{seat}-lives", "put", "ingress", [alive(seat)]),
-        _allow(f"{seat}-sees", "declare_subscriber", "egress", [alive("*")]),
-        _allow(f"{seat}-listens", "declare_subscriber", "ingress", [BEAT]),
-        _allow(f"{seat}-beaten", "put", "egress", [BEAT]),
-        _allow(f"{seat}-here", "liveliness_token", "ingress", [here(seat)]),
-        _allow(f"{seat}-gives", "reply", "ingress", [file(seat)]),
-        _allow(f"{seat}-asked", "query", "egress", [file(seat)]),
-        _allow(f"{seat}-can", "declare_queryable", "ingress", [file(seat)]),
+        *asks(f"{seat}-joins", [join(seat), CLOCK]),
+        allow(f"{seat}-lives", "put", "ingress", [alive(seat)]),
+        allow(f"{seat}-sees", "declare_subscriber", "egress", [alive("*")]),
+        allow(f"{seat}-listens", "declare_subscriber", "ingress", [BEAT]),
+        allow(f"{seat}-beaten", "put", "egress", [BEAT]),
+        allow(f"{seat}-here", "liveliness_token", "ingress", [here(seat)]),
+        allow(f"{seat}-gives", "reply", "ingress", [file(seat)]),
+        allow(f"{seat}-asked", "query", "egress", [file(seat)]),
+        allow(f"{seat}-can", "declare_queryable", "ingress", [file(seat)]),
     ]
