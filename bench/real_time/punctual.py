@@ -1,9 +1,11 @@
 """How punctual a run in real time is: delays asked for and achieved, what the medium adds to Zenoh, and who is late.
 
-    python bench/real_time/punctual.py [--agents 10] [--rate 100] [--seconds 10] [--busy 0] [--repeat 3] [--out FILE]
+    python bench/real_time/punctual.py [--agents 10] [--rate 100] [--per-process 1] [--seconds 10] [--busy 0] [--repeat 3]
+        [--keep docs/punctual.json]
 
 The last agent notes when each of its messages arrives; Zenoh alone is measured while the same swarm flies. `--busy` loops take
-processors away meanwhile. A figure is the median of the repeats, with the least and the largest.
+processors away meanwhile. A figure is the median of the repeats, with the least and the largest. `--keep` puts the runs in place
+of those of the same settings.
 """
 
 from __future__ import annotations
@@ -130,14 +132,15 @@ def main() -> None:
     parser.add_argument("--busy", type=int, default=0, help="loops that compute meanwhile")
     parser.add_argument("--per-process", type=int, default=1, help="agents that a process carries")
     parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--keep", type=Path, metavar="FILE")
     given = parser.parse_args()
     runs = [flown(given.agents, given.rate, given.seconds, given.busy, given.per_process) for _ in range(given.repeat)]
     for run in runs:
         print(json.dumps(run))
-    if given.out:
-        settings = {name: getattr(given, name) for name in ("agents", "rate", "seconds", "busy", "per_process")}
-        given.out.write_text(json.dumps({"settings": settings, "runs": runs}, indent=1) + "\n")
+    if given.keep:
+        called = ", ".join(f"{name} {getattr(given, name):g}" for name in ("agents", "rate", "per_process", "busy"))
+        kept = json.loads(given.keep.read_text()) if given.keep.exists() else {}
+        given.keep.write_text(json.dumps(kept | {called: runs}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -446,6 +446,7 @@ MEDIUM = MediumBrief(
     trust=Trust("drop", 1 << 20, 100, foreign=frozenset({2})),
     journal="/tmp/run/journal.arrows",
     batch=50,
+    gaps=True,
     pace=Pace(dt=0.05, factor=0.5, late=1.0),
     clock_s=-0.25,
 )

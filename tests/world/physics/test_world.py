@@ -77,6 +77,7 @@ def world():
         start="targets",
         spread=1.0,
         swarms=1,
+        flight=None,
     )
 
 
@@ -160,7 +161,7 @@ HELD = pytest.mark.parametrize("fault", HOLDING, ids=lambda fault: f"{fault.verb
 @HELD
 def test_absent_agents_hold_still(world, fault):
     z, u = np.random.default_rng(1).normal(size=(2, 7, 2))
-    flown = world.flown(scene(z, velocity=-u), u, under(fault))
+    flown = world.flown(0, scene(z, velocity=-u), u, under(fault))
     after = moved(world, 0, z, flown, fault)
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(after[ABSENT], z[ABSENT])
@@ -185,7 +186,7 @@ COASTING = [
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
 def test_paused_and_drifting_bodies_fly_on_as_they_did_whatever_is_commanded(world, fault):
     before, u = np.random.default_rng(1).normal(size=(2, 7, 2))
-    flown = world.flown(scene(ZHAO7.nominal, velocity=before), u, under(fault))
+    flown = world.flown(0, scene(ZHAO7.nominal, velocity=before), u, under(fault))
     np.testing.assert_array_equal(flown[ABSENT], before[ABSENT])
     np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
     np.testing.assert_allclose(moved(world, 0, ZHAO7.nominal, flown, fault), ZHAO7.nominal + 0.01 * flown, atol=1e-15)
@@ -196,7 +197,7 @@ def test_a_body_flies_on_for_as_long_as_its_agent_is_paused(world):
     here, flown = scene(ZHAO7.nominal), []
     for tick in range(7):
         now, commanded = timeline.at(tick), np.full((7, 2), float(tick + 1))
-        flown.append(world.flown(here, commanded, now))
+        flown.append(world.flown(0, here, commanded, now))
         here = world.step(tick, here, here.measured, flown[-1], now)
     assert [each[3, 0] for each in flown] == [1, 2, 2, 2, 2, 6, 7]
     assert [each[4, 0] for each in flown] == [1, 2, 3, 4, 5, 6, 7]
@@ -205,13 +206,13 @@ def test_a_body_flies_on_for_as_long_as_its_agent_is_paused(world):
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
 def test_a_body_that_coasts_holds_when_its_agent_dies(world, fault):
     u = np.ones((7, 2))
-    flown = world.flown(scene(ZHAO7.nominal, velocity=u), u, under(fault, Fault(Verb.KILL, 0, None, agents=(4,))))
+    flown = world.flown(0, scene(ZHAO7.nominal, velocity=u), u, under(fault, Fault(Verb.KILL, 0, None, agents=(4,))))
     assert flown[:, 0].tolist() == [1, 1, 1, 0, 1, 1, 1]
 
 
 def test_an_agent_that_departs_while_paused_holds(world):
     u = np.ones((7, 2))
-    flown = world.flown(scene(ZHAO7.nominal, velocity=u), u, under(COASTING[0], HOLDING[1]))
+    flown = world.flown(0, scene(ZHAO7.nominal, velocity=u), u, under(COASTING[0], HOLDING[1]))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
 
 
@@ -228,7 +229,7 @@ def test_gusts_carry_their_agents_on_top_of_what_they_fly(world):
 
 def test_a_gust_is_no_input_of_its_agent(world):
     gust = under(Fault(Verb.GUST, 0, None, agents=(2,), vector=(3.0, -1.0)))
-    u = world.flown(scene(ZHAO7.nominal), np.ones((7, 2)), gust)
+    u = world.flown(0, scene(ZHAO7.nominal), np.ones((7, 2)), gust)
     np.testing.assert_array_equal(u, 1.0)
     np.testing.assert_array_equal(world.step(0, scene(ZHAO7.nominal), UNSEEN, u, gust).velocity, 1.0)
 
@@ -297,7 +298,7 @@ def test_only_those_that_do_not_command_their_velocity_are_told_how_they_move(wo
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
 def test_double_integrators_that_nobody_steers_keep_their_velocity(heavy, fault):
     z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
-    flown = heavy.flown(scene(z, velocity=v), u, under(fault))
+    flown = heavy.flown(0, scene(z, velocity=v), u, under(fault))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
     after = heavy.step(0, scene(z, velocity=v), UNSEEN, flown, under(fault))
@@ -311,7 +312,7 @@ def test_a_double_integrator_gains_nothing_for_as_long_as_its_agent_is_paused(he
     here, speed = scene(ZHAO7.nominal), []
     for tick in range(7):
         now = timeline.at(tick)
-        here = heavy.step(tick, here, here.measured, heavy.flown(here, np.full((7, 2), 100.0), now), now)
+        here = heavy.step(tick, here, here.measured, heavy.flown(0, here, np.full((7, 2), 100.0), now), now)
         speed.append(here.velocity[[3, 4], 0])
     np.testing.assert_allclose(speed, np.transpose([[1, 2, 2, 2, 2, 3, 4], [1, 2, 3, 4, 5, 6, 7]]), atol=1e-12)
 
@@ -320,7 +321,7 @@ def test_a_double_integrator_gains_nothing_for_as_long_as_its_agent_is_paused(he
 def test_absent_double_integrators_stop_at_once_whatever_happens(heavy, fault):
     z, v, u = np.random.default_rng(1).normal(size=(3, 7, 2))
     gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
-    flown = heavy.flown(scene(z, velocity=v), u, under(fault))
+    flown = heavy.flown(0, scene(z, velocity=v), u, under(fault))
     after = replace(heavy, disturbance=pushes(0.1)).step(0, scene(z, velocity=v), UNSEEN, flown, under(fault, gust))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(after.position[ABSENT], z[ABSENT])
@@ -335,7 +336,7 @@ def test_gusts_and_disturbances_displace_a_double_integrator_and_give_it_no_velo
     push[[1, 4]] = (3.0, -1.0)
     here = scene(z, velocity=v)
     calm = heavy.step(0, here, UNSEEN, u, QUIET)
-    windy = heavy.step(0, here, UNSEEN, heavy.flown(here, u, under(gust)), under(gust))
+    windy = heavy.step(0, here, UNSEEN, heavy.flown(0, here, u, under(gust)), under(gust))
     shaken = replace(heavy, disturbance=pushes(0.2)).step(0, here, UNSEEN, u, QUIET)
     np.testing.assert_allclose(windy.position - calm.position, 0.01 * push, atol=1e-15)
     assert (shaken.position != calm.position).all()
@@ -424,7 +425,7 @@ def test_everybody_of_any_order_starts_at_rest(world, order):
 @pytest.mark.parametrize("fault", COASTING, ids=lambda fault: fault.verb)
 def test_integrators_that_nobody_steers_fly_no_input_and_go_on_as_they_moved(world, order, fault):
     slow, (here, u) = replace(world, body=integrators(order), dt=0.5), moving(order)
-    flown = slow.flown(here, u, under(fault))
+    flown = slow.flown(0, here, u, under(fault))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(flown[~ABSENT], u[~ABSENT])
     after = slow.step(0, here, UNSEEN, flown, under(fault))
@@ -438,7 +439,7 @@ def test_integrators_that_nobody_steers_fly_no_input_and_go_on_as_they_moved(wor
 def test_absent_integrators_of_any_order_stop_at_once_whatever_happens(world, order, fault):
     heavy, (here, u) = replace(world, body=integrators(order), disturbance=pushes(0.1)), moving(order)
     gust = Fault(Verb.GUST, 0, None, agents=tuple(range(1, 8)), vector=(1.0, 2.0))
-    flown = heavy.flown(here, u, under(fault))
+    flown = heavy.flown(0, here, u, under(fault))
     after = heavy.step(0, here, UNSEEN, flown, under(fault, gust))
     np.testing.assert_array_equal(flown[ABSENT], 0.0)
     np.testing.assert_array_equal(after.position[ABSENT], here.position[ABSENT])
@@ -453,7 +454,7 @@ def test_gusts_and_disturbances_displace_integrators_of_any_order_and_give_them_
     gust, push = Fault(Verb.GUST, 0, None, agents=(2, 5), vector=(3.0, -1.0)), np.zeros((7, 2))
     push[[1, 4]] = (3.0, -1.0)
     calm = heavy.step(0, here, UNSEEN, u, QUIET)
-    windy = heavy.step(0, here, UNSEEN, heavy.flown(here, u, under(gust)), under(gust))
+    windy = heavy.step(0, here, UNSEEN, heavy.flown(0, here, u, under(gust)), under(gust))
     shaken = replace(heavy, disturbance=pushes(0.2)).step(0, here, UNSEEN, u, QUIET)
     np.testing.assert_allclose(windy.position - calm.position, 0.01 * push, atol=1e-15)
     np.testing.assert_allclose(shaken.position - calm.position, shaken.disturbance, atol=1e-15)
