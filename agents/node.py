@@ -23,7 +23,7 @@ from analysis.models.arrays import Mask
 from netem.core import channels
 from netem.loading.choice import Choice
 from netem.processes.supervised import Supervisor
-from netem.processes.user_code import UserCodeError
+from netem.processes.user_code import in_tick
 from netem.wire import messages
 from netem.wire.arrays import TRUTH, packed
 from netem.wire.carrier import Ear, Session, await_heard
@@ -171,11 +171,8 @@ class AgentsNode:
                 return
             tick = inboxes[awake[0]].k
             self._supervisor.works(tick)
-            try:
+            with in_tick(tick):
                 self._live(tick, inboxes)
-            except UserCodeError as error:
-                error.tick = tick
-                raise
 
     def _taking_part(self) -> Sequence[int]:
         if self._roster is None:

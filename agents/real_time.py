@@ -11,7 +11,7 @@ from agents.loading import capabilities
 from agents.node import AgentBrief, AgentsNode
 from agents.timer import OwnClock
 from netem.processes.supervised import Supervisor
-from netem.processes.user_code import UserCodeError
+from netem.processes.user_code import in_tick
 from netem.processes.wall_time import WallTime, be_prompt
 from netem.wire import messages
 from netem.wire.carrier import Session
@@ -126,11 +126,8 @@ class RealTimeAgentsNode(AgentsNode):
             self._missed += max(0, tick - self._lived - moment.ticks)
         self._lived = tick
         self._supervisor.works(tick)
-        try:
+        with in_tick(tick):
             action, late_to_act = self._live_till(moment.acts, tick, inboxes)
-        except UserCodeError as error:
-            error.tick = tick
-            raise
         missed, self._missed = self._missed + (self._wall.now() > moment.following), 0
         late = max(late, late_to_act) / self._timer.factor
         self._tell(tick, action, [*inboxes], messages.Punctuality(late=late, missed=missed))

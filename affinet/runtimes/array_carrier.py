@@ -24,7 +24,7 @@ from netem.medium.in_flight import Delivery
 from netem.medium.medium import Medium
 from netem.medium.picking import picked
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
-from netem.processes.user_code import UserCodeError
+from netem.processes.user_code import in_tick
 from world.physics.world import Scene
 
 Broadcasts = Mapping[str, Fields]
@@ -90,11 +90,8 @@ class ArrayCarrier:
         UserCodeError
             When estimator or law do something wrong: in which tick.
         """
-        try:
+        with in_tick(tick):
             return self._tick(tick, scene, measured)
-        except UserCodeError as error:
-            error.tick = tick
-            raise
 
     def _tick(self, tick: int, scene: Scene, sensed: Array) -> BatchActed:
         before = self._welcomed_back(tick)

@@ -17,7 +17,7 @@ from netem.core.clock import Clock, Lockstep
 from netem.loading.choice import Choice
 from netem.processes.leaving import leave, status_of
 from netem.processes.supervised import Supervisor, called
-from netem.processes.user_code import UserCodeError
+from netem.processes.user_code import in_tick
 from netem.wire import messages
 from netem.wire.arrays import WHOLE, Form, numbers, packed
 from netem.wire.broadcasts import Broadcasts
@@ -88,11 +88,8 @@ class CentreNode:
             measured, seen = self._measurements(said[MEASUREMENT])
             inputs = np.array([self._input(agent, said[INPUT][agent]) for agent in self._agents])
             self._supervisor.works(tick)
-            try:
+            with in_tick(tick):
                 state, told = self._centre.step(state, measured, seen, inputs)
-            except UserCodeError as error:
-                error.tick = tick
-                raise
             self._tell(tick, told)
 
     def _hear(self, channel: str, tick: int) -> dict[int, dict[str, Any]]:

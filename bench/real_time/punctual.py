@@ -4,8 +4,8 @@
         [--keep docs/punctual.json]
 
 The last agent notes when each of its messages arrives; Zenoh alone is measured while the same swarm flies. `--busy` loops take
-processors away meanwhile. A figure is the median of the repeats, with the least and the largest. `--keep` puts the runs in place
-of those of the same settings.
+processors away meanwhile. A figure is the median of the repeats, with the least and the largest. `--keep` puts the runs in
+place of those of the same settings.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from netem.impairments.own import Loss, Offered, OwnLoss
 from netem.loading.calling import Calling
 from netem.loading.given import readonly
 from netem.loading.returned import BOOL, array
-from netem.processes.user_code import UserCodeError
+from netem.processes.user_code import in_tick
 
 
 class OwnLosses:
@@ -58,13 +58,9 @@ class OwnLosses:
         if self._by_position and position is not None:
             relative = position[self._sender] - position[self._receiver]
         offered = Offered(tick, tick * self._dt, self._ends["src"], self._ends["dst"], self._draws.at(tick), relative)
-        try:
-            with Calling(self._loss, "lost"):
-                lost = self._loss.lost(readonly(offered))
-                array("what is lost", lost, "C, n", (self._shape[0], len(self._rows)), (), BOOL)
-        except UserCodeError as error:
-            error.tick = tick
-            raise
+        with in_tick(tick), Calling(self._loss, "lost"):
+            lost = self._loss.lost(readonly(offered))
+            array("what is lost", lost, "C, n", (self._shape[0], len(self._rows)), (), BOOL)
         held = np.zeros(self._shape, dtype=bool)
         held[:, self._rows] = lost
         return held

@@ -6,6 +6,8 @@ import inspect
 import opcode
 import sysconfig
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, NamedTuple
 
@@ -48,6 +50,16 @@ class UserCodeError(RuntimeError):
         start = "" if self.during is None else f"{self.during}: "
         when = "" if self.tick is None else f" in tick {self.tick}"
         return f"{start}{self.where}{when}: {self.what} ({self.place})"
+
+
+@contextmanager
+def in_tick(tick: int) -> Iterator[None]:
+    """What a user's own code does wrong in the block is done in this tick."""
+    try:
+        yield
+    except UserCodeError as error:
+        error.tick = tick
+        raise
 
 
 class _Step(NamedTuple):
