@@ -65,7 +65,7 @@ class WorldBrief:
     trust
         What is taken from agents.
     is_outside, positioned
-        Whether a driver flies the bodies, and who is to be told by it where he is, shape (N,).
+        Whether a driver flies the bodies, and of whom it has to say where he is, shape (N,).
     books
         How it writes that down.
     pace

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from netem.wire.intake import Intake
 from netem.wire.keys import Keys
 from netem.wire.sequence import Numbering
 from netem.wire.session import DRIVER, WORLD
+from world.books.kept import Kept
 from world.brief import WorldBrief
+from world.physics import sensors
 from world.physics.world import Scene
 from world.real_time import TooLate
 from world.robots import OnRobot, Robots
@@ -29,13 +31,20 @@ class DrivenWorld:
     ----------
     session, supervisor, brief
         Where, watched by whom, and of which swarm.
-    intake
-        What becomes of wrong messages.
+    intake, keep
+        What becomes of wrong messages; and who is told how the driver keeps its time, in a run in real time.
     """
 
-    def __init__(self, session: Session, supervisor: Supervisor, brief: WorldBrief, intake: Intake) -> None:
+    def __init__(
+        self,
+        session: Session,
+        supervisor: Supervisor,
+        brief: WorldBrief,
+        intake: Intake,
+        keep: Callable[[Kept], None],
+    ) -> None:
         keys, world = Keys(brief.run), brief.world
-        self._world, self._supervisor, self._intake = world, supervisor, intake
+        self._world, self._supervisor, self._intake, self._keep = world, supervisor, intake, keep
         self._pace, self._in_real_time = brief.pace, brief.pace is not None
         self._agents = range(1, world.links.agents + 1)
         self._reader = Robots(
@@ -59,7 +68,7 @@ class DrivenWorld:
     def begin(self) -> Scene:
         """The scene in tick 0, when there is news of all robots."""
         self._take_in(self._of_all(0))
-        return self._world.begin()._replace(position=self._position, measured=self._measured)
+        return self._world.begin()._replace(position=self._position, measured=np.full_like(self._measured, np.nan))
 
     def measure(self, tick: int, scene: Scene, now: Conditions) -> Array:
         """What was measured on the robots, shape (L, D), with sensors that fail; NaN where nothing was."""
@@ -77,7 +86,7 @@ class DrivenWorld:
         """The scene of the next tick: the driver is told what to fly, and says what comes of it."""
         self._command(tick, flown)
         self._take_in(self._since(tick + 1) if self._in_real_time else self._of_all(tick + 1))
-        return scene._replace(position=self._position, measured=measured)
+        return scene._replace(position=self._position, measured=sensors.last(scene.measured, measured))
 
     def end(self) -> None:
         """The run is over: everybody is to stand still."""
@@ -106,17 +115,21 @@ class DrivenWorld:
         """News that has come by now."""
         read = (self._intake.take(arrived, tick, (), self._reader) for arrived in self._ear.waiting())
         news = [said for said in read if said is not None]
-        self._heard |= {said.agent: tick for said in news}
-        self._refuse_the_silent(tick)
+        self._heard |= {said.agent: max(said.tick, self._heard[said.agent]) for said in news}
+        self._note_how_late(tick)
         return news
 
-    def _refuse_the_silent(self, tick: int) -> None:
+    def _note_how_late(self, tick: int) -> None:
+        """How long ago that was of which the last of the robots speaks."""
         assert self._pace is not None, "of a run in real time"
         agent = min(self._heard, key=self._heard.__getitem__)
-        silent = (tick - self._heard[agent]) * self._pace.dt / self._pace.factor
+        behind = tick - self._heard[agent]
+        silent = behind * self._pace.dt / self._pace.factor
+        self._keep(Kept(tick - 1, DRIVER, silent, int(behind > 0)))
         if silent > self._pace.late:
             raise TooLate(
-                f"the robot of agent {agent} has said nothing for {silent:.3f} s; time.real.late is {self._pace.late:g} s"
+                f"the robot of agent {agent} has said nothing of what is measured after tick {self._heard[agent]}, "
+                f"{silent:.3f} s ago; time.real.late is {self._pace.late:g} s"
             )
 
     def _take_in(self, news: Iterable[OnRobot]) -> None:

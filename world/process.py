@@ -59,7 +59,11 @@ class WorldNode:
     ) -> None:
         self._world, self._supervisor, self._archive, self._logbook = brief.world, supervisor, archive, logbook
         self._carrier, self._clock = _of_time(session, supervisor, brief, self._meanwhile)
-        self._outside = DrivenWorld(session, supervisor, brief, self._carrier.intake) if brief.is_outside else None
+        self._outside: DrivenWorld | None = None
+        if brief.is_outside:
+            self._outside = DrivenWorld(
+                session, supervisor, brief, self._carrier.intake, lambda kept: self._carrier.kept.append(kept)
+            )
         self._batch, self._later = brief.books.batch, later
         self._due = 0
         self._flown: dict[int, FlownTick[ProcessesActed]] = {}

@@ -23,7 +23,7 @@ from analysis.models.finding import Finding
 from netem.core.listing import listed
 from netem.faults.control import Answer
 from netem.wire.certificates import AUTHORITY
-from netem.wire.session import HUB, WORLD
+from netem.wire.session import DRIVER, HUB, WORLD
 
 if TYPE_CHECKING:
     from affinet.planning.designing import Designed
@@ -68,7 +68,8 @@ class Progress:
         self._first = self._first or (tick, now)
         elapsed = now - self._first[1]
         factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
-        self._bar.see(tick, f"{tick * self._dt:6.2f} s  error {error:.4f} m²  {factor}")
+        off = "" if math.isnan(error) else f"error {error:.4f} m²  "  # where nobody knows where agents are
+        self._bar.see(tick, f"{tick * self._dt:6.2f} s  {off}{factor}")
 
 
 class HuntProgress:
@@ -216,7 +217,8 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     table = Table(show_header=False, title=_titled(outcome))
     flown, messages = outcome.flown, outcome.messages
     errors = {name.replace("_", " "): (of, "m") for name, of in outcome.errors.items()}
-    errors = errors or {"tracking error": (outcome.tracking_error, "m²")}
+    if not errors and not plan.may_have_gaps:
+        errors = {"tracking error": (outcome.tracking_error, "m²")}
     rows = [
         ("estimator, law", f"{flown['estimator']}, {flown['law']}"),
         ("seed", f"{flown['seed']}"),
@@ -260,9 +262,9 @@ def _titled(outcome: Outcome) -> str:
 
 def _timing(timing: Timing) -> list[tuple[str, str]]:
     """How processes of a run in real time kept their time: the worst of the agents stands for them all."""
-    agents = {name: of for name, of in timing.lateness.items() if name not in (WORLD, HUB)}
+    agents = {name: of for name, of in timing.lateness.items() if name not in (WORLD, HUB, DRIVER)}
     worst = sorted(agents, key=lambda name: (agents[name].p99_ms, name))[-1:]
-    shown = [name for name in (WORLD, HUB, *worst) if name in timing.lateness]
+    shown = [name for name in (WORLD, HUB, DRIVER, *worst) if name in timing.lateness]
     missed = [f"{name} {of.missed}" for name, of in timing.lateness.items() if of.missed]
     rows = [
         ("late", "; ".join(f"{name} {_milliseconds(timing.lateness[name])}" for name in shown)),

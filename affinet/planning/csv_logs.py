@@ -21,6 +21,8 @@ from world.physics.world import World
 _AXES = "xyz"
 _POLAR = ("range", "bearing", "elevation")
 _ROUNDING = 1e-3  # of a tick: as exact as clocks of seconds since 1970 are in ticks of a millisecond
+LARGEST = 1e9  # m, m/s: what no robot is, or flies
+_LATEST, _TURN = 1e12, 2.0 * np.pi  # s, rad
 _WHO = ("time", "agent", "neighbour")
 
 
@@ -35,6 +37,7 @@ def read(path: Path, world: World) -> RecordedFlight:
         When it is no log of this formation's, or ends too early.
     """
     log = _Log(path, world)
+    log.refuse_what_is_misplaced()
     log.refuse_what_is_short()
     return RecordedFlight(log.measured(), log.position(), log.input())
 
@@ -62,6 +65,16 @@ class _Log:
         self._agent = self._numbers("agent")
         self._says_measured = ~np.isnan(self._columns["neighbour"])
 
+    def refuse_what_is_misplaced(self) -> None:
+        """Fail where a row says what is of rows of the other kind, and nobody would look at it."""
+        every = np.arange(len(self._tick))
+        own = np.concatenate([self._vectors(what, every) for what in ("input", "position")], axis=-1)
+        seen = np.concatenate([self._vectors("relative", every), self._polar(every)], axis=-1)
+        self._refuse_rows(
+            every, self._says_measured & _says_some(own), "input and position are of rows without neighbour"
+        )
+        self._refuse_rows(every, ~self._says_measured & _says_some(seen), "it measures, and names no neighbour")
+
     def refuse_what_is_short(self) -> None:
         """Fail where it ends before the run does."""
         has = float(self._tick[-1]) if len(self._tick) else 0.0
@@ -75,9 +88,9 @@ class _Log:
         measured = np.full((ticks, len(links), self._dimension), np.nan)
         rows = np.flatnonzero(self._says_measured)
         said, there = self._said(rows)
-        tick = np.ceil(self._tick[rows]).astype(np.int64)
-        kept = there & (tick < ticks)
-        place = (tick * len(links) + self._links(rows))[kept]
+        kept = there & (self._tick[rows] <= ticks - 1)
+        tick = np.ceil(self._tick[rows][kept]).astype(np.int64)
+        place = tick * len(links) + self._links(rows)[kept]
         _, last = np.unique(place[::-1], return_index=True)  # of those of a tick and link the last stays
         measured.reshape(-1, self._dimension)[place[::-1][last]] = said[kept][::-1][last]
         return measured
@@ -116,26 +129,28 @@ class _Log:
 
     def _said(self, rows: Integers) -> tuple[Array, Mask]:
         """y_ij = z_i - z_j of each row, shape (m, D), and which there are (000, eq. 7); logs say where neighbours are."""
-        relative, polar = self._vectors("relative", rows), self._polar(rows)
-        sensor = self._world.sensor
+        relative, polar, sensor = self._vectors("relative", rows), self._polar(rows), self._world.sensor
+        by_place, by_angle = _says_some(relative), _says_some(polar)
+        self._refuse_rows(rows, by_place & by_angle, "it measures a relative position twice: give one form of it")
+        needed = polar if sensor.says_positions else polar[:, 1:]
+        is_half = (by_place & ~_says_all(relative)) | (by_angle & ~_says_all(needed))
+        self._refuse_rows(
+            rows, np.asarray(is_half), "it measures half of a relative position: give all of it, or nothing"
+        )
+        self._refuse_rows(rows, polar[:, 0] < 0.0, "it measures a range below 0")
+        beyond = np.asarray((np.abs(polar[:, 1:]) > _TURN).any(axis=-1))
+        self._refuse_rows(rows, beyond, "an angle of more than a turn: give rad")
         if not sensor.says_positions:
-            polar = polar.copy()
-            polar[:, 0] = 1.0
-            relative = relative / np.linalg.norm(relative, axis=-1, keepdims=True)
-        by_angle = sensor.of_polar(polar)
-        there = np.asarray(~np.isnan(relative).any(axis=-1))
-        said = -np.where(there[:, None], relative, by_angle)
-        unsaid = np.asarray(np.isnan(said).any(axis=-1))
-        is_half = np.asarray(unsaid & ~np.isnan(self._all_of(rows)).all(axis=-1))
-        self._refuse_rows(rows, is_half, "it measures half of a relative position: give all of it, or nothing")
-        return said, ~unsaid
+            length = np.linalg.norm(relative, axis=-1, keepdims=True)
+            self._refuse_rows(
+                rows, length[:, 0] == 0.0, "it measures no direction: the neighbour is where the agent is"
+            )
+            relative, polar = relative / length, np.concatenate([np.ones_like(polar[:, :1]), needed], axis=-1)
+        return -np.where(by_place[:, None], relative, sensor.of_polar(polar)), by_place | by_angle
 
     def _polar(self, rows: Integers) -> Array:
         columns = [self._columns[name][rows] for name in _POLAR[: self._dimension]]
         return np.stack(columns, axis=-1)
-
-    def _all_of(self, rows: Integers) -> Array:
-        return np.concatenate([self._vectors("relative", rows), self._polar(rows)], axis=-1)
 
     def _links(self, rows: Integers) -> Integers:
         index, neighbour = self._world.links.index, self._numbers("neighbour", rows)
@@ -148,11 +163,10 @@ class _Log:
         """Of each agent that says it, in which ticks, shape (m,), and what, shape (m, D)."""
         rows = np.flatnonzero(~self._says_measured)
         said = self._vectors(what, rows)
-        empty = np.isnan(said)
-        is_half = np.asarray(empty.any(axis=-1) & ~empty.all(axis=-1))
-        self._refuse_rows(rows, is_half, f"it says half of {what}: give all, or nothing")
+        whole = _says_all(said)
+        self._refuse_rows(rows, _says_some(said) & ~whole, f"it says half of {what}: give all, or nothing")
         for agent in range(1, self._world.links.agents + 1):
-            own = (self._agent[rows] == agent) & ~empty.any(axis=-1)
+            own = (self._agent[rows] == agent) & whole
             if own.any():
                 yield agent, self._tick[rows[own]], said[own]
 
@@ -183,6 +197,16 @@ def _whole(ticks: Array) -> Array:
     return np.where(np.abs(ticks - nearest) <= _ROUNDING, nearest, ticks)
 
 
+def _says_some(cells: Array) -> Mask:
+    """Rows (m,) in which not all cells (m, n) are empty."""
+    return np.asarray(~np.isnan(cells).all(axis=-1))
+
+
+def _says_all(cells: Array) -> Mask:
+    """Rows (m,) in which no cell (m, n) is empty."""
+    return np.asarray(~np.isnan(cells).any(axis=-1))
+
+
 def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     """The columns of a file by name, of numbers, NaN in empty cells; those that it has not are empty."""
     import pyarrow as pa  # it takes a while to import
@@ -193,7 +217,7 @@ def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     )
     try:
         table = csv.read_csv(path, convert_options=options)
-    except pa.ArrowInvalid as error:
+    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: no CSV file of numbers: {' '.join(str(error).split())}") from error
     if strange := [name for name in table.column_names if name not in known]:
         raise ValueError(f"{path}: no column {strange[0]!r} in such a log; {among(strange[0], known)}")
@@ -205,8 +229,8 @@ def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     columns: dict[str, Any] = dict.fromkeys(known, nothing)
     for name in table.column_names:
         columns[name] = table[name].fill_null(np.nan).to_numpy()
-    if infinite := [name for name, column in columns.items() if np.isinf(column).any()]:
-        raise ValueError(
-            f"{path}: {infinite[0]} is infinite in line {int(np.argmax(np.isinf(columns[infinite[0]]))) + 2}"
-        )
+    for name, column in columns.items():
+        if (beyond := np.abs(column) > (_LATEST if name == "time" else LARGEST)).any():
+            line = int(np.argmax(beyond)) + 2
+            raise ValueError(f"{path}: line {line}: {name} is {column[line - 2]:g}, which no robot can say")
     return columns

@@ -155,6 +155,9 @@ def _make(given: Scenario) -> Plan:
         network.degraded(given, formation, world.links, bits, *named, _ruled(played.faults, number, world.links))
         for number, named in enumerate(played.profiles, start=1)
     ]
+    profiles = (own, *(profile for profile, _ in degraded))
+    outside.refuse_unknown_places(world, profiles, played.triggers)
+    findings += outside.gaps(world)
     found = [*findings, *aired, *(note for _, said in degraded for note in said)]
     found += checks.timeline(played.faults, given.time.ticks, given.time.dt)
     found += [] if given.target is None else checks.detections(given.target, given.time.ticks * given.time.dt)
@@ -163,7 +166,7 @@ def _make(given: Scenario) -> Plan:
     plan = Plan(
         scenario=given,
         world=world,
-        profiles=(own, *(profile for profile, _ in degraded)),
+        profiles=profiles,
         faults=played.faults,
         triggers=played.triggers,
         channels=names,

@@ -137,6 +137,12 @@ class Plan:
         return self.scenario.world != "simulated"
 
     @property
+    def located(self) -> Mask:
+        """Agents of whom it has to be known where they are, shape (N,): also for who is lost by distance, and what waits."""
+        by_place = any(profile.spatial for profile in self.profiles) or bool(self.triggers)
+        return self.positioned | by_place
+
+    @property
     def knows_positions(self) -> bool:
         """Whether somebody may be told where he is: all but in a recorded flight without a reference."""
         return self.world.flight is None or self.world.flight.has_reference

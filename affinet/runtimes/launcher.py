@@ -302,7 +302,7 @@ class Launcher:
             limit=self._plan.scenario.agents.limit,
             trust=self._trust,
             is_outside=self._plan.scenario.external is not None,
-            positioned=self._plan.positioned,
+            positioned=self._plan.located,
             books=self._plan.books(self._viewer),
             pace=self._plan.pace,
         )
@@ -334,7 +334,7 @@ class Launcher:
 
     def _driver_brief(self, login: Login) -> DriverBrief:
         plan = self._plan
-        return DriverBrief.of(self._run, login, plan.world, plan.positioned, plan.pace)
+        return DriverBrief.of(self._run, login, plan.world, plan.located, plan.pace)
 
     def _centre_brief(self, login: Login) -> CentreBrief:
         return CentreBrief(self._run, login, self._plan.estimator, self._plan.swarm, self._trust)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from affinet.scenario.words import among
-from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
+from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, places_known, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
 from analysis.metrics import consistency, localization
@@ -192,8 +192,12 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
                 name, "vacuous", None, f"edges were estimated in {len(ticks)} ticks, and {least} are needed"
             )
         if not np.isfinite(mean[ticks]).all():
-            tick = int(np.argmin(np.isfinite(mean[ticks])))
-            return CheckResult(name, "fail", span.start + int(ticks[tick]), "the NEES is not a number any more")
+            tick = span.start + int(ticks[int(np.argmin(np.isfinite(mean[ticks])))])
+            if not places_known(evidence, tick):
+                return CheckResult(
+                    name, "vacuous", None, "it is not known where agents are, and so not how far off they are"
+                )
+            return CheckResult(name, "fail", tick, "the NEES is not a number any more")
         series, dimension = mean[ticks], evidence.plan.world.formation.dimension
         found = consistency.averaged(series, level)
         says = f"mean NEES {found.mean:.3g} +- {found.half:.2g} for {dimension} dimensions"

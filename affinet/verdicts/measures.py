@@ -36,19 +36,23 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
     are from their places about the target, `target_error` how far the target is from where they steer for: root mean squares.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        if plan.may_have_gaps:
-            off = np.concatenate([_edge_error(plan.world, span) for span in by_span(arrays)])
-            return {"edge_error": figures(off[~np.isnan(off)])}
+        by_edge = _edge_errors(plan.world, arrays) if plan.may_have_gaps else {}
         if channels.PLACE in plan.reports:
             known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
             off = localization.distance(arrays[channels.PLACE], known.edges())
-            return {"localization_error": figures(off[~np.isnan(off)])}
+            return by_edge | {"localization_error": figures(off[~np.isnan(off)])}
         if plan.world.pursuit is not None and reported(plan.reports):
             target = arrays["target"] - plan.world.formation.nominal
             off = arrays["reference"][:, :, 0] - target
             missed = root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
-            return {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
-    return {}
+            return by_edge | {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
+    return by_edge
+
+
+def _edge_errors(world: World, arrays: Arrays) -> dict[str, Figures]:
+    off = np.concatenate([_edge_error(world, span) for span in by_span(arrays)])
+    there = off[~np.isnan(off)]
+    return {"edge_error": figures(there)} if len(there) else {}
 
 
 def _edge_error(world: World, span: Arrays) -> Array:

@@ -279,6 +279,8 @@ def _untracked(plan: Plan, arrays: Arrays | None) -> list[str]:
     if arrays is None or not len(arrays["error"]):
         return ["no tick was flown: it proved nothing"]
     ticks, nobody = len(arrays["error"]), int(np.isnan(arrays["error"]).sum())
+    if _all(arrays, lambda span: span["verdicts"][:, 0] == Verdict.SILENT):
+        return ["nothing was measured in any tick: it proved nothing"]
     if nobody and not plan.may_have_gaps:
         return [f"nobody took part in {nobody} of {ticks} ticks: there is no tracking error, and it proved nothing"]
     if _all(arrays, lambda span: span["verdicts"][:, 1:] == Verdict.SILENT):

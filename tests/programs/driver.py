@@ -46,7 +46,7 @@ def wronged(said, wrong):
         "infinite": lambda: said | {"position": np.array([np.inf, 0.0]).tobytes()},
         "no position": lambda: said | {"position": None},
     }
-    made = by_name[wrong]()
+    made = by_name.get(wrong, lambda: said)()
     return made if isinstance(made, bytes) else msgpack.packb(made)
 
 
@@ -74,6 +74,10 @@ class Driver:
                 "measured": (-measured[rows]).tobytes(),
                 "position": position[agent - 1].tobytes(),
             }
+            if self.wrong == "nobody but leaders says where it is" and agent > 3:
+                said["position"] = None
+            if self.wrong == "stuck":
+                said["k"] = min(tick, TICK - 1)
             strikes = self.wrong and (agent, tick) == (NUMBER, TICK)
             if self.wrong == "robot 2 is quiet" and agent == NUMBER and tick >= TICK:
                 continue
@@ -85,9 +89,7 @@ class Driver:
             if strikes and self.wrong == "two at once":
                 self.voices[agent].say(msgpack.packb(said))
                 said |= {"seq": tick + 1}
-            self.voices[agent].say(
-                wronged(said, self.wrong) if strikes and self.wrong != "two at once" else msgpack.packb(said)
-            )
+            self.voices[agent].say(wronged(said, self.wrong) if strikes else msgpack.packb(said))
 
     def commanded(self):
         said = [msgpack.unpackb(self.ear.next().data) for _ in self.agents]

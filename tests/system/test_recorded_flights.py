@@ -16,6 +16,8 @@ from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
+from affinet.verdicts.checkers import bounded, collision_free, consistent
+from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome
 from netem.medium.verdict import Verdict
 from world.books import history
@@ -134,8 +136,105 @@ def test_without_a_reference_there_is_no_error(rows: list[Row], tmp_path: Path, 
     outcome, arrays = flown(tmp_path / "run", *recorded(log), "record.enabled=true", runtime=runtime)
     assert outcome.verdict == "pass"
     assert np.isnan(arrays["position"]).all()
-    assert outcome.errors["edge_error"]["mean"] is None
+    assert not outcome.errors
     assert arrays["known"].any()
+    evidence = Evidence(making.make(loading.load("corridor", [*SHORT, *recorded(log)])), arrays, outcome)
+    for checker in (bounded(1.0), collision_free(0.1), consistent()):
+        assert checker(evidence).verdict == "vacuous", checker(evidence)
+
+
+@pytest.mark.parametrize(
+    ("by_place", "says"),
+    [
+        ("network.zones=[{centre=[0.0,0.0],radius=1.0,share=1.0}]", "network: .*need a reference"),
+        ('timeline=[{verb="cut",links=["1-2"],when={tracking_error_below=0.01},lasts=0.1}]', "timeline: .*needs a ref"),
+    ],
+)
+def test_without_a_reference_nothing_goes_by_places(rows: list[Row], tmp_path: Path, by_place: str, says: str) -> None:
+    log = logs.written(tmp_path / "log.csv", list(map(logs.without("position"), rows)))
+    with pytest.raises(ScenarioError, match=says):
+        making.make(loading.load("corridor", [*SHORT, *recorded(log), by_place]))
+    assert making.make(loading.load("corridor", [*SHORT, *recorded(logs.written(log, rows)), by_place]))
+
+
+def test_a_sensor_that_freezes_in_a_gap_repeats_what_it_said_last(rows: list[Row], tmp_path: Path) -> None:
+    def is_kept(row: Row) -> bool:
+        return "neighbour" not in row or round(row["time"] / 0.01) % 5 == 0
+
+    log = logs.written(tmp_path / "log.csv", [row for row in rows if is_kept(row)])
+    freeze = 'timeline=[{verb="freeze",links=["1->4"],at=0.13,lasts=0.1}]'
+    _, arrays = flown(tmp_path / "run", *recorded(log), freeze)
+    link = making.make(loading.load("corridor")).world.links.index[1, 4]
+    said = arrays["measured"][:, link]
+    np.testing.assert_array_equal(said[13:23], np.broadcast_to(said[10], (10, 2)))
+    assert np.isnan(said[[11, 12, 23, 24]]).all()
+    assert not np.isnan(said[[10, 25]]).any()
+
+
+def test_a_flight_in_which_nothing_is_measured_proves_nothing(rows: list[Row], tmp_path: Path) -> None:
+    log = logs.written(tmp_path / "log.csv", [row for row in rows if "neighbour" not in row])
+    outcome, _ = flown(tmp_path / "run", *recorded(log))
+    assert (outcome.verdict, outcome.reasons) == ("vacuous", ("nothing was measured in any tick: it proved nothing",))
+    plan = making.make(loading.load("corridor", [*SHORT, *recorded(log)]))
+    assert [one.says for one in plan.findings if one.check == "recorded"] == [
+        "100.0% of the measurements of 50 ticks are gaps: nothing is measured there"
+    ]
+
+
+def test_what_is_said_after_the_run_changes_nothing(before: Path, rows: list[Row], tmp_path: Path) -> None:
+    late = {"time": 1e11, "agent": 4, "neighbour": 1, "relative_x": 77.0, "relative_y": 77.0}
+    outcome, _ = flown(tmp_path / "run", *recorded(logs.written(tmp_path / "log.csv", [*rows, late])))
+    assert outcome.digest == digest_of(before)
+
+
+def test_localization_keeps_its_own_error(tmp_path: Path) -> None:
+    out = tmp_path / "localized"
+    was, _ = flown(out, scenario="localization")
+    again, _ = flown(tmp_path / "again", *recorded(out), scenario="localization")
+    assert again.errors["localization_error"] == was.errors["localization_error"]
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "says"),
+    [
+        ("measured", lambda array: array[:, :10], "where (24, 2) are due"),
+        ("position", lambda array: array[:, :3], "where (7, 2) are due"),
+        ("input", lambda array: array[..., :1], "where (7, 2) are due"),
+        ("input", lambda array: array * np.nan, "no robot can have"),
+        ("position", lambda array: array + np.inf, "no robot can have"),
+        ("measured", lambda array: array.astype(np.float32), "float32"),
+    ],
+)
+def test_a_run_directory_that_was_changed_is_refused(
+    before: Path, tmp_path: Path, file: str, change: Callable[[np.ndarray], np.ndarray], says: str
+) -> None:
+    place = Path(shutil.copytree(before, tmp_path / "copy")) / "arrays" / f"{file}.npy"
+    np.save(place, change(np.load(place)))
+    with pytest.raises(ScenarioError) as refused:
+        making.make(loading.load("corridor", [*SHORT, *recorded(tmp_path / "copy")]))
+    assert says in str(refused.value)
+    assert str(place) in str(refused.value)
+
+
+@pytest.mark.parametrize("garbage", [b"", b"no array", b"\x93NUMPY\x01\x00v\x00{{{" + b" " * 110])
+def test_a_run_directory_that_is_damaged_is_refused(before: Path, tmp_path: Path, garbage: bytes) -> None:
+    place = Path(shutil.copytree(before, tmp_path / "copy")) / "arrays" / "measured.npy"
+    place.write_bytes(garbage)
+    with pytest.raises(ScenarioError, match=r"measured\.npy: not what a run wrote there"):
+        making.make(loading.load("corridor", [*SHORT, *recorded(tmp_path / "copy")]))
+
+
+def test_a_run_of_another_kind_of_sensor_is_refused(before: Path) -> None:
+    polar = ["sensing.sigma_range=0.1", "sensing.sigma_bearing=0.01", "agents.estimator=rkf"]
+    with pytest.raises(ScenarioError, match="set sensing alike"):
+        making.make(loading.load("corridor", [*SHORT, *recorded(before), *polar]))
+
+
+def test_a_direction_to_where_one_is_is_refused(rows: list[Row], tmp_path: Path) -> None:
+    log = logs.written(tmp_path / "log.csv", _changed(_MEASURES, relative_x=0.0, relative_y=0.0)(rows))
+    directions = ["sensing.sigma_direction=0.05", "agents.estimator=edge-kf"]
+    with pytest.raises(ScenarioError, match="line 9: it measures no direction"):
+        making.make(loading.load("corridor", [*SHORT, *recorded(log), *directions]))
 
 
 def test_the_error_is_held_against_the_reference(rows: list[Row], tmp_path: Path) -> None:
@@ -191,7 +290,16 @@ _MEASURES = 7  # the first row with a neighbour
         (_changed(_MEASURES, relative_x="", relative_y="", range=1.0), "half of a relative position"),
         (_changed(0, input_x=""), "half of input"),
         (_changed(_MEASURES, relative_x="abc"), "no CSV file of numbers"),
-        (_changed(_MEASURES, relative_x="inf"), "relative_x is infinite in line 9"),
+        (_changed(_MEASURES, relative_x="inf"), "line 9: relative_x is inf, which no robot can say"),
+        (_changed(_MEASURES, relative_x=1e300), "line 9: relative_x is 1e.300, which no robot can say"),
+        (
+            _changed(_MEASURES, relative_x="", relative_y="", range=-1.0, bearing=0.5),
+            "line 9: it measures a range below 0",
+        ),
+        (_changed(_MEASURES, relative_x="", relative_y="", range=1.0, bearing=90.0), "more than a turn: give rad"),
+        (_changed(_MEASURES, range=1.0, bearing=0.5), "a relative position twice"),
+        (_changed(_MEASURES, input_x=1.0, input_y=1.0), "of rows without neighbour"),
+        (_changed(0, relative_x=1.0, relative_y=1.0), "names no neighbour"),
         (_changed(0, relativ_x=1.0), "no column 'relativ_x' in such a log; did you mean"),
         (lambda rows: list(map(logs.without("agent"), rows)), "it has no column 'agent'"),
         (lambda rows: rows[:200], "it ends after"),

@@ -95,7 +95,37 @@ def test_a_robot_that_is_silent_in_real_time_fails_the_run_by_name(out):
     real = ['time.mode="real"', "time.real.late=0.5", "time.real.factor=0.5", "time.duration=5.0"]
     outcome, _ = flown(driven(*real, wrong="robot 2 is quiet"), out)
     assert outcome.verdict == "fail"
-    assert any("the robot of agent 2 has said nothing for" in reason for reason in outcome.reasons), outcome.reasons
+    assert any(
+        "the robot of agent 2 has said nothing of what is measured after tick 2" in reason for reason in outcome.reasons
+    ), outcome.reasons
+
+
+def test_a_driver_that_repeats_what_is_old_is_late_and_fails_the_run(out):
+    real = ['time.mode="real"', "time.real.late=0.5", "time.real.factor=0.5", "time.duration=5.0"]
+    outcome, _ = flown(driven(*real, wrong="stuck"), out)
+    assert outcome.verdict == "fail"
+    assert any("said nothing of what is measured after tick 2" in reason for reason in outcome.reasons), outcome.reasons
+    assert outcome.timing.lateness["driver"].missed > 1
+
+
+@pytest.mark.parametrize(
+    "by_place",
+    [
+        "network.zones=[{centre=[0.0,0.0],radius=1.0,share=1.0}]",
+        'timeline=[{verb="cut",links=["1-2"],when={tracking_error_below=0.01},lasts=0.1}]',
+    ],
+)
+def test_what_goes_by_places_makes_every_robot_say_where_it_is(by_place, out):
+    outcome, _ = flown(driven(by_place, wrong="nobody but leaders says where it is"), out)
+    assert outcome.verdict == "fail"
+    assert any("agent 4" in reason and "position" in reason for reason in outcome.reasons), outcome.reasons
+
+
+def test_followers_need_not_say_where_they_are(out):
+    outcome, arrays = flown(driven(wrong="nobody but leaders says where it is"), out)
+    assert outcome.verdict == "pass", outcome.reasons
+    assert np.isnan(arrays["position"][:, 3:]).all()
+    assert not np.isnan(arrays["position"][:, :3]).any()
 
 
 def example(*overrides):
@@ -120,6 +150,7 @@ def test_the_example_flies_in_real_time(out):
     assert outcome.verdict == "pass", outcome.reasons
     assert not np.isnan(arrays["position"]).any()
     assert outcome.timing is not None
+    assert outcome.timing.lateness["driver"].moments == outcome.ticks
     assert np.linalg.norm(arrays["position"][-1] - arrays["target"][-1], axis=-1).max() < 1.0
 
 

@@ -304,7 +304,7 @@ def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = Fa
         When they are not whole, or not those of a run any more.
     """
     files = [file for file in sorted(folder.iterdir()) if file.suffix == growing.ENDING]
-    arrays = {unquote(file.stem): _of(file, mapped=mapped) for file in files}
+    arrays = {unquote(file.stem): read(file, mapped=mapped) for file in files}
     try:
         whole = _up_to_the_last_tick(arrays)
         _refuse_other_forms(whole)
@@ -313,7 +313,14 @@ def load(folder: Path, only: Collection[str] | None = None, *, mapped: bool = Fa
     return whole if only is None else {name: whole[name] for name in only}
 
 
-def _of(file: Path, *, mapped: bool) -> NDArray[Any]:
+def read(file: Path, *, mapped: bool = False) -> NDArray[Any]:
+    """One array of a run.
+
+    Raises
+    ------
+    Damaged
+        When it is not there, or not whole.
+    """
     try:
         return growing.read(file, mapped=mapped)
     except _UNREADABLE as error:

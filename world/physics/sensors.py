@@ -37,6 +37,11 @@ def stray(draw: Array, now: Conditions) -> Mask:
     return draw < now.outlier
 
 
+def last(before: Array, measured: Array) -> Array:
+    """What was measured last, shape (L, D), where what is measured now has gaps, of NaN."""
+    return np.where(np.isnan(measured), before, measured)
+
+
 def astray(measured: Array, before: Array, struck: Mask, standard: Array, now: Conditions) -> Array:
     """What failing sensors say, shape (L, D), in metres.
 

@@ -33,7 +33,7 @@ class Scene(NamedTuple):
     position, motion, pose
         Of the agents, as `bodies.Motion` has them: shape (N, D), in metres, derivatives (N, K, D), and what else (N, S).
     measured
-        What was measured in the tick before, shape (L, D), in metres.
+        What was measured last, shape (L, D), in metres: in the tick before, but for gaps; NaN where nothing ever was.
     disturbance
         What displaced them from the tick before, shape (N, D), in metres.
     chase
@@ -128,6 +128,8 @@ class World:
         still, rest = np.zeros_like(position), self._body.rest(position)
         chase = None if self.pursuit is None else self.pursuit.begin(self.swarms, self.formation.agents)
         seen = self.sensor.exact(sensors.relative(position, self.links))
+        if self.flight is not None:  # no sensor has said anything yet
+            seen = np.full_like(seen, np.nan)
         return Scene(position, rest.derivatives, seen, still, chase, rest.pose)
 
     def target(self, tick: int | Integers) -> Array:
@@ -186,7 +188,9 @@ class World:
     def step(self, tick: int, scene: Scene, measured: Array, flown: Array, now: Conditions) -> Scene:
         """The scene of the next tick, after what was measured and flown in this one."""
         if self.flight is not None:
-            return scene._replace(position=self.flight.position[tick + 1], measured=measured)
+            return scene._replace(
+                position=self.flight.position[tick + 1], measured=sensors.last(scene.measured, measured)
+            )
         noise, chase = self._disturb(tick, scene), scene.chase
         moved = self._body.moved(scene.bodies, flown, now.push, self.dt)
         position, motion, pose = moved.position + noise, moved.derivatives, moved.pose
