@@ -189,7 +189,7 @@ def _unread(run: Run, done: Kill, flown_s: float | None) -> list[str]:
     summary = run.out / "summary.json"
     flew = summary.exists() and json.loads(summary.read_text())["wall_s"] > 0.0
     try:
-        ticks = left.ticks(run.out)
+        ticks = left.ticks(run.out, was_ended=done.role != "everybody")
     except Unreadable as error:
         return [f"unreadable: {error}"]
     done.ticks, done.recorded = ticks.get(left.BOOK, 0), left.SEEN in ticks

@@ -28,24 +28,32 @@ class Unreadable(RuntimeError):
     """Something of it cannot be read: what, and why."""
 
 
-def ticks(out: Path) -> dict[str, int]:
+def ticks(out: Path, *, was_ended: bool) -> dict[str, int]:
     """By what it left, how many ticks there are of it; nothing of what it had not begun.
+
+    Parameters
+    ----------
+    out
+        The run directory.
+    was_ended
+        Whether somebody was alive to end the recording: one that was not is read with a warning.
 
     Raises
     ------
     Unreadable
         When it has begun something that cannot be read.
     """
-    return {what: _read(what, reads, out / file) for what, (file, reads) in _LEFT.items() if _has_begun(out / file)}
+    begun = {what: (reads, out / file) for what, (file, reads) in _LEFT.items() if _has_begun(out / file)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error" if was_ended else "ignore")
+        return {what: _read(what, reads, path) for what, (reads, path) in begun.items()}
 
 
 def _read(what: str, reads: Callable[[Path], int], path: Path) -> int:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # a recording that was never ended is read with a warning
-        try:
-            return reads(path)
-        except (journal.JournalError, arrow.TableError, history.Damaged, RuntimeError, ValueError, Warning) as error:
-            raise Unreadable(f"{what}: {error}") from error
+    try:
+        return reads(path)
+    except (journal.JournalError, arrow.TableError, history.Damaged, RuntimeError, ValueError, Warning) as error:
+        raise Unreadable(f"{what}: {error}") from error
 
 
 def _has_begun(path: Path) -> bool:

@@ -160,7 +160,9 @@ def over_namespaces(scenario: str) -> Iterator[OverNamespaces]:
     with tempfile.TemporaryDirectory(prefix="kills-") as folder:
         keys = Path(folder) / "keys"
         addresses = [Network((HERE, THERE)).address(name) for name in (HERE, THERE)]
-        subprocess.run([_AFFINET, "keys", str(keys), "--agents", "7", "--hub", *addresses], check=True, capture_output=True)
+        subprocess.run(
+            [_AFFINET, "keys", str(keys), "--agents", "7", "--hub", *addresses], check=True, capture_output=True
+        )
         yield OverNamespaces(scenario, keys)
 
 

@@ -1,0 +1,86 @@
+"""Tables that a process writes on another machine, brought here while they grow.
+
+So what is lost is the last second of them, whichever machine dies, and not all of what was written there.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from affinet.runtimes.machines import joining
+from affinet.runtimes.machines.coordinator import Coordinator
+from affinet.runtimes.machines.joining import Asked, Listing, Part
+from netem.processes import system_errors
+from netem.wire.carrier import NotCarried
+from netem.wire.wrong import WireError
+
+_EVERY_S, _ANSWERED_WITHIN_S = 0.25, 1.0
+_Ask = Callable[[Asked], bytes]
+
+
+class Bringing:
+    """Brings them from its start on, until it is finished.
+
+    Parameters
+    ----------
+    coordinator, name
+        Who knows where the process is, and what it is called; nothing is brought of one that is here.
+    to
+        The folder to bring them to.
+    """
+
+    def __init__(self, coordinator: Coordinator, name: str, to: Path) -> None:
+        self._coordinator, self._name, self._to = coordinator, name, to
+        self._sizes: dict[str, int] = {}
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+
+    def start(self) -> None:
+        """Bring from now on, in a thread, what there is."""
+        self._thread.start()
+
+    def finish(self) -> None:
+        """Bring what is left; whoever wrote it has ended.
+
+        Raises
+        ------
+        RunFailed
+            When its machine does not answer.
+        OSError
+            When it cannot be written here.
+        """
+        self._over.set()
+        self._thread.join()
+        if self._is_elsewhere:
+            self._bring(lambda what: self._coordinator.asked_for(self._name, what))
+
+    @property
+    def _is_elsewhere(self) -> bool:
+        """Whether it has been started on another machine."""
+        seat = self._coordinator.seats.get(self._name)
+        return seat is not None and seat.process is not None
+
+    def _follow(self) -> None:
+        def ask(what: Asked) -> bytes:
+            return self._coordinator.ask(self._name, what, _ANSWERED_WITHIN_S)
+
+        while not self._over.wait(_EVERY_S):
+            with suppress(NotCarried, WireError, OSError):  # tried again, and told at the end
+                if self._is_elsewhere:
+                    self._bring(ask)
+
+    def _bring(self, ask: _Ask) -> None:
+        listed: dict[str, int] = joining.unpack(dict[str, int], ask(Listing(ending=joining.TABLE)))
+        for name, size in listed.items():
+            while self._sizes.get(name, 0) < size and (part := ask(Part(name=name, start=self._sizes.get(name, 0)))):
+                self._keep(Path(name).name, part)
+
+    def _keep(self, name: str, part: bytes) -> None:
+        path, start = self._to / name, self._sizes.get(name, 0)
+        with system_errors.about(path), path.open("r+b" if start else "wb") as file:
+            file.seek(start)
+            file.write(part)
+        self._sizes[name] = start + len(part)
