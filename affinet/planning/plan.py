@@ -30,7 +30,7 @@ from world.brief import RecordOptions
 from world.physics.world import World
 
 _MOST_OF_A_BATCH = 50
-_HALF_A_SECOND = 0.5
+_BATCH_S, _BATCH_IN_REAL_TIME_S = 1.0, 0.3
 
 
 class PlanError(ValueError):
@@ -106,7 +106,7 @@ class Plan:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
         # Who is killed has lost a batch, and in real time what a thread was still to write, or another machine to give.
-        seconds = 1.0 if self.pace is None else _HALF_A_SECOND * min(1.0, self.pace.factor)
+        seconds = _BATCH_S if self.pace is None else _BATCH_IN_REAL_TIME_S * min(1.0, self.pace.factor)
         batch = min(_MOST_OF_A_BATCH, max(1, int(seconds / self.world.dt)))
         return RecordOptions(record.every, batch, self.window, record.enabled, viewer)
 
