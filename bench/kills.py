@@ -194,7 +194,9 @@ def _unread(run: Run, done: Kill, flown_s: float | None) -> list[str]:
         return [f"unreadable: {error}"]
     done.ticks, done.recorded = ticks.get(left.BOOK, 0), left.SEEN in ticks
     if flown_s is not None:
-        return _behind(run, done, ticks, flown_s)
+        done.behind_s = flown_s - DT_S * min(ticks.values(), default=0)
+        late_s = left.late_s(run.out) if left.KEPT in ticks else 0.0
+        return left.too_short(ticks, flown_s, late_s, DT_S)
     wrong = []
     if not done.recorded and (flew or done.ticks):
         wrong.append("it flew, and there is no recording")
@@ -204,19 +206,6 @@ def _unread(run: Run, done: Kill, flown_s: float | None) -> list[str]:
         f"{done.ticks} ticks in the journal, and {ticks.get(what, 0)} in the {what}"
         for what in (left.ARRAYS, left.DRAWN)
         if abs(ticks.get(what, 0) - done.ticks) > _A_SECOND
-    ]
-
-
-def _behind(run: Run, done: Kill, ticks: Mapping[str, int], flown_s: float) -> list[str]:
-    if missing := left.ALL - ticks.keys():
-        return [f"it flew for {flown_s:.2f} s, and left no {', '.join(sorted(missing))}"]
-    behind = {what: flown_s - DT_S * of_it for what, of_it in ticks.items()}
-    done.behind_s = max(behind.values())
-    late_s = left.late_s(run.out)
-    return [
-        f"it flew for {flown_s:.2f} s, {late_s:.2f} s late at most, and the {what} ends {seconds:.2f} s before that"
-        for what, seconds in behind.items()
-        if seconds > 1.0 + late_s
     ]
 
 

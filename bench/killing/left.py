@@ -97,6 +97,28 @@ def late_s(out: Path) -> float:
     return float(kept["late_s"].to_numpy()[of_world].max(initial=0.0))
 
 
+def too_short(ticks: Mapping[str, int], flown_s: float, late_s: float, dt_s: float) -> list[str]:
+    """What is missing of a run in real time that was flown for so long, or ends more than a second before that.
+
+    Parameters
+    ----------
+    ticks
+        How many there are, by what it left.
+    flown_s, late_s
+        For how long it was flown by the clock, and how late it may have been, in seconds.
+    dt_s
+        A tick.
+    """
+    if missing := _LEFT.keys() - ticks.keys():
+        return [f"it flew for {flown_s:.2f} s, and left no {', '.join(sorted(missing))}"]
+    behind = {what: flown_s - dt_s * of_it for what, of_it in ticks.items()}
+    return [
+        f"it flew for {flown_s:.2f} s, {late_s:.2f} s late at most, and the {what} ends {seconds:.2f} s before that"
+        for what, seconds in behind.items()
+        if seconds > 1.0 + late_s
+    ]
+
+
 _LEFT: Mapping[str, tuple[str, Callable[[Path], int]]] = {
     BOOK: (JOURNAL, _journal),
     ARRAYS: (history.ARRAYS, _arrays),
@@ -105,4 +127,3 @@ _LEFT: Mapping[str, tuple[str, Callable[[Path], int]]] = {
     KEPT: (timing.FILE, _timing),
     DELIVERED: (deliveries.FILE, _deliveries),
 }
-ALL = frozenset(_LEFT)  # of a run in real time

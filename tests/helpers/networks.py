@@ -12,10 +12,15 @@ from killing.network import Network
 @contextmanager
 def network(*names):
     """A network of machines; the test is skipped where there can be none."""
-    if (why := _why_not()) is not None:
-        pytest.skip(f"no network namespaces here: {why}")
+    skip_without()
     with Network(names) as machines:
         yield machines
+
+
+def skip_without():
+    """Skip the test where there can be no network namespaces."""
+    if (why := _why_not()) is not None:
+        pytest.skip(f"no network namespaces here: {why}")
 
 
 @cache

@@ -6,6 +6,7 @@ So what is lost is the last second of them, whichever machine dies, and not all 
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -34,7 +35,7 @@ class Bringing:
 
     def __init__(self, coordinator: Coordinator, name: str, to: Path) -> None:
         self._coordinator, self._name, self._to = coordinator, name, to
-        self._sizes: dict[str, int] = {}
+        self._had: Counter[Path] = Counter()  # bytes of each
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
@@ -75,12 +76,13 @@ class Bringing:
     def _bring(self, ask: _Ask) -> None:
         listed: dict[str, int] = joining.unpack(dict[str, int], ask(Listing(ending=joining.TABLE)))
         for name, size in listed.items():
-            while self._sizes.get(name, 0) < size and (part := ask(Part(name=name, start=self._sizes.get(name, 0)))):
-                self._keep(Path(name).name, part)
+            path = self._to / Path(name).name
+            while self._had[path] < size and (part := ask(Part(name=name, start=self._had[path]))):
+                self._keep(path, part)
 
-    def _keep(self, name: str, part: bytes) -> None:
-        path, start = self._to / name, self._sizes.get(name, 0)
+    def _keep(self, path: Path, part: bytes) -> None:
+        start = self._had[path]
         with system_errors.about(path), path.open("r+b" if start else "wb") as file:
             file.seek(start)
             file.write(part)
-        self._sizes[name] = start + len(part)
+        self._had[path] += len(part)
