@@ -30,7 +30,7 @@ from world.brief import RecordOptions
 from world.physics.world import World
 
 _MOST_OF_A_BATCH = 50
-_BATCH_S, _BATCH_IN_REAL_TIME_S = 1.0, 0.3
+_BATCH_S, _BATCH_IN_REAL_TIME_S = 1.0, 0.25
 
 
 class PlanError(ValueError):

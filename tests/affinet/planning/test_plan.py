@@ -416,8 +416,8 @@ REAL = 'time.mode="real"'
     [
         (("time.dt=0.05",), 20),
         (("time.dt=0.01",), 50),
-        (("time.dt=0.05", REAL), 6),
-        (("time.dt=0.05", REAL, "time.real.factor=0.5"), 3),
+        (("time.dt=0.05", REAL), 5),
+        (("time.dt=0.05", REAL, "time.real.factor=0.5"), 2),
         (("time.dt=0.5", REAL), 1),
     ],
 )
