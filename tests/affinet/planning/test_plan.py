@@ -418,7 +418,7 @@ REAL = 'time.mode="real"'
         (("time.dt=0.01",), 50),
         (("time.dt=0.05", REAL), 5),
         (("time.dt=0.05", REAL, "time.real.factor=0.5"), 2),
-        (("time.dt=0.5", REAL), 1),
+        (("time.dt=0.05", REAL, "time.real.factor=0.1"), 1),
     ],
 )
 def test_at_most_a_second_is_written_at_once_and_less_where_it_takes_longer_to_arrive(overrides, ticks):
