@@ -200,6 +200,7 @@ def test_in_real_time_a_machine_that_is_cut_off_is_missed_and_comes_back(fleet, 
     assert told["messages"]["ticks"] == 240
     acted = kept_by(out, "agent 4")
     assert np.diff(acted).max() > 10
+    assert np.diff(kept_by(out, "agent 1")).max() < np.diff(acted).max() / 3  # who was not cut off flew on
     assert acted[-1] > 230
 
 

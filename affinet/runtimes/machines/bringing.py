@@ -43,20 +43,30 @@ class Bringing:
         """Bring from now on, in a thread, what there is."""
         self._thread.start()
 
-    def finish(self) -> None:
+    def finish(self, *, patiently: bool) -> None:
         """Bring what is left; whoever wrote it has ended.
+
+        Parameters
+        ----------
+        patiently
+            Whether to wait for a link that is cut; where the run has failed already, nobody does.
 
         Raises
         ------
         RunFailed
-            When its machine does not answer.
+            When its machine does not answer, and was waited for.
         OSError
             When it cannot be written here.
         """
         self._over.set()
         self._thread.join()
-        if self._is_elsewhere:
+        if not self._is_elsewhere:
+            return
+        if patiently:
             self._bring(lambda what: self._coordinator.asked_for(self._name, what))
+            return
+        with suppress(NotCarried):
+            self._bring(self._ask)
 
     @property
     def _is_elsewhere(self) -> bool:
@@ -65,13 +75,13 @@ class Bringing:
         return seat is not None and seat.process is not None
 
     def _follow(self) -> None:
-        def ask(what: Asked) -> bytes:
-            return self._coordinator.ask(self._name, what, _ANSWERED_WITHIN_S)
-
         while not self._over.wait(_EVERY_S):
             with suppress(NotCarried, WireError, OSError):  # tried again, and told at the end
                 if self._is_elsewhere:
-                    self._bring(ask)
+                    self._bring(self._ask)
+
+    def _ask(self, what: Asked) -> bytes:
+        return self._coordinator.ask(self._name, what, _ANSWERED_WITHIN_S)
 
     def _bring(self, ask: _Ask) -> None:
         listed: dict[str, int] = joining.unpack(dict[str, int], ask(Listing(ending=joining.TABLE)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -58,7 +59,7 @@ class Spread:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with self._stack, afterwards(self._bringing.finish):
+        with self._stack, afterwards(partial(self._bringing.finish, patiently=error is None)):
             if error is not None:
                 raise error
 

@@ -17,7 +17,7 @@ class There:
     """Another machine, as the coordinator has it: what is in its folder, while it can be reached."""
 
     def __init__(self, folder):
-        self.folder, self.is_reached, self.asked = folder, True, []
+        self.folder, self.is_reached, self.asked, self.waited_for = folder, True, [], 0
         self.seats = {"netem": SimpleNamespace(process="runs")}
 
     def ask(self, _name, what, _within_s):
@@ -27,6 +27,7 @@ class There:
         return of_folder(self.folder, what)
 
     def asked_for(self, name, what):
+        self.waited_for += 1
         try:
             return self.ask(name, what, 1.0)
         except NotCarried as error:
@@ -51,7 +52,7 @@ def bringing(there, here):
     bringing.start()
     yield bringing
     there.is_reached = True
-    bringing.finish()
+    bringing.finish(patiently=True)
 
 
 def holds(path, data):
@@ -84,7 +85,7 @@ def test_at_the_end_the_rest_of_each_table_is_brought_in_parts(bringing, there, 
     tables = {"journal.arrows": b"all of it", "journal-2.arrows": b"more", "deliveries.arrows": b""}
     for name, data in (tables | {"netem.log": b"not a table"}).items():
         (there.folder / name).write_bytes(data)
-    bringing.finish()
+    bringing.finish(patiently=True)
     # One that is empty has not begun: nobody could read it.
     assert {path.name: path.read_bytes() for path in here.iterdir()} == {
         name: data for name, data in tables.items() if data
@@ -94,7 +95,14 @@ def test_at_the_end_the_rest_of_each_table_is_brought_in_parts(bringing, there, 
 def test_a_machine_that_does_not_answer_at_the_end_fails_the_run(bringing, there):
     there.is_reached = False
     with pytest.raises(RunFailed):
-        bringing.finish()
+        bringing.finish(patiently=True)
+
+
+def test_where_the_run_has_failed_nobody_waits_for_a_link_that_is_cut(bringing, there):
+    # A process that died while a link was cut kept the run from ending until the machine behind it was given up.
+    there.is_reached = False
+    bringing.finish(patiently=False)
+    assert there.waited_for == 0
 
 
 def test_nothing_is_asked_of_a_process_that_is_here_or_never_began(there, here):
@@ -102,7 +110,7 @@ def test_nothing_is_asked_of_a_process_that_is_here_or_never_began(there, here):
     for name in ("netem", "world"):
         bringing = Bringing(there, name, here)
         bringing.start()
-        bringing.finish()
+        bringing.finish(patiently=True)
     assert not there.asked
 
 
