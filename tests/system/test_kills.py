@@ -46,6 +46,14 @@ def test_over_machines_all_but_the_last_second_is_there_whoever_is_killed(role, 
     assert bench.returncode == 0, bench.stdout + bench.stderr
 
 
+@pytest.mark.slow
+def test_a_machine_that_has_not_joined_yet_does_not_keep_a_failed_run_from_ending():
+    # It hears nobody say that the run is over, and was waited for.
+    skip_without()
+    bench = killed("command", "1.5", "--over", "namespaces", "--since", "start", "--seed", "2")
+    assert bench.returncode == 0, bench.stdout + bench.stderr
+
+
 @pytest.mark.parametrize("moment", ["1.8", pytest.param("2.6", marks=pytest.mark.slow)])
 def test_ctrl_c_while_it_starts_leaves_in_order(moment):
     bench = killed("ctrl-c", moment)
