@@ -13,8 +13,6 @@ from netem.wire.intake import Trust
 from netem.wire.session import Login
 from world.physics.world import World
 
-_MOST_OF_A_BATCH = 50
-
 
 @dataclass(frozen=True)
 class RecordOptions:
@@ -24,8 +22,8 @@ class RecordOptions:
     ----------
     every
         Ticks from one moment that is recorded, and whose graph is looked at, to the next.
-    second
-        Ticks of a second of the run, at least 1.
+    batch
+        How many ticks are written down at once: no more than a second of them, which who is killed has not written yet.
     window
         Ticks over which links count as working together.
     record
@@ -35,15 +33,10 @@ class RecordOptions:
     """
 
     every: int
-    second: int
+    batch: int
     window: int
     record: bool
     viewer: str | None
-
-    @property
-    def batch(self) -> int:
-        """How many ticks are written down at once: no more than a second of them, which who is killed has not written yet."""
-        return min(self.second, _MOST_OF_A_BATCH)
 
 
 @dataclass(frozen=True)

@@ -88,8 +88,8 @@ class WorldNode:
                 self._outside.end()
             self._carrier.end()
 
-    def _meanwhile(self, tick: int) -> None:
-        if tick % self._batch == 0:
+    def _meanwhile(self, _tick: int) -> None:
+        if self._due + self._batch - 1 in self._carrier.entries:
             self._write_down()
 
     def _write_down(self) -> None:

@@ -29,6 +29,9 @@ from netem.medium.medium import Verdicted, recorded
 from world.brief import RecordOptions
 from world.physics.world import World
 
+_MOST_OF_A_BATCH = 50
+_BATCH_S, _BATCH_IN_REAL_TIME_S = 1.0, 0.25
+
 
 class PlanError(ValueError):
     """The scenario is well formed, but cannot fly: why, in plain words."""
@@ -101,9 +104,11 @@ class Plan:
 
     def books(self, viewer: str | None) -> RecordOptions:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
-        record, simulated = self.scenario.record, 1.0 if self.pace is None else min(1.0, self.pace.factor)
-        second = max(1, int(simulated / self.world.dt))
-        return RecordOptions(record.every, second, self.window, record.enabled, viewer)
+        record = self.scenario.record
+        # Who is killed has lost a batch, and in real time what a thread was still to write, or another machine to give.
+        seconds = _BATCH_S if self.pace is None else _BATCH_IN_REAL_TIME_S * min(1.0, self.pace.factor)
+        batch = min(_MOST_OF_A_BATCH, max(1, int(seconds / self.world.dt)))
+        return RecordOptions(record.every, batch, self.window, record.enabled, viewer)
 
     @property
     def window(self) -> int:

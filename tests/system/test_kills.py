@@ -5,6 +5,7 @@ import sys
 
 import pytest
 from flying import PROCESSES
+from networks import skip_without
 from paths import BENCH
 
 pytestmark = PROCESSES
@@ -31,6 +32,25 @@ def killed(role, moment, *options):
 )
 def test_a_kill_at_any_moment_leaves_nothing_but_what_can_be_read(role, moment):
     bench = killed(role, moment)
+    assert bench.returncode == 0, bench.stdout + bench.stderr
+
+
+# By seed 1 the medium is on the machine of the launcher, by seed 2 on the other one.
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", ["1", "2"])
+@pytest.mark.parametrize("role", ["launcher", "command", "everybody"])
+def test_over_machines_all_but_the_last_second_is_there_whoever_is_killed(role, seed):
+    # Of a medium on another machine nothing was, when the launcher or all were killed.
+    skip_without()
+    bench = killed(role, "2.5", "--over", "namespaces", "--seed", seed)
+    assert bench.returncode == 0, bench.stdout + bench.stderr
+
+
+@pytest.mark.slow
+def test_a_machine_that_has_not_joined_yet_does_not_keep_a_failed_run_from_ending():
+    # It hears nobody say that the run is over, and was waited for.
+    skip_without()
+    bench = killed("command", "1.5", "--over", "namespaces", "--since", "start", "--seed", "2")
     assert bench.returncode == 0, bench.stdout + bench.stderr
 
 

@@ -169,13 +169,14 @@ REAL = ("--set", 'time.mode="real"', "--set", "time.dt=0.05", "--set", "time.rea
 
 def test_in_real_time_they_fly_by_one_clock(fleet, swarm, keys, tmp_path, out):
     swarm(duration=2.0)
-    machines = {"name": "one", "agents": [1, 2, 3]}, {"name": "other", "agents": [4, 5]}
+    machines = {"name": "one", "agents": [1, 2, 3]}, {"name": "other", "agents": [4, 5], "netem": endpoint()}
     hosts = hosts_file(tmp_path, keys, endpoint(), endpoint(), *machines)
     status, said = ended(fleet.start("hosts", hosts, "--out", out, *REAL))
     assert status == 0, said
     told = summary(out)
     assert told["verdict"] == "pass"
     assert {f"agent {number}" for number in range(1, 8)} <= told["timing"]["lateness"].keys()
+    assert told["timing"]["delays"]["messages"] > 0  # of the table that the medium wrote on another machine
     assert not fleet.running()
 
 
@@ -199,6 +200,7 @@ def test_in_real_time_a_machine_that_is_cut_off_is_missed_and_comes_back(fleet, 
     assert told["messages"]["ticks"] == 240
     acted = kept_by(out, "agent 4")
     assert np.diff(acted).max() > 10
+    assert np.diff(kept_by(out, "agent 1")).max() < np.diff(acted).max() / 3  # who was not cut off flew on
     assert acted[-1] > 230
 
 

@@ -8,14 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
 
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.identity import Identity, own
-from affinet.runtimes.machines.joining import Admitted, Joining, Leave, Listing, Part, Start
+from affinet.runtimes.machines.joining import Admitted, Asked, Joining, Leave, Start
 from affinet.runtimes.machines.remote import RemoteProcess
 from affinet.runtimes.machines.seat import SILENT_S, Seat
 from analysis.kernels import kernel as kernels
@@ -193,26 +192,28 @@ class Coordinator:
         to_coordinator = SAME if ours is None else ours.clock
         return to_coordinator.then(SAME if theirs is None else theirs.clock.back)
 
-    def fetch(self, name: str, stem: str, to: Path) -> None:
-        """Bring all files that a process wrote over there whose names begin with a stem.
+    def ask(self, name: str, what: Asked, within_s: float) -> bytes:
+        """Ask the machine of a seat for something that is written there.
+
+        Raises
+        ------
+        NotCarried
+            When it does not answer.
+        """
+        return self._session.ask(seats.file(name), joining.pack(what), within_s)
+
+    def asked_for(self, name: str, what: Asked) -> bytes:
+        """The same, for as long as the machine may come back.
 
         Raises
         ------
         RunFailed
-            When its machine does not answer.
+            When it does not answer.
         """
         self._looked_s = time.monotonic()
-        for file in joining.unpack(list[str], self._asked_for(name, Listing(stem=stem))):
-            start = 0
-            with (to / Path(file).name).open("wb") as written:
-                while part := self._asked_for(name, Part(name=file, start=start)):
-                    written.write(part)
-                    start += len(part)
-
-    def _asked_for(self, name: str, what: Listing | Part) -> bytes:
         while True:
             try:
-                return self._session.ask(seats.file(name), joining.pack(what), _ANSWERED_WITHIN_S)
+                return self.ask(name, what, _ANSWERED_WITHIN_S)
             except NotCarried as error:
                 if not self.heed():
                     raise RunFailed(f"{self.seats[name].where}: its files cannot be had: {error}") from error

@@ -17,6 +17,8 @@ from netem.wire.wrong import WireError
 
 T = TypeVar("T")
 
+TABLE = ".arrows"  # how the names of tables end
+
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Named fields, each of its type."""
@@ -122,9 +124,9 @@ class Alive(_Message, frozen=True, kw_only=True):
 
 
 class Listing(_Message, frozen=True, kw_only=True, tag="listing"):
-    """Asks for the names of the files in the machine's folder that begin with a stem."""
+    """Asks for the files in the machine's folder whose names end so: their names, and how many bytes there are of each."""
 
-    stem: str
+    ending: str
 
 
 class Part(_Message, frozen=True, kw_only=True, tag="part"):
@@ -141,7 +143,7 @@ Up = Started | Told | Logged | Ended | Failed
 _encoder = msgspec.msgpack.Encoder()
 
 
-def pack(message: _Message | float | list[str]) -> bytes:
+def pack(message: _Message | float | dict[str, int]) -> bytes:
     """A message as MessagePack."""
     return _encoder.encode(message)
 

@@ -207,9 +207,10 @@ class Place:
 
 
 def of_folder(folder: Path, asked: Asked) -> bytes:
-    """What is asked for of a folder: the names of some files, or a part of one."""
+    """What is asked for of a folder: which files there are, or a part of one."""
     if isinstance(asked, Listing):
-        return joining.pack(sorted(file.name for file in folder.iterdir() if file.name.startswith(asked.stem)))
+        found = sorted(file for file in folder.iterdir() if file.name.endswith(asked.ending))
+        return joining.pack({file.name: file.stat().st_size for file in found})
     with (folder / Path(asked.name).name).open("rb") as file:
         file.seek(asked.start)
         return file.read(_PART)

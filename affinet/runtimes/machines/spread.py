@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
+from affinet.runtimes.machines.bringing import Bringing
 from affinet.runtimes.machines.commands import Commands
 from affinet.runtimes.machines.coordinator import Coordinator
-from netem.medium.medium import JOURNAL
 from netem.processes.system_errors import afterwards
 from netem.wire.session import HUB, Login
 
@@ -44,19 +45,21 @@ class Spread:
     ) -> None:
         self.coordinator, self.groups, self._commands = coordinator, groups, commands
         coordinator.heed_too = commands.heed
-        self._listen, self._keys, self._out = listen, keys, out
+        self._listen, self._keys = listen, keys
+        self._bringing = Bringing(coordinator, HUB, out)
         self._stack = ExitStack()
 
     def __enter__(self) -> Spread:
         self._stack.push(self._commands.__exit__)  # they are waited for once they were told to leave
         self._stack.enter_context(self.coordinator)
         self._commands.__enter__()
+        self._bringing.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with self._stack, afterwards(self._bring):
+        with self._stack, afterwards(partial(self._bringing.finish, patiently=error is None)):
             if error is not None:
                 raise error
 
@@ -79,8 +82,3 @@ class Spread:
     def _keys_of(self, name: str) -> str:
         seat = self.coordinator.seats.get(name)
         return self._keys if seat is None or seat.joined is None else seat.joined.keys
-
-    def _bring(self) -> None:
-        medium = self.coordinator.seats.get(HUB)
-        if medium is not None and medium.process is not None:
-            self.coordinator.fetch(HUB, Path(JOURNAL).stem, self._out)

@@ -406,3 +406,20 @@ def test_what_a_finding_says_stays_on_one_line_of_plain_text_wherever_it_goes():
     assert str(said) == r"mine: a line\nand \x1b[31mred\udc80"
     again = pickle.loads(pickle.dumps(said))
     assert (str(again), again.findings) == (str(said), said.findings)
+
+
+REAL = 'time.mode="real"'
+
+
+@pytest.mark.parametrize(
+    ("overrides", "ticks"),
+    [
+        (("time.dt=0.05",), 20),
+        (("time.dt=0.01",), 50),
+        (("time.dt=0.05", REAL), 5),
+        (("time.dt=0.05", REAL, "time.real.factor=0.5"), 2),
+        (("time.dt=0.05", REAL, "time.real.factor=0.1"), 1),
+    ],
+)
+def test_at_most_a_second_is_written_at_once_and_less_where_it_takes_longer_to_arrive(overrides, ticks):
+    assert make("corridor", *overrides).books(None).batch == ticks

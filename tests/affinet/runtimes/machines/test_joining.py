@@ -187,8 +187,8 @@ def test_a_folder_gives_the_files_that_are_asked_for_and_none_beside_it(tmp_path
     for name in ("journal.arrows", "journal-2.arrows", "held"):
         (tmp_path / "there" / name).write_bytes(name.encode())
     (tmp_path / "secret").write_text("of another")
-    listed = joining.unpack(list[str], of_folder(tmp_path / "there", joining.Listing(stem="journal")))
-    assert listed == ["journal-2.arrows", "journal.arrows"]
+    listed = joining.unpack(dict[str, int], of_folder(tmp_path / "there", joining.Listing(ending=".arrows")))
+    assert listed == {"journal-2.arrows": 16, "journal.arrows": 14}
     assert of_folder(tmp_path / "there", joining.Part(name="journal.arrows", start=8)) == b"arrows"
     with pytest.raises(FileNotFoundError):
         of_folder(tmp_path / "there", joining.Part(name="../secret", start=0))
