@@ -28,7 +28,7 @@ def test_a_batch_is_written_as_soon_as_all_of_it_is_known_and_the_rest_at_the_en
     written = []
     monkeypatch.setattr(process, "_of_time", of_time)
     monkeypatch.setattr(process.flight, "fly", fly)
-    brief = SimpleNamespace(world=None, books=SimpleNamespace(batch=BATCH))
+    brief = SimpleNamespace(world=None, books=SimpleNamespace(batch=BATCH), is_outside=False)
     WorldNode(None, None, brief, None, None, calls.append).run()
     ticks = [[flown.tick for flown, _ in call.args[0]] for call in calls]
     assert ticks == [[0, 1, 2, 3, 4], [5, 6, 7, 8, 9], [10]]
