@@ -123,7 +123,7 @@ class DrivenWorld:
         """How long ago that was of which the last of the robots speaks."""
         assert self._pace is not None, "of a run in real time"
         agent = min(self._heard, key=self._heard.__getitem__)
-        behind = tick - self._heard[agent]
+        behind = max(0, tick - 1 - self._heard[agent])  # the command of the tick before has only just been given
         silent = behind * self._pace.dt / self._pace.factor
         self._keep(Kept(tick - 1, DRIVER, silent, int(behind > 0)))
         if silent > self._pace.late:
