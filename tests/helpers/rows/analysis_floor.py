@@ -78,6 +78,7 @@ CASES = {
         for dimension in [3 if one.covariance.shape[-1] == 3 else 2]
         for what, function, arguments in (
             ("measured", one.measured, (real(9, dimension), real(9, dimension))),
+            ("of_polar", one.of_polar, (real(9, dimension),)),
             ("spread", one.spread, (real(9, dimension),)),
             ("weight", one.weight, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),
             ("observed", one.observed, (real(9, dimension), real(9, dimension), covariance(9, dimension, dimension))),

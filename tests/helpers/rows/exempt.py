@@ -12,6 +12,7 @@ FLOWN = "flies in test_bits.py"
 
 EXEMPT = {
     ONE_MEDIUM: """
+        netem.ports.MediumPorts.sensed
         netem.medium.link_model.LinkModel.begin netem.medium.link_model.LinkModel.rest
         netem.medium.link_model.LinkModel.judge netem.medium.link_model.LinkModel.bit_draws
         netem.medium.link_model.LinkModel.draw netem.medium.medium.Verdicted.verdicts
@@ -60,9 +61,13 @@ EXEMPT = {
         world.physics.world.World.target world.physics.world.World.goal world.physics.world.World.sighting
         world.physics.world.World.measure world.physics.world.World.outliers world.physics.world.World.flown
         world.physics.world.World.odometry world.physics.world.World.step world.carrier.ZenohCarrier.carry world.flight.fly
-        world.real_time.RealTimeCarrier.carry
+        world.real_time.RealTimeCarrier.carry world.physics.world.World.astray world.physics.world.World.told
+        world.physics.sensors.last world.physics.recorded.RecordedFlight.flown_before world.robots.Robots.read
+        world.driven.DrivenWorld.begin world.driven.DrivenWorld.flown world.driven.DrivenWorld.goal
+        world.driven.DrivenWorld.measure world.driven.DrivenWorld.step
     """,
     ONCE: """
+        world.brief.DriverBrief.of
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
         netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
         netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
@@ -83,6 +88,7 @@ EXEMPT = {
         agents.swarm.SwarmBrief.follower_stress agents.swarm.SwarmBrief.laplacian agents.swarm.SwarmBrief.process
     """,
     WRITTEN: """
+        world.books.history.read
         netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.in_flight.Entry.dropped_by_verdict
         netem.medium.open_tick.OpenTick.close netem.medium.real_time.RealTimeRelay.closed
         netem.ports.MediumPorts.as_it_arrives netem.ports.MediumPorts.hand_out_measurements
@@ -127,7 +133,8 @@ EXEMPT = {
         world.physics.bodies.Body.moved
         agents.algebra.constraints.Maps.feasible agents.algebra.constraints.Maps.fit
         agents.algebra.constraints.Maps.nearest agents.algebra.constraints.Maps.covariance world.flight.Acted.input
-        world.flight.Carrier.carry
+        world.flight.Carrier.carry world.flight.Physics.begin world.flight.Physics.flown world.flight.Physics.goal
+        world.flight.Physics.measure world.flight.Physics.step world.books.history.Goals.goal
     """,
     FLOWN: """
         agents.agent.Agent.init agents.agent.Agent.sense agents.agent.Agent.act
