@@ -235,4 +235,4 @@ def test_each_process_has_a_password_of_its_own_and_none_lies_on_a_disk(tmp_path
     flying = launcher.Launcher(plan_of("corridor"), tmp_path, watch=lambda *_: None)
     logins = flying._make_logins(tmp_path)
     assert not list(tmp_path.iterdir())
-    assert len({login.password for login in logins.values()}) == len(logins) == 7 + 4
+    assert len({login.password for login in logins.values()}) == len(logins) == 7 + 5
