@@ -175,8 +175,10 @@ class Recorder:
         self._path = part(self._first_part, self._parts)
         make_room(self._path)
         viewers = [rr.GrpcSink(self._viewer)] if self._viewer and listens(self._viewer) else []
+        # The layout once: of each that it is given the library keeps two threads and a mebibyte to the end of the run.
+        layout = self._blueprint if self._parts == 1 else None
         with writing(self._path):
-            self._stream.set_sinks(rr.FileSink(str(self._path)), *viewers, default_blueprint=self._blueprint)
+            self._stream.set_sinks(rr.FileSink(str(self._path)), *viewers, default_blueprint=layout)
         if before != self._path:
             _refuse_what_breaks_off(before)
         self._stream.send_recording_name(self._name)
