@@ -70,7 +70,7 @@ def test_passwords_stand_in_one_file_that_nobody_else_reads(out, private):
         assert launcher.fly().failure is None
     finally:
         os.umask(before)
-    assert len(launcher._logins) == 7 + 4
+    assert len(launcher._logins) == 7 + 5
     # Once in the private folder, once as the link to it in the run directory.
     assert not set.union(*found[:7])
     assert set.union(*found[7:]) == {("control.json", 0o600)}
