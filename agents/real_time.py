@@ -12,7 +12,7 @@ from agents.node import AgentBrief, AgentsNode
 from agents.timer import OwnClock
 from netem.processes.supervised import Supervisor
 from netem.processes.user_code import in_tick
-from netem.processes.wall_time import WallTime, be_prompt
+from netem.processes.wall_time import WallTime, freeze_garbage
 from netem.wire import messages
 from netem.wire.carrier import Session
 from netem.wire.session import HUB
@@ -51,7 +51,7 @@ class RealTimeAgentsNode(AgentsNode):
 
     def run(self) -> None:
         """Wake, sense, speak, listen and act until the medium says that the run is over."""
-        be_prompt()
+        freeze_garbage()
         self._wall = self._await_the_first()
         clock, number = OwnClock.right(self._timer.drift), 0
         while not self._is_over:

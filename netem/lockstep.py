@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from analysis.models.arrays import Array, Integers, Mask
+from analysis.models.arrays import Array, Integers
 from netem.brief import MediumBrief
 from netem.medium.in_flight import Entry
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
@@ -104,7 +104,7 @@ class LockstepNode:
             if sense.fired:
                 self._relay.fire(sense.fired, sense.k)
             if decided is None:
-                decided = self._decide(sense.k, self._ports.where(sense), self._ports.sensed(sense))
+                decided = self._decide(sense.k, self._ports.where(sense), self._ports.measured(sense))
             self._ports.welcome_back(sense.k)
             self._ports.call(sense.k, set(decided.awake))
             self._ports.hand_out_measurements(sense, decided.awake, decided.seen)
@@ -123,9 +123,9 @@ class LockstepNode:
         """Whether a tick can be decided before anything is sensed in it."""
         return self._relay.ahead and not self._has_gaps
 
-    def _decide(self, tick: int, position: Array | None, sensed: Mask | None = None) -> Decided:
+    def _decide(self, tick: int, position: Array | None, measured: Array | None = None) -> Decided:
         self._ports.obey_orders(tick)
-        relayed = self._relay.decide(tick, position, sensed)
+        relayed = self._relay.decide(tick, position, measured)
         heard, entry = self._heard(relayed.arriving), relayed.entry
         journal = self._ports.journal(tick, entry, np.diff(heard.ends).tolist())
         awake = tuple((np.flatnonzero(relayed.awake) + 1).tolist())

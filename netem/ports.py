@@ -89,12 +89,13 @@ class MediumPorts:
         position: Array = numbers(sense.position, "the world: Sense: position", (len(self._inboxes), -1))
         return position
 
-    def sensed(self, sense: messages.Sense) -> Mask | None:
-        """Links whose sensors said something, shape (L,), where not all do."""
+    def measured(self, sense: messages.Sense) -> Array | None:
+        """What sensors said of every link, shape (L, D), where some may have said nothing."""
         if not self._brief.gaps:
             return None
-        measured = numbers(sense.measured, "the world: Sense: measured", (len(self._links), self._brief.dimension))
-        return ~np.isnan(measured).any(axis=-1)
+        shape = (len(self._links), self._brief.dimension)
+        measured: Array = numbers(sense.measured, "the world: Sense: measured", shape)
+        return measured
 
     def refuse_strangers(self) -> None:
         """Look who has come in."""

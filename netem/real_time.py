@@ -16,7 +16,7 @@ from netem.medium.relay import changed_on_the_way
 from netem.ports import MediumPorts, medium_of
 from netem.processes.background import Background
 from netem.processes.supervised import Supervisor
-from netem.processes.wall_time import WallTime, be_prompt
+from netem.processes.wall_time import WallTime, freeze_garbage
 from netem.wire import messages
 from netem.wire.carrier import Arrived, Session
 from netem.wire.keys import Keys
@@ -70,7 +70,7 @@ class RealTimeNode:
         """Wait until all agents and the world listen."""
         self._ports.await_everybody()
         _rehearse(self._new_relay(), self._brief)
-        be_prompt()
+        freeze_garbage()
 
     def run(self) -> None:
         """Relay until the world says that it was the last tick."""
@@ -119,7 +119,7 @@ class RealTimeNode:
         if sense.fired:
             self._relay.fire(sense.fired, sense.k)
         self._ports.obey_orders(sense.k + _NOTICE)
-        begun = self._relay.begin(sense.k, self._ports.where(sense), self._ports.sensed(sense))
+        begun = self._relay.begin(sense.k, self._ports.where(sense), self._ports.measured(sense))
         self._awake = frozenset(begun.awake)
         self._ports.welcome_back(sense.k)
         self._ports.call(sense.k, self._awake)

@@ -11,7 +11,7 @@ from netem.core.pace import Pace
 from netem.core.plain import from_plain
 from netem.faults.fault import Fault
 from netem.processes.supervised import Supervisor, called
-from netem.processes.wall_time import RealTime, WallTime, be_prompt
+from netem.processes.wall_time import RealTime, WallTime, freeze_garbage
 from netem.wire import messages
 from netem.wire.carrier import Session
 from netem.wire.session import HUB, WORLD
@@ -50,7 +50,7 @@ class RealTimeCarrier(ZenohCarrier):
     @property
     def clock(self) -> Iterator[int]:
         """The ticks of the run, which begins when this is first asked for the next."""
-        be_prompt()
+        freeze_garbage()
         self._wall = WallTime.soon(self._pace.factor)
         self._began = self._wall.began
         yield from RealTime(self._world.ticks, self._world.dt, self._wall)

@@ -55,19 +55,22 @@ class _Log:
         self._path, self._world = path, world
         self._dimension = world.formation.dimension
         columns = _columns(path, columns_of(self._dimension))
-        for name in ("time", "agent"):
-            self._refuse(np.isnan(columns[name]), f"there is no {name}", columns)
+        if not len(columns["time"]):
+            raise ValueError(f"{path}: it has no rows")
         in_order = np.argsort(columns["time"], kind="stable")
         self._line = in_order + 2  # the first is the heading
         self._columns = {name: column[in_order] for name, column in columns.items()}
-        first = self._columns["time"][0] if len(in_order) else 0.0
-        self._tick = _whole((self._columns["time"] - first) / world.dt)
+        self._every = np.arange(len(in_order))
+        for name in ("time", "agent"):
+            self._refuse_rows(self._every, np.isnan(self._columns[name]), f"there is no {name}")
+        time = self._columns["time"]
+        self._tick = _whole((time - time[0]) / world.dt)
         self._agent = self._numbers("agent")
         self._says_measured = ~np.isnan(self._columns["neighbour"])
 
     def refuse_what_is_misplaced(self) -> None:
         """Fail where a row says what is of rows of the other kind, and nobody would look at it."""
-        every = np.arange(len(self._tick))
+        every = self._every
         own = np.concatenate([self._vectors(what, every) for what in ("input", "position")], axis=-1)
         seen = np.concatenate([self._vectors("relative", every), self._polar(every)], axis=-1)
         self._refuse_rows(
@@ -77,7 +80,7 @@ class _Log:
 
     def refuse_what_is_short(self) -> None:
         """Fail where it ends before the run does."""
-        has = float(self._tick[-1]) if len(self._tick) else 0.0
+        has = float(self._tick[-1])
         if has < self._world.ticks - 1 - _ROUNDING:
             ends = has * self._world.dt
             raise ValueError(f"{self._path}: it ends after {ends:g} s: set time.duration to that, or less")
@@ -149,8 +152,7 @@ class _Log:
         return -np.where(by_place[:, None], relative, sensor.of_polar(polar)), by_place | by_angle
 
     def _polar(self, rows: Integers) -> Array:
-        columns = [self._columns[name][rows] for name in _POLAR[: self._dimension]]
-        return np.stack(columns, axis=-1)
+        return self._cells(_POLAR[: self._dimension], rows)
 
     def _links(self, rows: Integers) -> Integers:
         index, neighbour = self._world.links.index, self._numbers("neighbour", rows)
@@ -171,10 +173,13 @@ class _Log:
                 yield agent, self._tick[rows[own]], said[own]
 
     def _vectors(self, what: str, rows: Integers) -> Array:
-        return np.stack([self._columns[f"{what}_{axis}"][rows] for axis in _AXES[: self._dimension]], axis=-1)
+        return self._cells([f"{what}_{axis}" for axis in _AXES[: self._dimension]], rows)
+
+    def _cells(self, names: Sequence[str], rows: Integers) -> Array:
+        return np.stack([self._columns[name][rows] for name in names], axis=-1)
 
     def _numbers(self, name: str, rows: Integers | None = None) -> Integers:
-        rows = np.arange(len(self._tick)) if rows is None else rows
+        rows = self._every if rows is None else rows
         column, agents = self._columns[name][rows], self._world.links.agents
         wrong = np.asarray((column != np.round(column)) | (column < 1) | (column > agents))
         self._refuse_rows(rows, wrong, f"its {name} is none of 1 to {agents}")
@@ -183,12 +188,6 @@ class _Log:
     def _refuse_rows(self, rows: Integers, wrong: Mask, why: str) -> None:
         if wrong.any():
             raise ValueError(f"{self._path}: line {self._line[rows[int(np.argmax(wrong))]]}: {why}")
-
-    def _refuse(self, wrong: Mask, why: str, columns: dict[str, Array]) -> None:
-        if not len(columns["time"]):
-            raise ValueError(f"{self._path}: it has no rows")
-        if wrong.any():
-            raise ValueError(f"{self._path}: line {int(np.argmax(wrong)) + 2}: {why}")
 
 
 def _whole(ticks: Array) -> Array:

@@ -146,7 +146,7 @@ def _make(given: Scenario) -> Plan:
     findings.append(limits.run(first, given.time, memory))
     _refuse_fatal(findings)
     world = world_of(given, formation)
-    outside.refuse(given, world, played.faults)
+    outside.refuse(given, played.faults)
     world = replace(world, flight=flight_logs.of(given, world))
     bits = network.message_bits(names, spoken, world.links, brief.dimension)
     _refuse_fatal(limits.messages(bits, world, reports, given.trust))

@@ -14,7 +14,7 @@ from netem.impairments.profile import Profile
 from world.physics.world import World
 
 
-def refuse(given: Scenario, world: World, faults: Sequence[Fault]) -> None:
+def refuse(given: Scenario, faults: Sequence[Fault]) -> None:
     """Refuse what a world that is not simulated does not have.
 
     Raises
@@ -25,7 +25,7 @@ def refuse(given: Scenario, world: World, faults: Sequence[Fault]) -> None:
     if given.world == "simulated":
         return
     where = f"a world that is {given.world}"
-    if world.body.build().order != 1 or given.dynamics.model != "single-integrator":
+    if given.dynamics.model != "single-integrator":
         raise ScenarioError(f"dynamics.model: in {where} the input is a velocity: leave it a single-integrator")
     if given.target is not None:
         raise ScenarioError(f"target: nobody says where one is in {where}: leave it out")

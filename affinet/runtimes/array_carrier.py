@@ -95,7 +95,7 @@ class ArrayCarrier:
 
     def _tick(self, tick: int, scene: Scene, sensed: Array) -> BatchActed:
         before = self._welcomed_back(tick)
-        relayed = self._relay.decide(tick, scene.position, _there(sensed) if self._may_have_gaps else None)
+        relayed = self._relay.decide(tick, scene.position, sensed if self._may_have_gaps else None)
         idle, living = relayed.conditions.idle, before
         some_idle = idle.any()
         if some_idle:
@@ -172,10 +172,6 @@ class ArrayCarrier:
         for name, field in wrong.items():
             arriving[name][struck] = field
         return arriving
-
-
-def _there(measured: Array) -> Mask:
-    return np.asarray(~np.isnan(measured).any(axis=-1))
 
 
 def _protected(given: Any) -> Any:

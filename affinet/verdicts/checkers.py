@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from affinet.scenario.words import among
-from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, places_known, span_of, times
+from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
 from analysis.metrics import consistency, localization
@@ -193,7 +193,7 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
             )
         if not np.isfinite(mean[ticks]).all():
             tick = span.start + int(ticks[int(np.argmin(np.isfinite(mean[ticks])))])
-            if not places_known(evidence, tick):
+            if not evidence.located[tick]:
                 return CheckResult(
                     name, "vacuous", None, "it is not known where agents are, and so not how far off they are"
                 )

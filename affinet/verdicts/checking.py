@@ -149,14 +149,9 @@ def every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[
     if holds.all():
         return CheckResult(name, "pass", None, f"in all of {len(holds)} ticks")
     tick = span.start + int(np.argmin(holds))
-    if not places_known(evidence, tick):
+    if not evidence.located[tick]:
         return CheckResult(name, "vacuous", None, f"from {tick * evidence.dt:g} s on it is not known where agents are")
     return CheckResult(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {why(tick)}")
-
-
-def places_known(evidence: Evidence, tick: int) -> bool:
-    """Whether it is known where agents were in a tick: of a run that was not simulated it may be unknown."""
-    return not (evidence.plan.may_have_gaps and bool(np.isnan(evidence.position[tick]).any()))
 
 
 def _joined(sign: str, one: Checker, other: Checker, worst: tuple[RunVerdict, ...]) -> Checker:

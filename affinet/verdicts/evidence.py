@@ -92,6 +92,13 @@ class Evidence:
         """Agents whose processes live and run, shape (T, N)."""
         return self.timeline.each(range(self.ticks), lambda now: ~now.idle)
 
+    @cached_property
+    def located(self) -> Mask:
+        """Ticks in which it is known where all agents were, shape (T,): all but in runs that were not simulated."""
+        if not self.plan.may_have_gaps:
+            return np.ones(self.ticks, dtype=bool)
+        return np.asarray(~np.isnan(self.position).any(axis=(-2, -1)))
+
     def tick(self, seconds: float) -> int:
         """The tick of a time."""
         return round(seconds / self.dt)

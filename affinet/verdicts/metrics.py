@@ -134,7 +134,7 @@ def of_run(evidence: Evidence, name: str, span: range) -> Array:
     whole = told | {"position": evidence.position[part], "known": arrays["known"][part] & awake}
     looked_at = seen(evidence.plan.world, evidence.present[part], arrays["verdicts"][part, 0], whole)
     value, there = METRICS[name].of(looked_at)[..., 0], METRICS[name].there(looked_at)[..., 0]
-    if evidence.plan.may_have_gaps and name in _OF_POSITIONS:
-        there = there & ~np.isnan(whole["position"]).any(axis=(-2, -1))
+    if name in _OF_POSITIONS:
+        there = there & evidence.located[part]
     of_something: Array = np.where(there, np.where(np.isnan(value), np.inf, value), np.nan)
     return of_something

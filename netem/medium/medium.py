@@ -120,18 +120,20 @@ class Medium:
         """The state before the first tick."""
         return MediumState.empty(self._shape, tuple(model.begin() for model in self._link_models))
 
-    def offered(self, tick: int, sensed: Mask | None = None) -> Mask:
+    def offered(self, tick: int, measured: Array | None = None) -> Mask:
         """Where messages are offered in a tick, shape (C, L): who is awake speaks on all its links, and all sensors sense.
 
         Parameters
         ----------
         tick
             Its number.
-        sensed
-            Links whose sensors said something, shape (L,), where not all do.
+        measured
+            What sensors said, shape (L, D), NaN of those that said nothing; None where all said something.
         """
         offered = self._under(self.timeline.at(tick)).offered
-        return offered if sensed is None else offered & (sensed | ~self._sensing)
+        if measured is None:
+            return offered
+        return offered & (~np.isnan(measured).any(axis=-1) | ~self._sensing)
 
     def judge(
         self, state: MediumState, tick: int, offered: Mask, position: Array | None

@@ -88,7 +88,7 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
         """When the next message is due, in simulated seconds."""
         return self._freed[0].due_s if self._freed else self._parcels.next_s
 
-    def begin(self, tick: int, position: Array | None, sensed: Mask | None = None) -> Begun:
+    def begin(self, tick: int, position: Array | None, measured: Array | None = None) -> Begun:
         """A tick begins: judge what will be said in it.
 
         Parameters
@@ -97,12 +97,12 @@ class RealTimeRelay(FaultedRelay, Generic[Said]):
             Its number.
         position
             The agents', shape (N, D), in metres; only a spatial profile needs them.
-        sensed
-            Links whose sensors said something, shape (L,), where not all do.
+        measured
+            What sensors said, shape (L, D), NaN of those that said nothing; None where all said something.
         """
         self._freed_s = tick * self._dt
         conditions = self.timeline.at(tick)
-        self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick, sensed), position)
+        self._state, verdicts = self._medium.judge(self._state, tick, self._medium.offered(tick, measured), position)
         waits = self._state.waits or _of_recorded(verdicts, tick, self._dt)
         now = self._open[tick] = OpenTick(tick, verdicts, waits)
         awake = (np.flatnonzero(~conditions.idle) + 1).tolist()

@@ -172,7 +172,7 @@ class Relay(FaultedRelay, Generic[Said]):
         """Whether a tick can be decided before it is known where the agents are."""
         return self._medium.ahead
 
-    def decide(self, tick: int, position: Array | None, sensed: Mask | None = None) -> Relayed:
+    def decide(self, tick: int, position: Array | None, measured: Array | None = None) -> Relayed:
         """What becomes of a tick in which all who are awake speak to all their neighbours.
 
         Parameters
@@ -181,10 +181,10 @@ class Relay(FaultedRelay, Generic[Said]):
             Its number: one after the tick that was finished last.
         position
             The agents', shape (N, D), in metres; only a spatial profile needs them.
-        sensed
-            Links whose sensors said something, shape (L,), where not all do.
+        measured
+            What sensors said, shape (L, D), NaN of those that said nothing; None where all said something.
         """
-        return self.decide_on(tick, self._medium.offered(tick, sensed), position)
+        return self.decide_on(tick, self._medium.offered(tick, measured), position)
 
     def decide_on(self, tick: int, offered: Mask, position: Array | None) -> Relayed:
         """What becomes of a tick in which a message is offered where `offered` says so, shape (C, L)."""

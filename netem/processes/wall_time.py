@@ -75,7 +75,7 @@ def interrupting() -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
-def be_prompt() -> None:
+def freeze_garbage() -> None:
     """Collect no garbage that is not of the run itself."""
     gc.collect()
     gc.freeze()

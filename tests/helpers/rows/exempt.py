@@ -12,7 +12,7 @@ FLOWN = "flies in test_bits.py"
 
 EXEMPT = {
     ONE_MEDIUM: """
-        netem.ports.MediumPorts.sensed
+        netem.ports.MediumPorts.measured
         netem.medium.link_model.LinkModel.begin netem.medium.link_model.LinkModel.rest
         netem.medium.link_model.LinkModel.judge netem.medium.link_model.LinkModel.bit_draws
         netem.medium.link_model.LinkModel.draw netem.medium.medium.Verdicted.verdicts
