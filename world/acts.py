@@ -92,6 +92,10 @@ class Acts:
         """Whose key it is."""
         return self._speaking[key]
 
+    def refuse(self, key: str) -> None:
+        """Take note that an act was refused before its number was looked at."""
+        self._streams.refuse(self._stream[self._speaking[key]])
+
     def restart(self, agent: int) -> None:
         """Expect the acts of a new process."""
         self._streams.restart(self._stream[agent])

@@ -65,12 +65,17 @@ class Robots:
         self._speaking = {keys.measured(agent): agent for agent in range(1, links.agents + 1)}
         self._links, self._dimension, self._positioned = links, dimension, positioned
         self._in_real_time = in_real_time
-        of_robot = {f"robot {agent}": key for key, agent in self._speaking.items()}
+        self._stream = {key: f"robot {agent}" for key, agent in self._speaking.items()}
+        of_robot = {stream: key for key, stream in self._stream.items()}
         self._streams = Sequences("the driver's", lost=lost and (lambda stream, number: lost(of_robot[stream], number)))
 
     def speaker(self, key: str) -> int:
         """Whose key it is."""
         return self._speaking[key]
+
+    def refuse(self, key: str) -> None:
+        """Take note that what is said of a robot was refused before its number was looked at."""
+        self._streams.refuse(self._stream[key])
 
     def read(self, key: str, data: bytes, tick: int, awaited: Container[int]) -> OnRobot:
         """What came on a key.
@@ -105,7 +110,7 @@ class Robots:
         if not (self._in_real_time or agent in awaited):
             raise WireError(f"{whose}: it says twice what is measured in tick {tick}", Wrong.REPEATED)
         read = self._read(agent, said, f"{whose}: Measured")
-        self._streams.check(f"robot {agent}", said.seq)
+        self._streams.check(self._stream[key], said.seq)
         return read
 
     def _read(self, agent: int, said: messages.Measured, whose: str) -> OnRobot:

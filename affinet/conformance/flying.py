@@ -158,7 +158,7 @@ class Conversation:
     def end_all(self) -> None:
         """Leave no process behind."""
         for program in self._programs:
-            program.end()
+            program.kill()
 
     @property
     def _program(self) -> Program:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import subprocess
 import threading
 from contextlib import suppress
@@ -11,7 +9,8 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, NamedTuple
 
-from affinet.runtimes.child import Child, started
+from affinet.runtimes.child import Child
+from affinet.runtimes.programs import ForeignProgram
 from affinet.runtimes.told import LONGEST_LINE
 from netem.processes.supervised import brief_bytes
 
@@ -48,7 +47,7 @@ class Program:
 
     def __init__(self, command: list[str], agent: int, life: int, log: Path, happened: SimpleQueue[Any]) -> None:
         with log.open("wb") as errors:
-            process = started(command, subprocess.PIPE, errors)
+            process = ForeignProgram(command, subprocess.PIPE, errors)
         self.child = Child("agent", agent, process, log, trusted=False)
         self._life, self._happened = life, happened
         threading.Thread(target=self._read, daemon=True).start()
@@ -72,15 +71,8 @@ class Program:
                 self.child.process.stdin.close()
 
     def kill(self) -> None:
-        """Kill it, as the script says, and wait until it is gone."""
+        """Kill it, and what it has started, and wait until it is gone."""
         self.child.process.kill()
-        self.child.process.wait()
-        self.orphan()
-
-    def end(self) -> None:
-        """Leave nothing of it behind: not what it has started, either."""
-        with suppress(ProcessLookupError):
-            os.killpg(self.child.process.pid, signal.SIGKILL)
         self.child.process.wait()
         self.orphan()
 

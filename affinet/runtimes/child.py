@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import subprocess
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,7 +17,6 @@ import psutil
 from affinet.runtimes.silence import ProcessStatus, StatusHistory
 from affinet.runtimes.told import LONGEST_LINE, Beat, Event, NotItsOwn, beat, printable, read, shown
 from netem.processes.supervised import brief_bytes, called
-from netem.wire.session import ENVIRONMENT
 
 _LAST_LINES, _LAST_BYTES = 12, 1 << 16
 _LONGEST_REASON = 4000
@@ -83,23 +81,16 @@ class UserCodeFailed(RunFailed):
     """It did because a user's own code did something wrong."""
 
 
+def indented(title: str, lines: Sequence[str]) -> str:
+    """Lines under a title."""
+    return "\n    ".join([title, *lines])
+
+
 def named(role: str, number: int | None) -> str:
     """What a process is called among those of a run."""
     if number is None:
         return role
     return called(number) if role == "agent" else f"{role} {number}"
-
-
-def started(command: Sequence[str], stdin: int, log: IO[bytes]) -> Process:
-    """A program as a process of the run, which writes its events to a pipe, and what else it says to its log."""
-    return subprocess.Popen(
-        command,
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=log,
-        env=os.environ | ENVIRONMENT,
-        start_new_session=True,  # Ctrl-C is for the launcher, which ends its children in order
-    )
 
 
 @dataclass
@@ -248,11 +239,15 @@ class Child:
         """How it ended, and its last lines."""
         code = self.process.wait()
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit status {code}"
+        lines = self.last_lines
+        return f"{self.who} was {how}." + (indented(" Its last lines:", lines) if lines else " It had said nothing.")
+
+    @property
+    def last_lines(self) -> list[str]:
+        """What it said last on its standard error."""
         with self.log.open("rb") as log:
             log.seek(max(0, log.seek(0, os.SEEK_END) - _LAST_BYTES))
-            lines = printable(log.read().decode(errors="replace")).splitlines()[-_LAST_LINES:]
-        said = "".join(f"\n    {line}" for line in lines) if lines else " It had said nothing."
-        return f"{self.who} was {how}.{' Its last lines:' if lines else ''}{said}"
+            return printable(log.read().decode(errors="replace")).splitlines()[-_LAST_LINES:]
 
     def report(self) -> dict[str, Any]:
         """For the summary."""

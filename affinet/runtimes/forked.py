@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import IO
 
 from affinet.runtimes import nursery
-from affinet.runtimes.child import Child, Process, RunFailed, started
+from affinet.runtimes.child import Child, Process, RunFailed
+from affinet.runtimes.programs import Program
 from affinet.runtimes.silence import StatusHistory
 from analysis.kernels import kernel as kernels
 
@@ -77,7 +78,7 @@ class Nursery:
             ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             unless_started.enter_context(ours)
             with theirs:
-                process = started(program(private, prepared), theirs.fileno(), log)
+                process = Program(program(private, prepared), theirs.fileno(), log)
             unless_started.pop_all()
         return cls(Child(NURSERY, None, process, Path(log.name), trusted=True), ours, patience_s)
 

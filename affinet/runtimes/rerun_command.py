@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 _START_S = 10.0
-_NOTHING_IN_IT = b"no data recording found"
+_NOTHING_IN_IT, _MAY_BE_NOTHING = b"no data recording found", 1024  # bytes: a first chunk alone is longer
 
 
 class NoViewer(RuntimeError):
@@ -38,8 +38,9 @@ def mend(recording: Path) -> None:
         mended.unlink(missing_ok=True)
         raise NotMended(f"{recording} breaks off, and cannot be mended: {_last_line(merged.stderr)}")
     mended.replace(recording)
-    # The command asks in a tenth of the time in which its library is imported, and a run that failed is to end soon.
-    if _NOTHING_IN_IT in _rrd("compare", str(recording), str(recording)).stderr:
+    # A run that failed is to end soon: the command takes a tenth of the time in which its library is imported, on a busy
+    # machine seconds.
+    if recording.stat().st_size < _MAY_BE_NOTHING and _is_empty(recording):
         recording.unlink()
 
 
@@ -68,6 +69,10 @@ def open_viewer() -> str:
             viewer.terminate()
             raise NoViewer(f"the Rerun viewer did not listen within {_START_S:g} s")
     return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def _is_empty(recording: Path) -> bool:
+    return _NOTHING_IN_IT in _rrd("compare", str(recording), str(recording)).stderr
 
 
 def _command() -> str:

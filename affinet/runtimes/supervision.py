@@ -14,10 +14,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-from affinet.runtimes.child import Child, RunFailed, named, started
+from affinet.runtimes.child import Child, RunFailed, indented, named
 from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.interruption import Interruption
 from affinet.runtimes.machines.coordinator import Coordinator
+from affinet.runtimes.programs import ForeignProgram
 from affinet.runtimes.silence import holding_up, stalled
 from affinet.runtimes.told import Beat, Event
 from netem.core.listing import listed
@@ -142,7 +143,7 @@ class ProcessGroup:
     def start(self, role: str, command: Sequence[str], brief: Any, number: int | None = None) -> Child:
         """Start a program of somebody else's making, and give it its brief."""
         with self._log(named(role, number)) as log:
-            process = started(command, subprocess.PIPE, log)
+            process = ForeignProgram(command, subprocess.PIPE, log)
         return self._brief(Child(role, number, process, Path(log.name), trusted=False), brief)
 
     def _log(self, name: str) -> IO[bytes]:
@@ -175,7 +176,8 @@ class ProcessGroup:
             late = self.now_s - self._moved_s >= patience_s
             if late or any(self.now_s - since_s >= self._patience_s for since_s in stopped_s.values()):
                 blamed = [child for child in waiting if late or child.name in stopped_s]
-                raise RunFailed(f"{_said_of(blamed)}, and not ready: waited {self.now_s - self._moved_s:.1f} s for it")
+                why = f"{_said_of(blamed)}, and not ready: waited {self.now_s - self._moved_s:.1f} s for it"
+                raise RunFailed(why + _last_lines(blamed))
         for child in children:
             child.measure()
             child.looks = None
@@ -229,8 +231,9 @@ class ProcessGroup:
         looks = {child.name: child.looks for child in culprits if child.looks is not None}
         trusted = [child.name for child in culprits if child.trusted]
         if blamed := stalled(looks, self._patience_s, trusted):
-            said = _said_of([alive[name] for name in blamed])
-            raise RunFailed(f"{said}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}")
+            to_blame = [alive[name] for name in blamed]
+            said = f"{_said_of(to_blame)}: nothing moved for {quiet_s:.1f} s; {_who_waits(beats, blamed)}"
+            raise RunFailed(said + _last_lines(to_blame))
 
     def kill(self, child: Child) -> None:
         """Kill a child as the script says, wait until it is gone, and keep nothing of it but its report."""
@@ -286,8 +289,9 @@ class ProcessGroup:
         looks = {child.name: child.looks for child in staying if child.looks is not None}
         trusted = [child.name for child in staying if child.role not in {"agent", "host"}]
         if blamed := stalled(looks, self._patience_s, trusted):
-            said = _said_of([child for child in staying if child.name in blamed])
-            raise RunFailed(f"{said}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run")
+            to_blame = [child for child in staying if child.name in blamed]
+            said = f"{_said_of(to_blame)}, and had not left {self.now_s - self._moved_s:.1f} s after the end of the run"
+            raise RunFailed(said + _last_lines(to_blame))
 
     def _lately(self, child: Child) -> Beat | None:
         """What a child does, unless it has not said so for a while, or never does."""
@@ -348,6 +352,12 @@ def _has_ended(child: Child) -> bool:
 
 def _said_of(children: Sequence[Child]) -> str:
     return listed(f"{child.who} {child.looks.now if child.looks else 'is gone'}" for child in children)
+
+
+def _last_lines(children: Sequence[Child]) -> str:
+    """What they have said on their standard error, those who did."""
+    said = ((child.name, child.last_lines) for child in children)
+    return "".join(indented(f"\n  {name} said last:", lines) for name, lines in said if lines)
 
 
 def _who_waits(beats: Mapping[str, Beat | None], whom: Collection[str]) -> str:

@@ -43,13 +43,19 @@ class Broadcasts:
         self._in_real_time = in_real_time
         self._speaking = {keys.broadcast(agent, name): (agent, name) for agent in agents for name in channels}
         self._channels, self._payloads = list(channels), payloads
-        of_voice = {f"{agent} {name}": key for key, (agent, name) in self._speaking.items()}
+        self._stream = {key: f"{agent} {name}" for key, (agent, name) in self._speaking.items()}
+        of_voice = {stream: key for key, stream in self._stream.items()}
         self._streams = Sequences("agent", lost=lost and (lambda stream, number: lost(of_voice[stream], number)))
 
     def speaker(self, key: str) -> int:
         """Whose key it is."""
         speaking = self._speaking.get(key)
         return int(key.rsplit("/", 3)[1]) if speaking is None else speaking[0]
+
+    def refuse(self, key: str) -> None:
+        """Take note that a broadcast was refused before its number was looked at."""
+        if (stream := self._stream.get(key)) is not None:
+            self._streams.refuse(stream)
 
     def restart(self, agent: int) -> None:
         """Expect the broadcasts of a new process."""
@@ -92,7 +98,7 @@ class Broadcasts:
             says = f"{_whose(key)}: it speaks twice in tick {tick}, or while it is dead or paused"
             raise WireError(says, Wrong.REPEATED)
         self._payloads.check(said.src, said.channel, said.payload)
-        self._streams.check(f"{said.src} {said.channel}", said.seq)
+        self._streams.check(self._stream[key], said.seq)
         return said
 
 

@@ -74,6 +74,9 @@ class Reader(Protocol[T_co]):
     def read(self, key: str, data: bytes, tick: int, awaited: Container[Any]) -> T_co:
         """What came in a tick in which so much is awaited; a `WireError` or an `UninstructedLoss` where it is wrong."""
 
+    def refuse(self, key: str) -> None:
+        """Take note that what came there last was refused, for another reason than its number."""
+
 
 class Intake:
     """What a subscriber takes from agents.
@@ -123,6 +126,8 @@ class Intake:
             return reader.read(key, arrived.data, tick, awaited)
         except (WireError, UninstructedLoss) as error:
             self.note(agent, error.wrong)
+            if isinstance(error, WireError):
+                reader.refuse(key)
             if self._trust.wrong_messages == "fail":
                 raise
             return None

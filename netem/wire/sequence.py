@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable
 
 from netem.wire.wrong import Wrong
@@ -70,6 +70,11 @@ class Sequences:
     def __init__(self, sender: str, *, from_any: bool = False, lost: Callable[[str, int], None] | None = None) -> None:
         self._sender, self._from_any, self._lost = sender, from_any, lost
         self._expected = Numbering()
+        self._refused: Counter[str] = Counter()
+
+    def refuse(self, stream: str) -> None:
+        """Its latest message was refused before its number was looked at: the transport has not lost it."""
+        self._refused[stream] += 1
 
     def check(self, stream: str, number: int) -> None:
         """Take note of a message; of one that is not the next, no note is taken.
@@ -83,7 +88,8 @@ class Sequences:
             self._expected.join(stream, number)
         expected = self._expected.due(stream)
         if self._lost is not None and number > expected:
-            self._lost(stream, number - expected)
+            if (lost := number - expected - self._refused[stream]) > 0:
+                self._lost(stream, lost)
             self._expected.skip(stream, number)
             expected = number
         if number != expected:
@@ -93,7 +99,9 @@ class Sequences:
                 Wrong.SKIPPED if number > expected else Wrong.REPEATED,
             )
         self._expected.next(stream)
+        self._refused.pop(stream, None)
 
     def restart(self, stream: str) -> None:
         """Expect 0 again: the sender is a new process."""
         self._expected.restart(stream)
+        self._refused.pop(stream, None)

@@ -125,3 +125,17 @@ def test_who_does_not_leave_is_named(tmp_path):
             RunFailed, match=r"^agent 2 \(pid \d+\) sleeps \(state S\), and had not left .* s after the end"
         ):
             crew.await_all_gone()
+
+
+def test_what_a_silent_program_said_last_is_told(tmp_path):
+    """Before: who looked for the reason had to know that there is a log."""
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
+        awaited = swarm(crew)
+        crew.start("agent", ["sh", "-c", "echo no port /dev/ttyUSB0 >&2; exec sleep 600"], {}, 2)
+        with pytest.raises(RunFailed, match=r"\n  agent 2 said last:\n    no port /dev/ttyUSB0$"):
+            blamed(crew, awaited)
+    with ProcessGroup(tmp_path, SHORT, Interruption()) as crew:
+        crew.start("agent", ["sleep", "600"], {}, 3)
+        with pytest.raises(RunFailed) as failure:
+            blamed(crew, crew.children)
+    assert "said last" not in str(failure.value)

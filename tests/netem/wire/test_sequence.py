@@ -81,3 +81,39 @@ def test_a_restart_of_one_stream_leaves_the_others():
     sequences.check("4 theta", 0)
     sequences.restart("3 theta")
     sequences.check("4 theta", 1)
+
+
+def counting(said):
+    sequences, lost = Sequences("agent", lost=lambda stream, number: lost.append((stream, number))), []
+    for number in said:
+        if number is None:
+            sequences.refuse("3 theta")
+        else:
+            sequences.check("3 theta", number)
+    return lost
+
+
+@pytest.mark.parametrize(
+    ("said", "lost"),
+    [
+        ((0, 1, 2), []),
+        ((0, 3), [2]),
+        ((0, None, 2, 3), []),
+        ((0, None, None, 3), []),
+        ((0, None, 4), [2]),
+        ((0, None, 1, 3), [1]),
+        ((None, 1, None, 3), []),
+    ],
+    ids=str,
+)
+def test_where_nobody_waits_what_was_refused_is_not_lost_by_the_transport(said, lost):
+    assert counting(said) == [("3 theta", number) for number in lost]
+
+
+def test_what_was_refused_of_a_process_that_is_gone_hides_no_loss():
+    lost = []
+    sequences = Sequences("agent", lost=lambda stream, number: lost.append((stream, number)))
+    sequences.refuse("3 theta")
+    sequences.restart("3 theta")
+    sequences.check("3 theta", 1)
+    assert lost == [("3 theta", 1)]
