@@ -173,3 +173,29 @@ def test_what_is_not_defined_may_be_nan():
     said = honest(ACT) | {"psi": float("nan"), "reports": {"place": [float("nan")] * 2}}
     assert subscriber.hears(msgpack.packb(said))
     assert not subscriber.refused()
+
+
+@pytest.mark.parametrize("on", [ACT, INPUT])
+@pytest.mark.parametrize(("refused", "lost"), [(0, 2), (1, 1), (2, 0), (3, 0)])
+def test_in_real_time_what_was_refused_is_not_lost_by_the_transport(on, refused, lost):
+    """Before, a flood was booked as lost."""
+    said = []
+    intake = Intake(Trust("drop", 1 << 20, 100, foreign=frozenset()))
+    given = {"in_real_time": True, "lost": lambda *what: said.append(what)}
+    if on == ACT:
+        reader = Acts(KEYS, LINKS, 2, {}, **given)
+    else:
+        neighbours = {agent: frozenset(LINKS.neighbours_of(agent)) for agent in (1, 2, 3)}
+        payloads = Payloads({INPUT: {"velocity": Form((2,), truths=False)}}, neighbours, 2, frozenset())
+        reader = Broadcasts(KEYS, (1, 2, 3), (INPUT,), payloads, **given)
+
+    def hears(tick):
+        right = msgpack.packb(honest(on, tick) | ({} if on == ACT else {"at": 0.1 * tick}))
+        assert intake.take(arrived(on, right), tick, (), reader)
+
+    hears(FIRST)
+    for _ in range(refused):
+        assert intake.take(arrived(on, b"\xc1"), FIRST, (), reader) is None
+    hears(FIRST + 3)
+    hears(FIRST + 5)
+    assert said == [(key(on), number) for number in (lost, 1) if number]
