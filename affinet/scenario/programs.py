@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping
+
+_NUMBER = re.compile(r"0|[1-9][0-9]{0,8}")
 
 
 def words(command: str) -> list[str]:
@@ -32,7 +35,7 @@ def of_agents(programs: Mapping[str, str]) -> dict[str, str]:
         When one is not.
     """
     for number, command in programs.items():
-        if not number.isascii() or not number.isdecimal() or number != str(int(number)):
+        if not _NUMBER.fullmatch(number):
             raise ValueError(f'{number!r} is no agent: give its number, like "3" = "python my_agent.py"')
         words(command)
     return dict(programs)

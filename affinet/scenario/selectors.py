@@ -27,10 +27,10 @@ T = TypeVar("T")
 
 _ROLES = ("leaders", "followers", "all")
 _ROLE = "|".join(_ROLES)
-_AGENT = rf"\d+|{_ROLE}"
+_AGENT = rf"\d{{1,9}}|{_ROLE}"
 _PAIR = re.compile(rf"({_AGENT})(->|-)({_AGENT})")
-_RANDOM = re.compile(r"random (\d+)")
-_RANDOM_AGENTS = re.compile(rf"random (\d+)(?: ({_ROLE}))?")
+_RANDOM = re.compile(r"random (\d{1,9})")
+_RANDOM_AGENTS = re.compile(rf"random (\d{{1,9}})(?: ({_ROLE}))?")
 _OF_GRAPH = ("ring", "bridges", "min-cut", "critical")
 _AGENTS_OF_GRAPH = ("cut-vertices", "critical")
 _SPLITS = ("halves", "leaders", "min-cut")
@@ -124,7 +124,7 @@ def edge(text: str) -> tuple[int, int]:
     ValueError
         When it is none.
     """
-    if not (match := re.fullmatch(r"(\d+)-(\d+)", text)):
+    if not (match := re.fullmatch(r"(\d{1,9})-(\d{1,9})", text)):
         raise ValueError(f"{text!r} is no edge; the edges of a formation have no direction: write '2-4'")
     return int(match[1]), int(match[2])
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterable, Mapping
 from itertools import islice
 
 _MOST_ITEMS, _DEEPEST = 6, 4
+_ENDLESS = re.compile(r"\S{400,}")  # longer than a path that somebody wrote
 
 
 def hint(word: object, known: Iterable[str]) -> str:
@@ -30,8 +32,12 @@ def shown(value: object, most: int = 60) -> str:
 
 
 def one_line(text: str) -> str:
-    """The text on one line, whatever a user's names hold: what breaks lines or cannot be printed is escaped."""
-    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
+    """The text on one line, whatever names hold: what breaks lines or cannot be printed is escaped, what has no end cut."""
+    return _ENDLESS.sub(_cut, "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text))
+
+
+def _cut(word: re.Match[str]) -> str:
+    return f"{word[0][:200]}...{word[0][-20:]}"
 
 
 def _plain(word: str) -> str:

@@ -296,3 +296,31 @@ def test_values_are_shown_as_toml_on_one_line(value, says):
 
 def test_what_breaks_a_line_is_escaped():
     assert one_line("a\nb\x1b[1m\u2028é m²") == "a\\nb\\x1b[1m\\u2028é m²"
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        f"agents.estimator={'[' * 5000!r}",
+        f"formation.edges=['2-1{'9' * 5000}']",
+        f"network.profile={'x' * 5000!r}",
+        f"formation.preset={'x' * 5000!r}",
+        f"agents.parameters={{rkf={{{'y' * 5000}=1.0}}}}",
+        f"agents.programs={{{'7' * 5000}='sh'}}",
+        f"timeline=[{{verb='kill', at=0.1, agents=[{'9' * 5000!r}]}}]",
+        f"timeline=[{{verb='kill', at=0.1, agents=['random {'9' * 5000}']}}]",
+        f"timeline=[{{verb='cut', at=0.1, links=['{'z' * 5000}']}}]",
+    ],
+    ids=lambda given: given.partition("=")[0],
+)
+def test_what_a_name_without_an_end_is_wrong_with_is_told_in_a_line_that_ends(override, capsys):
+    """Found in a thousand malformed files: a name of thousands of letters was all one saw."""
+    assert main(["check", "corridor", "--set", override]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 20 < len(line) < 1200
+    assert "..." in line
+
+
+def test_a_path_of_a_usual_length_is_not_cut():
+    path = "/".join(["folder" * 8] * 8)
+    assert one_line(path) == path

@@ -252,7 +252,7 @@ def test_a_swarm_that_cannot_be_launched_fails_and_says_why(refused, out, monkey
     def refuse(*_, **__):
         raise OSError(refused, os.strerror(refused))
 
-    monkeypatch.setattr("affinet.runtimes.supervision.subprocess.Popen", refuse)
+    monkeypatch.setattr("affinet.runtimes.forked.Program", refuse)
     done = fly(plan_of("corridor", *SHORT, "record.enabled=false"), "processes", out, lambda *_: None)
     assert done.reasons == (f"the swarm could not be launched: {said(OSError(refused, ''))}",)
     assert summary(out)["verdict"] == "fail"
