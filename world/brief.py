@@ -11,6 +11,7 @@ from netem.faults.fault import Fault
 from netem.faults.trigger import Trigger
 from netem.wire.intake import Trust
 from netem.wire.session import Login
+from world.books.scenery import Scenery
 from world.physics.world import World
 
 
@@ -30,6 +31,10 @@ class RecordOptions:
         Whether to make a recording.
     viewer
         URL of a viewer to stream to.
+    settings
+        The scenario, as Markdown.
+    scenery
+        What the swarm flies through.
     """
 
     every: int
@@ -37,6 +42,8 @@ class RecordOptions:
     window: int
     record: bool
     viewer: str | None
+    settings: str
+    scenery: Scenery
 
 
 @dataclass(frozen=True)

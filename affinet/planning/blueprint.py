@@ -169,6 +169,8 @@ def _course(path: Sequence[Waypoint], order: int, time: TimeSection, dimension: 
 def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
     seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
     section = given.manoeuvre
+    for number, wall in enumerate(section.walls, start=1):
+        sections.array(f"manoeuvre.walls.{number}", wall, (len(wall), dimension))
     if section.preset == "hover":
         return manoeuvre.hover(seconds, dimension)
     if section.preset is not None:

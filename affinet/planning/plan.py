@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
+from affinet.scenario.loading import to_toml
 from affinet.scenario.programs import words
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
@@ -26,7 +27,9 @@ from netem.faults.trigger import Trigger
 from netem.impairments.profile import Profile
 from netem.loading.choice import Choice
 from netem.medium.medium import Verdicted, recorded
+from world.books.scenery import JammedBall, Scenery
 from world.brief import RecordOptions
+from world.formation import manoeuvre
 from world.physics.world import World
 
 _MOST_OF_A_BATCH = 50
@@ -108,7 +111,19 @@ class Plan:
         # Who is killed has lost a batch, and in real time what a thread was still to write, or another machine to give.
         seconds = _BATCH_S if self.pace is None else _BATCH_IN_REAL_TIME_S * min(1.0, self.pace.factor)
         batch = min(_MOST_OF_A_BATCH, max(1, int(seconds / self.world.dt)))
-        return RecordOptions(record.every, batch, self.window, record.enabled, viewer)
+        settings = f"```toml\n{to_toml(self.scenario)}```\n"
+        return RecordOptions(record.every, batch, self.window, record.enabled, viewer, settings, self.scenery)
+
+    @property
+    def scenery(self) -> Scenery:
+        """What the swarm flies through, as far as it is known before."""
+        own, flown = self.profiles[0], self.scenario.manoeuvre
+        walls = flown.walls or manoeuvre.WALLS.get(flown.preset or "", ())
+        return Scenery(
+            tuple(tuple(map(tuple, wall)) for wall in walls),
+            tuple(JammedBall(tuple(zone.centre.tolist()), zone.radius, zone.share) for zone in own.zones),
+            max((reach.outer for reach in own.reaches if reach.comms), default=None),
+        )
 
     @property
     def window(self) -> int:

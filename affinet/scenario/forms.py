@@ -22,6 +22,7 @@ EXAMPLES: Mapping[str, Any] = {
     "formation.weights": [1.0, 1.0, -1.0, 1.0, -1.0, 1.0],
     "manoeuvre": {"preset": "hover"},
     "manoeuvre.keyframes.offset": [0.0, 0.0],
+    "manoeuvre.walls": [[[19.0, 4.0], [19.0, 1.4], [25.0, 1.4], [25.0, 4.0]]],
     "target.path": [{"time": 0.0, "position": [0.0, 0.0]}, {"time": 10.0, "position": [5.0, 0.0]}],
     "target.path.position": [0.0, 0.0],
     "time": {"dt": 0.01, "duration": 60.0},

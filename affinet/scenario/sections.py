@@ -103,10 +103,11 @@ class Keyframe(Section):
 
 
 class ManoeuvreSection(Section):
-    """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
+    """What the leaders fly: a preset, or keyframes joined by monotone cubics; and `walls` in pictures, lines through points (m)."""
 
     preset: Literal["hover", "corridor", "ravine"] | None = None
     keyframes: list[Keyframe] = Field(default_factory=list)
+    walls: list[Annotated[Matrix, Field(min_length=2)]] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _whole(self) -> ManoeuvreSection:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -22,6 +22,19 @@ _QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _COLLAPSE = np.array([[-1.375, -0.375], [0.0, 0.0]])
 _ANCHOR = np.array([4.0, 0.0])
 _LOOKS = 65  # at the way from one keyframe to the next, its middle among them
+
+# What the presets fly between, for pictures: lines through points, in metres.
+WALLS: Mapping[str, Sequence[Sequence[tuple[float, ...]]]] = {
+    "corridor": (
+        ((-6.0, 4.0), (48.0, 4.0), (48.0, -8.0)),
+        ((-6.0, -4.0), (19.0, -4.0), (19.0, -1.4), (25.0, -1.4), (25.0, -4.0), (38.5, -4.0), (38.5, -8.0)),
+        ((19.0, 4.0), (19.0, 1.4), (25.0, 1.4), (25.0, 4.0)),
+    ),
+    "ravine": (
+        *(((15.5, y, 3.0), (21.0, y, 3.0), (21.0, y, 9.0), (15.5, y, 9.0), (15.5, y, 3.0)) for y in (-1.3, 1.3)),
+        *(((32.0, -11.0, z), (38.0, -11.0, z), (38.0, -14.5, z), (32.0, -14.5, z), (32.0, -11.0, z)) for z in (5.5, 6.5)),
+    ),
+}
 
 
 def corridor(seconds: Array) -> Manoeuvre:

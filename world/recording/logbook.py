@@ -83,8 +83,7 @@ class RunWriter:
                 name=out.absolute().name,
                 world=world,
                 reports=reports,
-                every=books.every,
-                viewer=books.viewer,
+                books=books,
                 in_real_time=pace is not None,
             )
 

@@ -6,12 +6,9 @@ import numpy as np
 import rerun as rr
 
 from analysis.models.algebra import product
-from analysis.models.arrays import Array
 from netem.core.channels import THETA
-from netem.faults.timeline import Timeline
-from world.books.history import Moments
 from world.physics.world import World
-from world.recording.stage import points
+from world.recording.stage import Stage, Stretch
 
 _PERCEIVED = 0x3FA7F577
 
@@ -21,28 +18,24 @@ class PerceivedFormations:
 
     Parameters
     ----------
-    stream
-        The recording.
+    stage
+        Where.
     world
         What is flown.
-    origin
-        Of the recording, shape (D,), in metres.
     """
 
-    def __init__(self, stream: rr.RecordingStream, world: World, origin: Array) -> None:
-        self._stream = stream
-        self._origin = origin
+    def __init__(self, stage: Stage, world: World) -> None:
+        self._stage = stage
         nominal = world.formation.nominal
         self._from_each = nominal[None] - nominal[:, None]
-        self._reach = float(np.ptp(nominal, axis=0).max())
 
     def begin(self) -> None:
         """Log what does not change, in a part of the recording that has nothing yet."""
-        look = rr.Points3D.from_fields(radii=0.008 * self._reach, colors=_PERCEIVED)
-        self._stream.log("swarm/perceived", look, static=True)
+        look = rr.Points3D.from_fields(radii=0.008 * self._stage.reach, colors=_PERCEIVED)
+        self._stage.still("swarm/perceived", look)
 
-    def log(self, time: list[rr.TimeColumn], moments: Moments, kept: slice, timeline: Timeline) -> None:  # noqa: ARG002
-        """Consecutive ticks, of which those `kept` are recorded; who perceives no map is left out."""
-        theta, position = moments.reports[THETA][kept], moments.position[kept] - self._origin
+    def log(self, stretch: Stretch) -> None:
+        """Log consecutive ticks; who perceives no map is left out."""
+        theta, position = stretch.moments.reports[THETA][stretch.kept], stretch.position
         seen = position[:, :, None] + product(theta[:, :, None], self._from_each[..., None])[..., 0]
-        points(self._stream, "swarm/perceived", time, seen.reshape(len(seen), -1, seen.shape[-1]))
+        self._stage.points("swarm/perceived", stretch.time, seen.reshape(len(seen), -1, seen.shape[-1]))

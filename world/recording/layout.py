@@ -1,0 +1,139 @@
+"""How a recording is laid out when it is opened: a scene, and beside it what there is to see of the task and of the network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import rerun.blueprint as rrb
+
+from world.physics.world import World
+from world.recording.links import MOST_IN_A_MATRIX, SWEEP
+from world.recording.stage import TIMELINE
+
+_LEGEND = 0.3  # of the length of a run: kept free of curves
+_TRAIL_S = 8.0
+HIDDEN = ("swarm/believed", "swarm/range")  # until they are asked for, in the panel on the left
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What there is to see.
+
+    Parameters
+    ----------
+    localizes, pursues, maps, edges
+        Whether agents say where they believe they are, find a target, fit maps, or estimate edges.
+    in_real_time
+        Whether processes have a time to keep.
+    """
+
+    localizes: bool
+    pursues: bool
+    maps: bool
+    edges: bool
+    in_real_time: bool
+
+
+def blueprint(world: World, shown: Shown, reach: float) -> rrb.Blueprint:
+    """The layout of a recording of this world; `reach` is that of its formation, in metres."""
+    curves = _Curves(world.ticks * world.dt)
+    agents = world.formation.agents
+    air = [
+        rrb.Spatial2DView(origin="spacetime", name="messages in space and time", visual_bounds=_sweep(agents)),
+        *([_matrix(agents)] if agents <= MOST_IN_A_MATRIX else []),
+    ]
+    scene = rrb.Vertical(_scene(world, reach), rrb.Tabs(*air), row_shares=[3, 1])
+    panels = rrb.Vertical(
+        rrb.Tabs(*_of_the_task(curves, shown)),
+        rrb.Tabs(*_of_the_network(curves, shown)),
+        rrb.Tabs(
+            rrb.StateTimelineView(origin="processes", name="processes"),
+            rrb.TextLogView(origin="events", name="events"),
+            rrb.TextDocumentView(origin="settings", name="settings"),
+        ),
+        row_shares=[2, 2, 1],
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(scene, panels, column_shares=[3, 2]),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+class _Curves:
+    """Makes views of curves, with a margin in which their legends cover none."""
+
+    def __init__(self, duration_s: float) -> None:
+        ends = rrb.TimeRangeBoundary.absolute(seconds=duration_s * (1.0 + _LEGEND))
+        begins = rrb.TimeRangeBoundary.absolute(seconds=0.0)
+        self._axis = rrb.TimeAxis(view_range=rrb.TimeRange(start=begins, end=ends))
+
+    def view(self, origin: str, name: str, *, legend: bool = True, contents: Sequence[str] = ("$origin/**",)) -> rrb.View:
+        corner = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend)
+        return rrb.TimeSeriesView(
+            origin=origin, contents=list(contents), name=name, axis_x=self._axis, plot_legend=corner
+        )
+
+
+def _of_the_task(curves: _Curves, shown: Shown) -> list[rrb.View]:
+    views = []
+    if shown.localizes:
+        views.append(curves.view("metrics/localization", "off the best places (log10 m)", legend=False))
+    else:
+        if shown.pursues:
+            views.append(curves.view("metrics/target", "error of the target (log10 m)"))
+        views += [
+            curves.view("metrics/tracking_error", "tracking error (log10 m²)", legend=False),
+            curves.view("metrics/off", "off target, by agent (log10 m)"),
+            curves.view("metrics/procrustes", "off its shape (log10 m)", legend=False),
+        ]
+    if shown.maps:
+        views.append(curves.view("metrics/psi", "psi, by agent (log10)"))
+        views.append(curves.view("metrics/infeasible", "agents that can fit no map"))
+    if shown.edges:
+        views.append(curves.view("metrics/consistency", "filter consistency"))
+    return views
+
+
+def _of_the_network(curves: _Curves, shown: Shown) -> list[rrb.View]:
+    views = [
+        curves.view("messages", "messages per tick, by verdict"),
+        curves.view("graph/connectivity", "connectivity"),
+        curves.view("graph/joint_connectivity", "connectivity in a window"),
+        curves.view("graph/age", "age of information (s)"),
+        curves.view("graph", "rigidity", contents=("graph/feasible", "graph/stress_dimension")),
+    ]
+    return [*views, curves.view("timing", "how late processes are (ms)")] if shown.in_real_time else views
+
+
+def _scene(world: World, reach: float) -> rrb.View:
+    trail = rrb.VisibleTimeRange(
+        TIMELINE,
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-_TRAIL_S),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    flat = world.formation.dimension == 2
+    eye = rrb.EyeControls3D(
+        position=(0.0, -0.01 * reach, 2.6 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
+        look_target=(0.0, 0.0, 0.0),
+        eye_up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0),
+        tracking_entity="swarm/agents",
+    )
+    hidden: Mapping[str, rrb.EntityBehavior] = dict.fromkeys(HIDDEN, rrb.EntityBehavior(visible=False))
+    return rrb.Spatial3DView(
+        origin="swarm",
+        name="swarm",
+        line_grid=False,
+        eye_controls=eye,
+        overrides={"swarm/trail": rrb.VisibleTimeRanges([trail]), **hidden},
+    )
+
+
+def _sweep(agents: int) -> rrb.VisualBounds2D:
+    return rrb.VisualBounds2D(x_range=[-1.0, SWEEP + 1.0], y_range=[0.0, agents + 1.0])
+
+
+def _matrix(agents: int) -> rrb.View:
+    bounds = rrb.VisualBounds2D(x_range=[-1.5, agents + 0.5], y_range=[-1.5, agents + 0.5])
+    return rrb.Spatial2DView(origin="ages", name="age of what is heard, up to 1 s", visual_bounds=bounds)

@@ -1,0 +1,40 @@
+"""The colours of recordings and pictures: what an agent is and does, and what became of a message."""
+
+from __future__ import annotations
+
+from netem.medium.verdict import Verdict
+
+LEADER, FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
+DEAD, PAUSED, DEPARTED, VANISHED = 0xB23B3BFF, 0xB388FFFF, 0x8A8A8AFF, 0x00000000
+SENSING, COMMS, BOTH = 0x3DDC84FF, 0x3FA7F5FF, 0x8FE3FFFF
+PLAIN, FAINT, BAND = 0xFFFFFFFF, 0x8888AA60, 0xAAAAAAFF
+OF_VERDICT = {
+    Verdict.SILENT: 0x00000000,
+    Verdict.DELIVERED: 0x3DDC84FF,
+    Verdict.DELAYED: 0x9AD0FFFF,
+    Verdict.DEAD: 0xB23B3BFF,
+    Verdict.PAUSED: 0xB388FFFF,
+    Verdict.DEPARTED: 0x8A8A8AFF,
+    Verdict.CUT: 0xFF3B30FF,
+    Verdict.PARTITION: 0xC86BFFFF,
+    Verdict.SCRIPTED: 0xFF6B6BFF,
+    Verdict.DROPOUT: 0xFF80ABFF,
+    Verdict.CLOSED: 0x6A6A7AFF,
+    Verdict.RANGE: 0xA1887FFF,
+    Verdict.JAMMED: 0xFFEB3BFF,
+    Verdict.LISTED: 0xFFCC80FF,
+    Verdict.LOST: 0xFF9F1CFF,
+    Verdict.OVERFLOW: 0x26C6DAFF,
+    Verdict.UNSAID: 0xF48FB1FF,
+}
+# As far from each other as so many can be on a dark ground.
+_OF_AGENTS = (
+    *(0x4FC3F7FF, 0xFFB300FF, 0x66BB6AFF, 0xEF5350FF, 0xBA68C8FF, 0xFFF176FF),
+    *(0xA1887FFF, 0xF48FB1FF, 0x26A69AFF, 0xC5E1A5FF, 0x9FA8DAFF, 0xFFFFFFFF),
+)
+MOST_APART = len(_OF_AGENTS)
+
+
+def of_agents(number: int) -> list[int]:
+    """A colour for each of so many agents, which differ up to `MOST_APART` of them."""
+    return [_OF_AGENTS[agent % MOST_APART] for agent in range(number)]
