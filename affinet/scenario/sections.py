@@ -103,7 +103,10 @@ class Keyframe(Section):
 
 
 class ManoeuvreSection(Section):
-    """What the leaders fly: a preset, or keyframes joined by monotone cubics; and `walls` in pictures, lines through points (m)."""
+    """What the leaders fly: a preset, or keyframes joined by monotone cubics.
+
+    `walls` are lines through points, in metres, that pictures show.
+    """
 
     preset: Literal["hover", "corridor", "ravine"] | None = None
     keyframes: list[Keyframe] = Field(default_factory=list)

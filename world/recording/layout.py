@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import rerun.blueprint as rrb
 
 from world.physics.world import World
-from world.recording.links import MOST_IN_A_MATRIX, SWEEP
+from world.recording.links import MOST_IN_A_MATRIX, SHAPE, SWEEP
 from world.recording.stage import TIMELINE
 
 _LEGEND = 0.3  # of the length of a run: kept free of curves
@@ -35,12 +35,12 @@ class Shown:
     in_real_time: bool
 
 
-def blueprint(world: World, shown: Shown, reach: float) -> rrb.Blueprint:
-    """The layout of a recording of this world; `reach` is that of its formation, in metres."""
+def blueprint(world: World, shown: Shown, reach: float, every: int) -> rrb.Blueprint:
+    """The layout of a recording of this world, of one tick in so many; `reach` is that of its formation, in metres."""
     curves = _Curves(world.ticks * world.dt)
     agents = world.formation.agents
     air = [
-        rrb.Spatial2DView(origin="spacetime", name="messages in space and time", visual_bounds=_sweep(agents)),
+        _messages(agents, SWEEP * every * world.dt),
         *([_matrix(agents)] if agents <= MOST_IN_A_MATRIX else []),
     ]
     scene = rrb.Vertical(_scene(world, reach), rrb.Tabs(*air), row_shares=[3, 1])
@@ -52,7 +52,7 @@ def blueprint(world: World, shown: Shown, reach: float) -> rrb.Blueprint:
             rrb.TextLogView(origin="events", name="events"),
             rrb.TextDocumentView(origin="settings", name="settings"),
         ),
-        row_shares=[2, 2, 1],
+        row_shares=[4, 4, 3],
     )
     return rrb.Blueprint(
         rrb.Horizontal(scene, panels, column_shares=[3, 2]),
@@ -69,7 +69,9 @@ class _Curves:
         begins = rrb.TimeRangeBoundary.absolute(seconds=0.0)
         self._axis = rrb.TimeAxis(view_range=rrb.TimeRange(start=begins, end=ends))
 
-    def view(self, origin: str, name: str, *, legend: bool = True, contents: Sequence[str] = ("$origin/**",)) -> rrb.View:
+    def view(
+        self, origin: str, name: str, *, legend: bool = True, contents: Sequence[str] = ("$origin/**",)
+    ) -> rrb.View:
         corner = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend)
         return rrb.TimeSeriesView(
             origin=origin, contents=list(contents), name=name, axis_x=self._axis, plot_legend=corner
@@ -108,14 +110,9 @@ def _of_the_network(curves: _Curves, shown: Shown) -> list[rrb.View]:
 
 
 def _scene(world: World, reach: float) -> rrb.View:
-    trail = rrb.VisibleTimeRange(
-        TIMELINE,
-        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-_TRAIL_S),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
     flat = world.formation.dimension == 2
     eye = rrb.EyeControls3D(
-        position=(0.0, -0.01 * reach, 2.6 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
+        position=(0.0, -0.01 * reach, 2.0 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
         look_target=(0.0, 0.0, 0.0),
         eye_up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0),
         tracking_entity="swarm/agents",
@@ -126,12 +123,22 @@ def _scene(world: World, reach: float) -> rrb.View:
         name="swarm",
         line_grid=False,
         eye_controls=eye,
-        overrides={"swarm/trail": rrb.VisibleTimeRanges([trail]), **hidden},
+        overrides={"swarm/trail": rrb.VisibleTimeRanges([_lately(_TRAIL_S)]), **hidden},
     )
 
 
-def _sweep(agents: int) -> rrb.VisualBounds2D:
-    return rrb.VisualBounds2D(x_range=[-1.0, SWEEP + 1.0], y_range=[0.0, agents + 1.0])
+def _messages(agents: int, sweep_s: float) -> rrb.View:
+    return rrb.Spatial2DView(
+        origin="spacetime",
+        name="messages in space and time",
+        visual_bounds=rrb.VisualBounds2D(x_range=[-1.0, SHAPE * agents + 1.0], y_range=[0.0, agents + 1.0]),
+        time_ranges=[_lately(sweep_s)],
+    )
+
+
+def _lately(seconds: float) -> rrb.VisibleTimeRange:
+    until = rrb.TimeRangeBoundary.cursor_relative()
+    return rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds), end=until)
 
 
 def _matrix(agents: int) -> rrb.View:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from analysis.models.arrays import Array, Integers
+from analysis.models.arrays import Array, Integers, Mask
 from netem.core.links import Links
 from netem.medium.verdict import REASONS, Verdict
 from world.physics.world import World
@@ -17,8 +17,8 @@ _COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 MOST_IN_A_MATRIX = 60  # agents, whose matrix is drawn
 _OLD_S = 1.0  # an age that is drawn as the oldest
 _FRESH, _STALE, _NEVER = np.array([61, 220, 132.0]), np.array([176, 42, 48.0]), np.array([70, 70, 82])
-SWEEP = 24  # recorded moments beside each other, after which the diagram of messages begins again at its left
-_ROW = 1.0  # height of an agent in it; a moment is as wide
+SWEEP = 12  # recorded moments beside each other, after which the diagram of messages begins again at its left
+SHAPE = 4.0  # how much wider it is than the rows of all agents are high
 
 
 class Graph:
@@ -108,7 +108,7 @@ class AgeMatrix:
 
     def begin(self) -> None:
         """Log what does not change, in a part of the recording that has nothing yet."""
-        middle, before = np.arange(self._agents) + 0.5, np.full(self._agents, -0.6)
+        middle, before = np.arange(self._agents) + 0.3, np.full(self._agents, -0.6)
         places = np.concatenate([np.stack([before, middle], -1), np.stack([middle, before], -1)])
         numbers = [str(agent) for agent in range(1, self._agents + 1)]
         labels = rr.Points2D(places, labels=numbers * 2, radii=0.0, show_labels=True)
@@ -154,12 +154,14 @@ class SpaceTime:
 
     def begin(self) -> None:
         """Log what does not change, in a part of the recording that has nothing yet."""
-        rows = _ROW * np.arange(1, self._agents + 1)
-        lines = np.stack([np.stack([np.zeros_like(rows), rows], -1), np.stack([rows * 0.0 + SWEEP, rows], -1)], axis=1)
+        rows, width = np.arange(1.0, self._agents + 1.0), SHAPE * self._agents
+        lines = np.stack(
+            [np.stack([np.zeros_like(rows), rows], -1), np.stack([np.full_like(rows, width), rows], -1)], 1
+        )
         numbers = [str(agent) for agent in range(1, self._agents + 1)]
         self._stage.still("spacetime/rows", rr.LineStrips2D(lines, colors=0x50506080, radii=rr.Radius.ui_points(0.5)))
         names = rr.Points2D(
-            np.stack([np.full(self._agents, -0.5), rows], -1), labels=numbers, radii=0.0, show_labels=True
+            np.stack([np.full(self._agents, -0.5), rows - 0.4], -1), labels=numbers, radii=0.0, show_labels=True
         )
         self._stage.still("spacetime/numbers", names)
         self._stage.still("spacetime/messages", rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.0)))
@@ -178,11 +180,12 @@ class SpaceTime:
         columns = rr.LineStrips2D.columns(strips=ends[shown], colors=colours[shown])
         self._stage.stream.send_columns("spacetime/messages", stretch.time, columns.partition(shown.sum(axis=1)))
 
-    def _ends(self, ticks: Integers, age: Integers, dropped: Array) -> Array:
+    def _ends(self, ticks: Integers, age: Integers, dropped: Mask) -> Array:
         """Where the line of each message begins and ends, shape (T, L, 2, 2)."""
         moment = (ticks // self._every % SWEEP)[:, None] + (self._links.src - 1) / (1.2 * self._agents)
         said, heard = np.broadcast_to(self._links.src, age.shape), np.broadcast_to(self._links.dst, age.shape)
         until = np.where(dropped, (said + heard) / 2.0, heard)
-        begins = np.stack([moment - age / self._every, _ROW * said], axis=-1)
-        ends = np.stack([moment + 0.5 / self._agents, _ROW * until], axis=-1)
+        wide = SHAPE * self._agents / SWEEP
+        begins = np.stack([wide * (moment - age / self._every), said], axis=-1)
+        ends = np.stack([wide * (moment + 0.5 / self._agents), until], axis=-1)
         return np.stack([begins, ends], axis=-2)

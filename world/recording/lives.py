@@ -34,16 +34,17 @@ class Lives:
 
     def __init__(self, stage: Stage, agents: int) -> None:
         self._stage, self._agents = stage, agents
-        self._forget()
+        self._was: list[str | None] = [None] * agents
+        self._under: Conditions | None = None
 
     def begin(self) -> None:
         """Log what does not change, in a part of the recording that has nothing yet."""
-        self._forget()
+        self._was, self._under = [None] * self._agents, None
         states = rr.StateConfiguration(
             values=list(_STATES), labels=list(_STATES), colors=np.array([*_STATES.values()], dtype=np.uint32)
         )
         for agent in range(1, self._agents + 1):
-            self._stage.still(f"processes/agent {agent}", states)
+            self._stage.still(f"processes/{agent}", states)
 
     def log(self, stretch: Stretch) -> None:
         """Log consecutive ticks."""
@@ -57,15 +58,11 @@ class Lives:
             for agent, (before, state) in enumerate(zip(self._was, now, strict=True), start=1):
                 if state != before:
                     changes.setdefault(agent, []).append((tick, state))
-            self._was = now
+            self._was = [*now]
         for agent, changed in changes.items():
             ticks, said = zip(*changed, strict=True)
             columns = rr.StateChange.columns(state=said)
-            self._stage.stream.send_columns(f"processes/agent {agent}", self._stage.times(ticks), columns)
-
-    def _forget(self) -> None:
-        self._was: list[str | None] = [None] * self._agents
-        self._under: Conditions | None = None
+            self._stage.stream.send_columns(f"processes/{agent}", self._stage.times(ticks), columns)
 
     def _log_events(self, stretch: Stretch) -> None:
         said = [(tick, *line) for tick in stretch.moments.ticks.tolist() for line in _said_of(stretch.timeline, tick)]
@@ -75,10 +72,10 @@ class Lives:
             self._stage.stream.send_columns("events", self._stage.times(ticks), columns)
 
 
-def states(now: Conditions) -> list[str | None]:
+def states(now: Conditions) -> list[str]:
     """What each agent does."""
     masks = [now.vanished, now.dead, now.departed, now.paused]
-    said: list[str | None] = np.select(masks, ["gone", "dead", "departed", "paused"], "flies").tolist()
+    said: list[str] = np.select(masks, ["gone", "dead", "departed", "paused"], "flies").tolist()
     return said
 
 

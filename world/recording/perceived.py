@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import rerun as rr
 
 from analysis.models.algebra import product

@@ -36,7 +36,9 @@ from world.recording.swarm import Swarm
 from world.recording.target import Pursued
 
 _FLUSH_S = 20.0
-LARGEST = 2**23  # bytes, after which the next part begins: the library holds 0.7 kB of each chunk of one, for its ending
+LARGEST = (
+    2**23
+)  # bytes, after which the next part begins: the library holds 0.7 kB of each chunk of one, for its ending
 
 
 class Recorder:
@@ -87,7 +89,7 @@ class Recorder:
             )
         self._stage = Stage(self._stream, world)
         shown = _shown(world, reports, in_real_time=in_real_time)
-        self._blueprint = blueprint(world, shown, self._stage.reach)
+        self._blueprint = blueprint(world, shown, self._stage.reach, books.every)
         self._layers = _layers(self._stage, world, books, shown)
         self._begin()
 

@@ -110,9 +110,7 @@ class Stage:
 
     def arrows(self, path: str, time: Times, origins: Array, vectors: Array) -> None:
         """Log arrows (T, n, D) from points (T, n, D)."""
-        columns = rr.Arrows3D.columns(
-            vectors=spatial(vectors).reshape(-1, 3), origins=spatial(origins).reshape(-1, 3)
-        )
+        columns = rr.Arrows3D.columns(vectors=spatial(vectors).reshape(-1, 3), origins=spatial(origins).reshape(-1, 3))
         self.stream.send_columns(path, time, columns.partition([origins.shape[1]] * len(origins)))
 
     def scalars(self, path: str, time: Times, values: Array) -> None:

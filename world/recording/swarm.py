@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import rerun as rr
 
 from analysis.models.arrays import Array
+from analysis.models.elementary import whole_power
 from netem.faults.timeline import Conditions
 from world.physics.world import World
 from world.recording import palette
 from world.recording.stage import Colours, Stage, Stretch, spatial
 
-_AHEAD_S = 0.5  # an arrow ends where a velocity leads within
+_AHEAD_S = 0.5  # an arrow ends where an input alone leads within
 _STEPS = (1.0, 2.0, 5.0)
 
 
@@ -28,6 +31,8 @@ class Swarm:
 
     def __init__(self, stage: Stage, world: World) -> None:
         self._stage, self._formation = stage, world.formation
+        order = world.body.build().order
+        self._per_input = whole_power(_AHEAD_S, order) / math.factorial(order)
         self._edges = np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1
         self._metres = _round_length(stage.reach / 4.0)
 
@@ -51,7 +56,7 @@ class Swarm:
         self._log_bodies(stretch)
         self._stage.segments("swarm/target", stretch.time, spatial(stretch.target)[:, self._edges])
         flown = stretch.moments.input[stretch.kept]
-        self._stage.arrows("swarm/input", stretch.time, stretch.position, _AHEAD_S * flown)
+        self._stage.arrows("swarm/input", stretch.time, stretch.position, self._per_input * flown)
         self._stage.segments("swarm/scale", stretch.time, self._bar(stretch.target))
 
     def _log_bodies(self, stretch: Stretch) -> None:
@@ -71,7 +76,7 @@ class Swarm:
         """A bar below the formation that is wanted, shape (T, 1, 2, 3)."""
         corner = spatial(target.min(axis=1))
         corner[:, 1] -= 0.3 * self._stage.reach
-        ends = np.stack([corner, corner + [self._metres, 0.0, 0.0]], axis=1)
+        ends = np.stack([corner, corner + np.array([self._metres, 0.0, 0.0])], axis=1)
         return ends[:, None]
 
 

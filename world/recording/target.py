@@ -58,7 +58,9 @@ class Pursued:
         )
         strips = lines.reshape(len(lines), -1, *lines.shape[-2:])
         columns = rr.LineStrips3D.columns(strips=strips.reshape(-1, *strips.shape[-2:]))
-        self._stage.stream.send_columns("swarm/agreed/spread", stretch.time, columns.partition([strips.shape[1]] * len(strips)))
+        self._stage.stream.send_columns(
+            "swarm/agreed/spread", stretch.time, columns.partition([strips.shape[1]] * len(strips))
+        )
 
 
 def _over_agents(off: Array) -> Array:

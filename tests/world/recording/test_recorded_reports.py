@@ -53,8 +53,9 @@ def test_a_recording_of_a_pursuit_shows_the_target_and_what_agents_know_of_it(pu
         np.sqrt(np.nanmean(((each - target) ** 2).sum(axis=-1), axis=-1))
         for each in (kept["found"], kept["reference"][:, :, 0])
     ]
-    np.testing.assert_allclose(told, np.stack(expected, axis=-1), rtol=1e-6, atol=1e-9)
-    assert np.isfinite(told).all()
+    off = np.stack(expected, axis=-1)
+    np.testing.assert_array_equal(np.isnan(told), off == 0.0)
+    np.testing.assert_allclose(10.0 ** told[off > 0.0], off[off > 0.0], rtol=1e-6)
     strips = column(chunks, "/swarm/agreed/spread", "LineStrips3D:strips")
     assert [len(moment) for moment in strips] == [10] * 8
     away = np.linalg.norm(np.array(strips[4])[..., :2] - kept["reference"][4, :, None, 0], axis=-1)
@@ -88,8 +89,10 @@ def test_a_recording_of_localization_shows_places_the_best_places_and_ellipses(t
     assert np.isnan(off[:5]).all()
     assert np.isfinite(off[20:]).all()
     here = np.sqrt(((place - best) ** 2).sum(axis=-1).mean(axis=-1))
-    np.testing.assert_allclose(off[20:], here[20:], rtol=1e-4, atol=1e-6)
-    assert off[20] > off[-1] > 0.0
+    seen = here > 1e-5  # below, positions of single floats tell nothing
+    assert seen[20:23].all()
+    np.testing.assert_allclose(off[seen], np.log10(here[seen]), atol=1e-2)
+    assert off[20] > off[-1]
     # They are drawn where agents are, and not at the origin of the common frame.
     moved = place[..., :2] - arrays["place"][:150:5]
     np.testing.assert_allclose(moved[20:], np.broadcast_to(moved[20:, :1], moved[20:].shape), atol=1e-5)
@@ -109,7 +112,7 @@ def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
     kept = arrays["place"][:40:5]
     assert np.isnan(kept).any(axis=(1, 2)).tolist() == [False] * 4 + [True] * 4
     known = FirstMeasurements.of(plan.world, plan.timeline, arrays["measured"], arrays["verdicts"][:, 0])
-    np.testing.assert_allclose(told, localization.distance(kept, known.edges()), rtol=1e-6)
+    np.testing.assert_allclose(told, np.log10(localization.distance(kept, known.edges())), rtol=1e-6)
     assert np.isfinite(told).all()
     place, best = (
         np.array(column(chunks, f"/swarm/{path}", "Points3D:positions"), dtype=float) for path in ("place", "optimal")
@@ -117,7 +120,7 @@ def test_a_recording_of_localization_goes_on_when_one_dies(tmp_path):
     assert np.isfinite(best).all()
     assert np.isfinite(np.delete(place, 3, axis=1)).all()
     off = np.delete(place - best, 3, axis=1)[4:]
-    np.testing.assert_allclose(np.sqrt((off**2).sum(axis=-1).mean(axis=-1)), told[4:], rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(np.sqrt((off**2).sum(axis=-1).mean(axis=-1)), 10.0 ** told[4:], rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("estimator", ["ral", "conral", "ga-rkf"])

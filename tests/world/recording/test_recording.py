@@ -42,12 +42,24 @@ def test_it_holds_the_swarm_the_graphs_the_target_and_the_metrics(chunks):
         "/swarm/target",
         "/swarm/graph/nominal",
         "/swarm/graph/functional",
+        "/swarm/believed",
+        "/swarm/input",
+        "/swarm/perceived",
+        "/swarm/scale",
+        "/swarm/walls",
         "/metrics/tracking_error",
+        "/metrics/off",
+        "/metrics/procrustes",
         "/metrics/psi",
         "/metrics/consistency",
         "/metrics/infeasible",
-        "/metrics/messages",
+        "/messages/delivered",
+        "/graph/connectivity",
+        "/ages/matrix",
+        "/spacetime/messages",
+        "/processes/7",
         "/events",
+        "/settings",
     } <= {str(chunk.entity_path) for chunk in chunks}
 
 
@@ -58,7 +70,7 @@ def test_it_is_on_simulated_time(chunks):
 
 def test_the_tracking_error_is_that_of_the_run(chunks, flown):
     recorded = [value[0] for value in column(chunks, "/metrics/tracking_error", "Scalars:scalars")]
-    assert recorded == load(flown / ARRAYS)["error"][::5].tolist()
+    np.testing.assert_allclose(recorded, np.log10(load(flown / ARRAYS)["error"][::5]), rtol=1e-12)
 
 
 def normalised(plan, arrays, tick):
@@ -126,10 +138,13 @@ def test_a_swarm_that_diverges_in_space_is_recorded_to_the_end(estimator, sensin
 
 
 def test_messages_are_counted_over_all_ticks(chunks, flown):
-    per_tick = np.array(column(chunks, "/metrics/messages", "Scalars:scalars"))
     verdicts = load(flown / ARRAYS)["verdicts"]
-    assert per_tick[:, 0].sum() * 5 == pytest.approx((verdicts == Verdict.DELIVERED).sum())
-    assert per_tick.sum() * 5 == pytest.approx((verdicts != Verdict.SILENT).sum())
+    counts = {verdict: int((verdicts == verdict).sum()) for verdict in Verdict if verdict != Verdict.SILENT}
+    told = {verdict: 5 * np.sum(column(chunks, f"/messages/{verdict.label}", "Scalars:scalars")) for verdict in counts}
+    assert told == pytest.approx(counts)
+    assert {str(chunk.entity_path) for chunk in chunks} & {f"/messages/{verdict.label}" for verdict in Verdict} == {
+        f"/messages/{verdict.label}" for verdict, number in counts.items() if number
+    }
 
 
 def test_faults_are_told_as_text(chunks):
