@@ -21,7 +21,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import machines, options, show, terminal
+from affinet.cli import machines, options, show, terminal, watching
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process
@@ -31,7 +31,7 @@ from affinet.runtimes.interruption import Interrupted
 from affinet.runtimes.machines import hosts
 from affinet.runtimes.machines.place import Refused
 from affinet.runtimes.machines.spread import Spread
-from affinet.runtimes.rerun_command import NoViewer, open_viewer
+from affinet.runtimes.rerun_command import NoViewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
 from affinet.scenario.sections import Scenario, ScenarioError
@@ -207,6 +207,11 @@ def _replay(parsed: argparse.Namespace) -> int:
     return status if difference is None else FAIL
 
 
+def _watch(parsed: argparse.Namespace) -> int:
+    watching.watch(parsed.directories, serve=parsed.serve)
+    return PASS
+
+
 def _check_determinism(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
@@ -303,16 +308,16 @@ def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Pa
         refuse_in_process(plan)
     if parsed.out:
         refuse_taken(parsed.out)
-    viewer = open_viewer() if parsed.view else None
-    parsed.out = parsed.out or directories.for_run(name)
-    claim(parsed.out)
-    with show.Progress(plan, name, parsed.out) as watch:
-        elsewhere = None if spread is None else spread(parsed.out)
-        outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer, elsewhere)
-    if parsed.json:
-        print(json.dumps(outcome.to_json(), allow_nan=False))  # noqa: T201
-    else:
-        show.outcome(outcome, plan)
+    with watching.live(parsed) as viewer:
+        parsed.out = parsed.out or directories.for_run(name)
+        claim(parsed.out)
+        with show.Progress(plan, name, parsed.out) as watch:
+            elsewhere = None if spread is None else spread(parsed.out)
+            outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer, elsewhere)
+        if parsed.json:
+            print(json.dumps(outcome.to_json(), allow_nan=False), flush=True)  # noqa: T201
+        else:
+            show.outcome(outcome, plan)
     return _status(outcome)
 
 
@@ -357,6 +362,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
     "replay": _replay,
+    "watch": _watch,
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,

@@ -6,6 +6,7 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
+from affinet.cli import watching
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
@@ -42,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
             "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
         )
         _add_output(command)
+    watching.add_to(commands)
     _add_hunt(commands)
     _add_study(commands)
     _add_design(commands)
@@ -69,7 +71,7 @@ def _add_overrides(command: argparse.ArgumentParser) -> None:
 
 def _add_output(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=_path, metavar="DIR", help="run directory (default: runs/SCENARIO-TIME)")
-    command.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+    watching.add_live(command)
 
 
 def _add_coordinators(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

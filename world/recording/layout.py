@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import rerun.blueprint as rrb
@@ -13,7 +13,7 @@ from world.recording.stage import TIMELINE
 
 _LEGEND = 0.3  # of the length of a run: kept free of curves
 _TRAIL_S = 8.0
-HIDDEN = ("swarm/believed", "swarm/range")  # until they are asked for, in the panel on the left
+HIDDEN = ("believed", "range")  # until they are asked for, in the panel on the left
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Shown:
 
 def blueprint(world: World, shown: Shown, reach: float, every: int) -> rrb.Blueprint:
     """The layout of a recording of this world, of one tick in so many; `reach` is that of its formation, in metres."""
-    curves = _Curves(world.ticks * world.dt)
+    curves = Curves(world.ticks * world.dt)
     agents = world.formation.agents
     air = [
         _messages(agents, SWEEP * every * world.dt),
         *([_matrix(agents)] if agents <= MOST_IN_A_MATRIX else []),
     ]
-    scene = rrb.Vertical(_scene(world, reach), rrb.Tabs(*air), row_shares=[3, 1])
+    seen = scene("swarm", "swarm", reach, flat=world.formation.dimension == 2)
     panels = rrb.Vertical(
         rrb.Tabs(*_of_the_task(curves, shown)),
         rrb.Tabs(*_of_the_network(curves, shown)),
@@ -55,14 +55,20 @@ def blueprint(world: World, shown: Shown, reach: float, every: int) -> rrb.Bluep
         row_shares=[4, 4, 3],
     )
     return rrb.Blueprint(
-        rrb.Horizontal(scene, panels, column_shares=[3, 2]),
+        rrb.Horizontal(rrb.Vertical(seen, rrb.Tabs(*air), row_shares=[3, 1]), panels, column_shares=[3, 2]),
         rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
         collapse_panels=True,
     )
 
 
-class _Curves:
-    """Makes views of curves, with a margin in which their legends cover none."""
+class Curves:
+    """Makes views of curves, with a margin in which their legends cover none.
+
+    Parameters
+    ----------
+    duration_s
+        How long they are.
+    """
 
     def __init__(self, duration_s: float) -> None:
         ends = rrb.TimeRangeBoundary.absolute(seconds=duration_s * (1.0 + _LEGEND))
@@ -72,13 +78,14 @@ class _Curves:
     def view(
         self, origin: str, name: str, *, legend: bool = True, contents: Sequence[str] = ("$origin/**",)
     ) -> rrb.View:
+        """A view of the curves below an entity, or of some."""
         corner = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend)
         return rrb.TimeSeriesView(
             origin=origin, contents=list(contents), name=name, axis_x=self._axis, plot_legend=corner
         )
 
 
-def _of_the_task(curves: _Curves, shown: Shown) -> list[rrb.View]:
+def _of_the_task(curves: Curves, shown: Shown) -> list[rrb.View]:
     views = []
     if shown.localizes:
         views.append(curves.view("metrics/localization", "off the best places (log10 m)", legend=False))
@@ -98,7 +105,7 @@ def _of_the_task(curves: _Curves, shown: Shown) -> list[rrb.View]:
     return views
 
 
-def _of_the_network(curves: _Curves, shown: Shown) -> list[rrb.View]:
+def _of_the_network(curves: Curves, shown: Shown) -> list[rrb.View]:
     views = [
         curves.view("messages", "messages per tick, by verdict"),
         curves.view("graph/connectivity", "connectivity"),
@@ -109,21 +116,21 @@ def _of_the_network(curves: _Curves, shown: Shown) -> list[rrb.View]:
     return [*views, curves.view("timing", "how late processes are (ms)")] if shown.in_real_time else views
 
 
-def _scene(world: World, reach: float) -> rrb.View:
-    flat = world.formation.dimension == 2
+def scene(origin: str, name: str, reach: float, *, flat: bool) -> rrb.View:
+    """A view of a swarm whose formation is so large, in metres, in a plane or not."""
     eye = rrb.EyeControls3D(
         position=(0.0, -0.01 * reach, 2.0 * reach) if flat else (-1.4 * reach, -2.0 * reach, 1.1 * reach),
         look_target=(0.0, 0.0, 0.0),
         eye_up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0),
-        tracking_entity="swarm/agents",
+        tracking_entity=f"{origin}/agents",
     )
-    hidden: Mapping[str, rrb.EntityBehavior] = dict.fromkeys(HIDDEN, rrb.EntityBehavior(visible=False))
+    hidden = {f"{origin}/{layer}": rrb.EntityBehavior(visible=False) for layer in HIDDEN}
     return rrb.Spatial3DView(
-        origin="swarm",
-        name="swarm",
+        origin=origin,
+        name=name,
         line_grid=False,
         eye_controls=eye,
-        overrides={"swarm/trail": rrb.VisibleTimeRanges([_lately(_TRAIL_S)]), **hidden},
+        overrides={f"{origin}/trail": rrb.VisibleTimeRanges([_lately(_TRAIL_S)]), **hidden},
     )
 
 

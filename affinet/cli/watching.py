@@ -1,0 +1,125 @@
+"""`affinet watch`, and the watching of a run while it flies."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from affinet.planning.blueprint import formation_of
+from affinet.runtimes.interruption import Interrupted, ended_by_signals
+from affinet.runtimes.rerun_command import NoViewer
+from affinet.runtimes.viewers import WebViewer, open_viewer, show
+from affinet.scenario import loading
+from affinet.scenario.sections import ScenarioError
+from affinet.scenario.words import one_line
+from netem.core.parts import parts
+
+RECORDING = "run.rrd"
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command `watch`."""
+    watch = commands.add_parser("watch", help="watch what was flown: one run, or several on one timeline")
+    watch.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories")
+    watch.add_argument("--serve", action="store_true", help="as a page for a browser on this machine, until Ctrl-C")
+
+
+def add_live(command: argparse.ArgumentParser) -> None:
+    """Add what shows a run while it flies."""
+    shown = command.add_mutually_exclusive_group()
+    shown.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
+    shown.add_argument(
+        "--serve", action="store_true", help="watch in a browser on this machine while it flies, and on until Ctrl-C"
+    )
+
+
+def watch(directories: Sequence[Path], *, serve: bool) -> None:
+    """Show what was flown until the viewer is closed, or the page no longer wanted.
+
+    Raises
+    ------
+    ScenarioError
+        When a directory holds no run, or one without a recording.
+    NoViewer
+        When nothing can be shown.
+    """
+    with _files(directories) as files:
+        if not serve:
+            with ended_by_signals():
+                show(files)
+            return
+        with WebViewer(files) as web:
+            _tell(f"{web.page}\nserved until Ctrl-C")
+            _until_asked(web)
+
+
+@contextmanager
+def live(parsed: argparse.Namespace) -> Iterator[str | None]:
+    """Where a run is streamed to, if it is watched; without a screen it flies all the same."""
+    if parsed.serve:
+        with WebViewer() as web:
+            _tell(web.page)
+            yield web.stream
+            _tell(f"still at {web.page} until Ctrl-C")
+            _until_asked(web)
+        return
+    try:
+        viewer = open_viewer() if parsed.view else None
+    except NoViewer as error:
+        viewer = None
+        _tell(one_line(f"{error}; it flies without: `affinet watch RUN` shows it later, --serve in a browser"))
+    yield viewer
+
+
+def _until_asked(web: WebViewer) -> None:
+    with suppress(Interrupted), ended_by_signals():
+        web.wait()
+
+
+@contextmanager
+def _files(directories: Sequence[Path]) -> Iterator[list[Path]]:
+    """The recording of a run; of several, one that has them all."""
+    if len(directories) == 1:
+        yield _recording(directories[0])
+        return
+    from world.recording.beside import RecordedRun, beside  # Rerun takes a second to import
+
+    runs = []
+    for name, directory in zip(_names(directories), directories, strict=True):
+        flown = loading.resolved(directory)
+        nominal = formation_of(flown).nominal
+        reach, flat = float(np.ptp(nominal, axis=0).max()), nominal.shape[-1] == 2
+        runs.append(RecordedRun(name, _recording(directory), flat, reach, flown.time.duration))
+    with tempfile.TemporaryDirectory(prefix="affinet-") as folder:
+        together = Path(folder) / RECORDING
+        beside(runs, together)
+        yield [together]
+
+
+def _recording(directory: Path) -> list[Path]:
+    loading.resolved(directory)
+    if not (files := parts(directory / RECORDING)):
+        raise ScenarioError(f"{directory}: no {RECORDING} in it: it was flown with record.enabled=false, or cut short")
+    return files
+
+
+def _names(directories: Sequence[Path]) -> list[str]:
+    """The last part of each path; with a number where that is the same."""
+    names = [directory.absolute().name for directory in directories]
+    counts, seen = Counter(names), Counter[str]()
+    shown = []
+    for name in names:
+        seen[name] += 1
+        shown.append(name if counts[name] == 1 else f"{name} ({seen[name]})")
+    return shown
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
