@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from affinet.planning.blueprint import formation_of
-from affinet.runtimes.interruption import Interrupted, ended_by_signals
+from affinet.runtimes.interruption import ended_by_signals
 from affinet.runtimes.rerun_command import NoViewer
 from affinet.runtimes.viewers import WebViewer, open_viewer, show
 from affinet.scenario import loading
@@ -56,8 +56,7 @@ def watch(directories: Sequence[Path], *, serve: bool) -> None:
                 show(files)
             return
         with WebViewer(files) as web:
-            _tell(f"{web.page}\nserved until Ctrl-C")
-            _until_asked(web)
+            _until_asked(web, f"{web.page}\nserved until Ctrl-C")
 
 
 @contextmanager
@@ -67,8 +66,7 @@ def live(parsed: argparse.Namespace) -> Iterator[str | None]:
         with WebViewer() as web:
             _tell(web.page)
             yield web.stream
-            _tell(f"still at {web.page} until Ctrl-C")
-            _until_asked(web)
+            _until_asked(web, f"still at {web.page} until Ctrl-C")
         return
     try:
         viewer = open_viewer() if parsed.view else None
@@ -78,8 +76,9 @@ def live(parsed: argparse.Namespace) -> Iterator[str | None]:
     yield viewer
 
 
-def _until_asked(web: WebViewer) -> None:
-    with suppress(Interrupted), ended_by_signals():
+def _until_asked(web: WebViewer, says: str) -> None:
+    with suppress(KeyboardInterrupt), ended_by_signals():
+        _tell(says)
         web.wait()
 
 

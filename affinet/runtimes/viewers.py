@@ -32,7 +32,9 @@ def open_viewer() -> str:
         When it cannot start, as on a machine without a screen.
     """
     port = _free_port()
-    _Viewer(["--port", str(port), "--expect-data-soon"], outlives=True).await_listening([port])
+    viewer = _Viewer(["--port", str(port), "--expect-data-soon"], outlives=True)
+    viewer.await_listening([port])
+    viewer.let_go()
     return _stream(port)
 
 
@@ -114,12 +116,15 @@ class _Viewer:
     def await_listening(self, ports: Sequence[int]) -> None:
         """Wait until it listens there; a `NoViewer` where it does not."""
         deadline = time.monotonic() + _START_S
-        while not all(map(_listens, ports)):
+        wrong = None
+        while wrong is None and not all(map(_listens, ports)):
             if self._process.poll() is not None:
-                raise NoViewer(f"the Rerun viewer ended at once: {self._last_line()}")
-            if time.monotonic() > deadline:
-                self.end()
-                raise NoViewer(f"the Rerun viewer did not listen within {_START_S:g} s")
+                wrong = f"ended at once: {self._last_line()}"
+            elif time.monotonic() > deadline:
+                wrong = f"did not listen within {_START_S:g} s"
+        if wrong:
+            self.end()
+            raise NoViewer(f"the Rerun viewer {wrong}")
 
     def wait(self) -> None:
         """Wait until it ends; a `NoViewer` where it fails."""
@@ -134,6 +139,10 @@ class _Viewer:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Have nothing more to do with it."""
         self._said.close()
 
     def _last_line(self) -> str:
