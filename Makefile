@@ -4,7 +4,7 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray test-browser coverage lint types imports picture bench clean
 
 demo: $(READY) ## fly through bursts of losses over processes, and the same losses again with a filter alone
 	$(BIN)/affinet run bursts
@@ -19,7 +19,7 @@ test: lint types imports ## everything that must hold, in minutes
 test-room: $(READY) ## a room's own tests, without flights over processes: make test-room ROOM=netem/medium
 	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
-test-all: lint types imports test-xarray ## and the slow proofs
+test-all: lint types imports test-xarray test-browser ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
 
 test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every Python from 3.11 on that is found
@@ -31,6 +31,10 @@ test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose mod
 test-xarray: $(READY) ## what studies leave, read with xarray, in an environment of its own
 	UV_PROJECT_ENVIRONMENT=.venv-xarray $(UV) sync --locked --quiet --no-dev --group xarray
 	.venv-xarray/bin/pytest -n0 tests/affinet/studies/test_labelled.py
+
+test-browser: $(READY) ## the web viewer in headless Chromium, in an environment of its own
+	UV_PROJECT_ENVIRONMENT=.venv-browser $(UV) sync --locked --quiet --no-dev --group browser
+	.venv-browser/bin/pytest -n0 tests/affinet/cli/test_in_a_browser.py
 
 coverage: $(READY) ## which lines the tests in this process run, by room, into docs/coverage.md
 	$(BIN)/coverage erase

@@ -27,6 +27,7 @@ OF_VERDICT = {
     Verdict.OVERFLOW: 0x26C6DAFF,
     Verdict.UNSAID: 0xF48FB1FF,
 }
+WALL, JAMMED, RANGE = 0xB0A090FF, 0xFFEB3B55, 0x6A6A8A30
 # As far from each other as so many can be on either ground.
 _OF_AGENTS = (
     *(0x3D9BE9FF, 0xF59E0BFF, 0x3FAE5AFF, 0xE5484DFF, 0xA45EE5FF, 0xB8A100FF),

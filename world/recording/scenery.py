@@ -6,9 +6,8 @@ import numpy as np
 import rerun as rr
 
 from world.books.scenery import Scenery
+from world.recording import palette
 from world.recording.stage import Stage, Stretch, spatial
-
-_WALL, _JAMMED, _RANGE = 0xB0A090FF, 0xFFEB3B55, 0x6A6A8A30
 
 
 class Surroundings:
@@ -29,21 +28,23 @@ class Surroundings:
         """Log what does not change, in a part of the recording that has nothing yet."""
         if walls := self._scenery.walls:
             strips = [spatial(np.array(wall) - self._stage.origin) for wall in walls]
-            self._stage.still("swarm/walls", rr.LineStrips3D(strips, radii=rr.Radius.ui_points(2.5), colors=_WALL))
+            self._stage.still(
+                "swarm/walls", rr.LineStrips3D(strips, radii=rr.Radius.ui_points(2.5), colors=palette.WALL)
+            )
         if zones := self._scenery.zones:
             centres = np.array([zone.centre for zone in zones]) - self._stage.origin
             shown = rr.Ellipsoids3D(
                 centers=spatial(centres),
                 half_sizes=_balls([zone.radius for zone in zones], centres.shape[-1]),
                 labels=[f"jammed {zone.share:.0%}" for zone in zones],
-                colors=_JAMMED,
+                colors=palette.JAMMED,
                 fill_mode=rr.components.FillMode.Solid,
             )
             self._stage.still("swarm/jammed", shown)
         if (hearing := self._scenery.hearing) is not None:
             still = rr.Ellipsoids3D.from_fields(
                 half_sizes=_balls([hearing], len(self._stage.origin)),
-                colors=_RANGE,
+                colors=palette.RANGE,
                 line_radii=rr.Radius.ui_points(0.5),
                 fill_mode=rr.components.FillMode.MajorWireframe,
             )
