@@ -82,7 +82,8 @@ _FLOWN: dict[str, Any] = {
         "keyframes": [
             {"time": 0.0, "theta": SQUARE, "offset": [0.0, 0.0], "angle": 0.1},
             {"time": 0.2, "theta": SQUARE, "offset": [1.0, 0.0], "angle": 0.2},
-        ]
+        ],
+        "walls": [[[0.0, 1.0], [2.0, 3.0]]],
     },
     "time": {**SHORT, "real": {"factor": 1.0, "late": 1.0, "timers": [_TIMER]}},
     "sensing": {"samples": 2, "sigma": 0.1},

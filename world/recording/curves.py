@@ -90,7 +90,8 @@ class TrackingCurves:
         self._stage.scalars("metrics/tracking_error", stretch.time, decades(moments.error[stretch.kept, None]))
         shape = procrustes_error(moments.position[stretch.kept], self._formation.nominal, present)
         self._stage.scalars("metrics/procrustes", stretch.time, decades(shape[:, None]))
-        squared = ((stretch.position - stretch.target) ** 2).sum(axis=-1)
+        off = stretch.position - stretch.target
+        squared = (off * off).sum(axis=-1)
         self._off.log(stretch, decades(np.where(present, np.sqrt(squared), np.nan)))
 
 

@@ -72,7 +72,7 @@ EXEMPT = {
         netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
         netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
         netem.impairments.measured.delays netem.medium.journal.carried world.formation.manoeuvre.narrowest
-        world.formation.manoeuvre.turned world.recording.stage.origin world.physics.disturbance.Disturbance.between
+        world.formation.manoeuvre.turned world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
@@ -104,8 +104,9 @@ EXEMPT = {
         world.books.localized.FirstMeasurements.of
         world.books.localized.FirstMeasurements.tick world.books.localized.FirstMeasurements.take
         world.books.localized.FirstMeasurements.edges world.books.realised.Realised.stabilised
-        world.books.realised.GraphWatch.follow world.books.realised.realise world.recording.stage.points
-        world.recording.stage.scalars analysis.claims.checks.flat analysis.claims.checks.approaches
+        world.books.realised.GraphWatch.follow world.books.realised.realise world.recording.stage.Stage.points
+        world.recording.stage.Stage.scalars world.recording.stage.Stage.arrows world.recording.stage.Stage.segments
+        world.recording.curves.EachAgent.log analysis.claims.checks.flat analysis.claims.checks.approaches
         analysis.claims.checks.lower analysis.claims.checks.ratio analysis.claims.checks.stays_below
         analysis.claims.checks.leaves analysis.claims.checks.exponential analysis.claims.checks.never_above
         analysis.claims.checks.below_in_mean analysis.claims.checks.within analysis.claims.checks.value

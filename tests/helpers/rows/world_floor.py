@@ -17,7 +17,7 @@ from rows.case import covariance, leaves, of, real, share, truth, whole
 from world.books import edges
 from world.formation import manoeuvre
 from world.physics import bodies, disturbance, noise, sensors
-from world.recording import stage
+from world.recording import curves, stage
 
 LINKS, MANY = 6, 500
 FEW = np.ones(LINKS, dtype=bool)
@@ -174,6 +174,7 @@ CASES = {
     ),
     "world.physics.sensors.noise": of(lambda white: sensors.noise(white, PUSH.covariance), real(9, 2)),
     "world.physics.sensors.relative": of(lambda position: sensors.relative(position, _plan().world.links), real(10, 2)),
+    "world.recording.curves.decades": of(curves.decades, real(9, 3)),
     "world.recording.stage.spatial": of(stage.spatial, real(9, 2)),
     "world.recording.stage.ellipses": of(
         lambda centre, spread: stage.ellipses(centre, spread, 3.0), real(9, 3), covariance(9, 3, 3)
