@@ -31,7 +31,7 @@ def open_viewer() -> str:
     NoViewer
         When it cannot start, as on a machine without a screen.
     """
-    port = _free_port()
+    port = free_port()
     viewer = _Viewer(["--port", str(port), "--expect-data-soon"], outlives=True)
     viewer.await_listening([port])
     viewer.let_go()
@@ -46,7 +46,7 @@ def show(files: Sequence[Path]) -> None:
     NoViewer
         When it cannot start, or fails.
     """
-    viewer = _Viewer(["--port", str(_free_port()), *_named(files)])
+    viewer = _Viewer(["--port", str(free_port()), *_named(files)])
     try:
         viewer.wait()
     finally:
@@ -73,7 +73,7 @@ class WebViewer:
     """
 
     def __init__(self, files: Sequence[Path] = ()) -> None:
-        port, web = _free_port(), _free_port()
+        port, web = free_port(), free_port()
         self.stream = _stream(port)
         self.page = f"http://{_LOOPBACK}:{web}/?url={quote(self.stream, safe='')}"
         self._server = _Viewer(["--serve-web", "--port", str(port), "--web-viewer-port", str(web), *_named(files)])
@@ -163,7 +163,8 @@ def _stream(port: int) -> str:
     return f"rerun+http://{_LOOPBACK}:{port}/proxy"
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port on loopback that nobody listens on now."""
     with socket.socket() as probe:
         probe.bind((_LOOPBACK, 0))
         return int(probe.getsockname()[1])
