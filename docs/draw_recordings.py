@@ -1,21 +1,24 @@
-"""The pictures of recordings in docs/pictures, as a viewer without a screen draws them (it needs a Vulkan driver, like lavapipe).
+"""The pictures of recordings in docs/pictures, as a viewer without a screen draws them: with a Vulkan driver, like lavapipe.
 
     python docs/draw_recordings.py [--only corridor ...] [--out docs/pictures]
 
-Each scenario is flown in one process, and shown at one moment.
+Each scenario is flown in one process, and shown at one moment. `film` is the film of the README, which takes no viewer.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from PIL import Image
 from rerun.experimental import ViewerClient
 
+from affinet.cli import commands as cli
 from affinet.planning import making
 from affinet.runtimes.rerun_command import command
 from affinet.runtimes.run import fly
@@ -36,6 +39,7 @@ _MOMENTS = {  # of each shipped scenario one, in seconds
     "target": 4.0,
 }
 _LOOKS = 200
+_EMPTY = 60_000  # bytes, that a window without a swarm has
 
 
 @contextmanager
@@ -54,7 +58,7 @@ def _connected(url: str, process: subprocess.Popen[bytes]) -> ViewerClient:
     while process.poll() is None:
         try:
             return ViewerClient.connect(url)
-        except Exception:  # noqa: BLE001, S112 - it is not there yet, which the library says in several ways
+        except Exception:  # noqa: BLE001 - it is not there yet, which the library says in several ways
             continue
     raise RuntimeError("the viewer ended at once: is there a Vulkan driver (mesa-vulkan-drivers)?")
 
@@ -74,20 +78,35 @@ def picture(files: Sequence[Path], seconds: float) -> bytes:
         raise RuntimeError(f"the picture did not come to rest in {_LOOKS} looks")
 
 
-_EMPTY = 60_000  # bytes, that a window without a swarm has
+def flown(out: Path, name: str, *overrides: str) -> Path:
+    """The directory of a run."""
+    fly(making.make(loading.load(name, overrides)), "inprocess", out, lambda *_: None)
+    return out
+
+
+def film(folder: Path, path: Path) -> None:
+    """GA-RKF and RKF in the same bursts of losses."""
+    shown = {"GA-RKF": "ga-rkf", "RKF": "rkf"}
+    runs = [flown(folder / name, "bursts", f"agents.estimator={estimator}") for name, estimator in shown.items()]
+    command = ["render", *map(str, runs), "--to", "30", "--speed", "5", "--fps", "10", "--out", str(path)]
+    if cli.main(command):
+        raise RuntimeError("no film was made")
 
 
 def main() -> None:
     """Fly, and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=list(_MOMENTS), default=list(_MOMENTS))
+    parser.add_argument("--only", nargs="+", choices=["film", *_MOMENTS], default=["film", *_MOMENTS])
     parser.add_argument("--out", type=Path, default=_HERE / "pictures")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in given.only:
-            out = Path(folder) / name
-            fly(making.make(loading.load(name)), "inprocess", out, lambda *_: None)
-            (given.out / f"recording-{name}.png").write_bytes(picture(parts(out / "run.rrd"), _MOMENTS[name]))
+            if name == "film":
+                film(Path(folder), given.out / "bursts.gif")
+                continue
+            out = flown(Path(folder) / name, name)
+            shot = Image.open(io.BytesIO(picture(parts(out / "run.rrd"), _MOMENTS[name])))
+            shot.convert("RGB").quantize(256).save(given.out / f"recording-{name}.png", optimize=True)
 
 
 if __name__ == "__main__":

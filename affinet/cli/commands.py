@@ -21,7 +21,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import machines, options, show, terminal, watching
+from affinet.cli import machines, options, rendering, show, terminal, watching
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process
@@ -212,6 +212,11 @@ def _watch(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _render(parsed: argparse.Namespace) -> int:
+    rendering.render(parsed)
+    return PASS
+
+
 def _check_determinism(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
@@ -363,6 +368,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "check": _check,
     "replay": _replay,
     "watch": _watch,
+    "render": _render,
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,

@@ -6,7 +6,7 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
-from affinet.cli import watching
+from affinet.cli import rendering, watching
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
@@ -44,6 +44,7 @@ def parser() -> argparse.ArgumentParser:
         )
         _add_output(command)
     watching.add_to(commands)
+    rendering.add_to(commands)
     _add_hunt(commands)
     _add_study(commands)
     _add_design(commands)

@@ -38,15 +38,37 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
     with np.errstate(over="ignore", invalid="ignore"):
         by_edge = _edge_errors(plan.world, arrays) if plan.may_have_gaps else {}
         if channels.PLACE in plan.reports:
-            known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
-            off = localization.distance(arrays[channels.PLACE], known.edges())
+            off = _off_places(plan, timeline, arrays)
             return by_edge | {"localization_error": figures(off[~np.isnan(off)])}
-        if plan.world.pursuit is not None and reported(plan.reports):
-            target = arrays["target"] - plan.world.formation.nominal
-            off = arrays["reference"][:, :, 0] - target
-            missed = root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
+        if _pursues(plan):
+            missed = _off_target(plan, arrays)
             return by_edge | {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
     return by_edge
+
+
+def over_time(plan: Plan, timeline: Timeline, arrays: Arrays) -> tuple[str, Array]:
+    """What matters of a run in each tick, shape (T,), with its name and unit."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if channels.PLACE in plan.reports:
+            return "localization error (m)", _off_places(plan, timeline, arrays)
+        if _pursues(plan):
+            return "target error (m)", _off_target(plan, arrays)
+    return "tracking error (m²)", arrays["error"]
+
+
+def _pursues(plan: Plan) -> bool:
+    return plan.world.pursuit is not None and reported(plan.reports)
+
+
+def _off_places(plan: Plan, timeline: Timeline, arrays: Arrays) -> Array:
+    known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
+    return localization.distance(arrays[channels.PLACE], known.edges())
+
+
+def _off_target(plan: Plan, arrays: Arrays) -> Array:
+    target = arrays["target"] - plan.world.formation.nominal
+    off = arrays["reference"][:, :, 0] - target
+    return root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
 
 
 def _edge_errors(world: World, arrays: Arrays) -> dict[str, Figures]:

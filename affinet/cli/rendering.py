@@ -1,0 +1,141 @@
+"""`affinet render`: runs as a picture, or as a film, without a viewer."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich import progress as bar
+
+from affinet.cli.progress import Bar
+from affinet.scenario.sections import ScenarioError
+from affinet.verdicts import measures, reading
+from affinet.verdicts.evidence import Evidence
+from analysis.models.arrays import Array
+from netem.medium.verdict import Verdict
+from netem.processes.system_errors import about
+from world.recording import palette
+
+if TYPE_CHECKING:
+    from analysis.figures.swarm import Flight
+
+_STILL, _MOVING = (".png", ".pdf", ".svg", ".jpg"), (".mp4", ".gif")
+_MOST_FRAMES = 20_000
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command `render`."""
+    render = commands.add_parser("render", help="a picture or a film of runs, for a paper or a page")
+    render.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories, side by side")
+    render.add_argument(
+        "--out", required=True, type=_picture, metavar="FILE", help=f"ends in {', '.join((*_STILL, *_MOVING))}"
+    )
+    render.add_argument("--at", type=float, metavar="S", help="of a picture: which moment (default: the last)")
+    render.add_argument(
+        "--speed", type=_positive, default=4.0, metavar="X", help="of a film: times real time (default: %(default)g)"
+    )
+    render.add_argument(
+        "--fps", type=int, default=15, choices=range(1, 61), metavar="N", help="frames a second (default: %(default)s)"
+    )
+    render.add_argument(
+        "--from", dest="begins", type=float, default=0.0, metavar="S", help="of a film: its first moment"
+    )
+    render.add_argument("--to", dest="ends", type=float, metavar="S", help="of a film: its last moment")
+
+
+def render(parsed: argparse.Namespace) -> None:
+    """Draw it.
+
+    Raises
+    ------
+    ScenarioError, PlanError, UserCodeError, Damaged
+        When a directory holds no run that can be drawn, or there is nothing to write a film with.
+    OSError
+        When the file cannot be written.
+    """
+    from analysis.figures import swarm  # matplotlib takes a while to import
+
+    flights = [_flight(reading.evidence(directory), directory) for directory in parsed.directories]
+    last = max(float(flight.seconds[-1]) for flight in flights)
+    with about(parsed.out):
+        if parsed.out.suffix in _STILL:
+            swarm.still(flights, _within("--at", last if parsed.at is None else parsed.at, last), parsed.out)
+            return
+        moments = _moments(parsed, last)
+        try:
+            with Bar(str(parsed.out), len(moments), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
+                for number in swarm.film(flights, moments, parsed.fps, parsed.out):
+                    shown.see(number + 1, f"{number + 1}/{len(moments)} frames")
+        except swarm.NoFilm as error:
+            raise ScenarioError(str(error)) from error
+
+
+def _moments(parsed: argparse.Namespace, last: float) -> Array:
+    begins = _within("--from", parsed.begins, last)
+    ends = last if parsed.ends is None else _within("--to", parsed.ends, last)
+    if ends <= begins:
+        raise ScenarioError(f"--to {ends:g}: give a moment after --from {begins:g}")
+    step = parsed.speed / parsed.fps
+    if (ends - begins) / step > _MOST_FRAMES:
+        raise ScenarioError(
+            f"--speed {parsed.speed:g}: that would be more than {_MOST_FRAMES} frames; give a higher one"
+        )
+    moments: Array = np.arange(begins, ends + 0.5 * step, step)
+    return moments
+
+
+def _within(option: str, seconds: float, last: float) -> float:
+    if not 0.0 <= seconds <= last:
+        raise ScenarioError(f"{option} {seconds:g}: give a moment from 0 to {last:g} s")
+    return seconds
+
+
+def _flight(evidence: Evidence, directory: Path) -> Flight:
+    from analysis.figures.swarm import Flight
+
+    world, scenery = evidence.plan.world, evidence.plan.scenery
+    quantity, values = measures.over_time(evidence.plan, evidence.timeline, evidence.arrays)
+    return Flight(
+        title=directory.absolute().name,
+        seconds=evidence.seconds,
+        position=evidence.position,
+        target=evidence.arrays["target"],
+        leaders=world.formation.is_leader,
+        edges=np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1,
+        heard=np.stack([world.links.src, world.links.dst], axis=1) - 1,
+        verdicts=evidence.arrays["verdicts"][:, 0],
+        colours=_colours(),
+        error=values,
+        quantity=quantity,
+        walls=[np.array(wall) for wall in scenery.walls],
+        zones=[(np.array(zone.centre), zone.radius) for zone in scenery.zones],
+    )
+
+
+def _colours() -> Sequence[tuple[str, tuple[float, float, float]]]:
+    codes = [palette.OF_VERDICT[verdict] for verdict in Verdict]
+    names = ["" if verdict is Verdict.SILENT else verdict.label for verdict in Verdict]
+    return [
+        (name, ((code >> 24) / 255.0, (code >> 16 & 255) / 255.0, (code >> 8 & 255) / 255.0))
+        for name, code in zip(names, codes, strict=True)
+    ]
+
+
+def _picture(text: str) -> Path:
+    path = Path(text)
+    if path.suffix not in (*_STILL, *_MOVING):
+        raise argparse.ArgumentTypeError(f"{text!r}: give a name that ends in {', '.join((*_STILL, *_MOVING))}")
+    return path
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-3 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number from 0.001 to 1e6")
+    return value
