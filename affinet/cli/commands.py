@@ -21,7 +21,18 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import completing, doctoring, listing, machines, many_runs, options, scaffolding, schemas, show, terminal
+from affinet.cli import (
+    completing,
+    doctoring,
+    listing,
+    machines,
+    many_runs,
+    options,
+    scaffolding,
+    schemas,
+    show,
+    terminal,
+)
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process

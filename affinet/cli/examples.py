@@ -33,7 +33,10 @@ class Example(NamedTuple):
 # What one does next, for who types no command; those that there are not are left out.
 NEXT: Sequence[Example] = (
     Example("affinet check corridor", "can this scenario fly? nothing starts"),
-    Example("affinet run corridor --runtime inprocess", "fly it in this process; without the option, a process for each agent"),
+    Example(
+        "affinet run corridor --runtime inprocess",
+        "fly it in this process; without the option, a process for each agent",
+    ),
     Example("affinet watch runs/corridor-TIME", "look at what was flown"),
     Example("affinet list scenarios", "what there is; also estimators, laws, profiles, verbs, checkers, ..."),
     Example("affinet new project my-swarm", "a project of your own, which passes its tests at once"),
@@ -54,17 +57,23 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
             "each combination of settings",
             _BRIEF,
         ),
-        Example("affinet run bursts --sweep agents.estimator=ga-rkf,rkf --check 'bounded(5)'", "who keeps together?", _BRIEF),
+        Example(
+            "affinet run bursts --sweep agents.estimator=ga-rkf,rkf --check 'bounded(5)'", "who keeps together?", _BRIEF
+        ),
     ),
     "check": (
         Example("affinet check corridor", "a table of what was checked"),
-        Example("affinet check hexa --set formation.leaders=[4,5,7] --json", "exit status 2 where it cannot fly", status=2),
+        Example(
+            "affinet check hexa --set formation.leaders=[4,5,7] --json", "exit status 2 where it cannot fly", status=2
+        ),
     ),
     "replay": (
         Example("affinet replay runs/kept --runtime inprocess", "fly it again, and compare every bit"),
         Example("affinet replay runs/kept --verdicts --seed 8 --runtime inprocess", "other noise, the same losses"),
     ),
-    "check-determinism": (Example("affinet check-determinism corridor --duration 2", "the same bits, three times", "--duration 0.5"),),
+    "check-determinism": (
+        Example("affinet check-determinism corridor --duration 2", "the same bits, three times", "--duration 0.5"),
+    ),
     "hunt": (
         Example(
             "affinet hunt corridor --invariant 'bounded(1000)' --verbs dropout --budget 20 --set time.dt=0.05 --duration 5",
@@ -74,7 +83,9 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
     ),
     "study": (
         Example("affinet study paper-004-fig33 --quick", "a coarse version, in studies/paper-004-fig33-quick/"),
-        Example("affinet study mine.toml --out studies/mine --jobs 1", "your own (`affinet new study mine`)", "--quick"),
+        Example(
+            "affinet study mine.toml --out studies/mine --jobs 1", "your own (`affinet new study mine`)", "--quick"
+        ),
     ),
     "design": (
         Example("affinet design grid --agents 50 --range 2.25", "writes designed-grid.toml"),
@@ -88,18 +99,26 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
     "keys": (Example("affinet keys keys --agents 7 --hub 10.0.0.1", "before runs over several machines"),),
     "hosts": (Example("affinet hosts hosts.toml", "docs/machines.md has the file", alone=False),),
     "world": (
-        Example("affinet world corridor --listen tls/10.0.0.1:7447 --keys keys", "on the machine of the world", alone=False),
-    ),
-    "agent": (Example("affinet agent 4 5 --connect tls/10.0.0.1:7447 --keys keys", "on the machine of agents 4 and 5", alone=False),),
-    "host": (Example("affinet host 1 --connect tls/10.0.0.1:7447 --keys keys", "several agents in one process", alone=False),),
-    "netem": (
         Example(
-            "affinet netem --connect tls/10.0.0.1:7447 --listen tls/10.0.0.2:7448 --keys keys", "on the machine of the air", alone=False
+            "affinet world corridor --listen tls/10.0.0.1:7447 --keys keys", "on the machine of the world", alone=False
         ),
     ),
-    "conformance": (
-        Example("affinet conformance 'python my_agent.py'", "docs/agents.md has one", alone=False),
+    "agent": (
+        Example(
+            "affinet agent 4 5 --connect tls/10.0.0.1:7447 --keys keys", "on the machine of agents 4 and 5", alone=False
+        ),
     ),
+    "host": (
+        Example("affinet host 1 --connect tls/10.0.0.1:7447 --keys keys", "several agents in one process", alone=False),
+    ),
+    "netem": (
+        Example(
+            "affinet netem --connect tls/10.0.0.1:7447 --listen tls/10.0.0.2:7448 --keys keys",
+            "on the machine of the air",
+            alone=False,
+        ),
+    ),
+    "conformance": (Example("affinet conformance 'python my_agent.py'", "docs/agents.md has one", alone=False),),
     "list": (
         Example("affinet list", "which kinds there are"),
         Example("affinet list estimators", "all, with parameters, units and defaults"),

@@ -76,9 +76,10 @@ def _print_entries(entries: Sequence[Entry]) -> None:
     console = Console()
     for entry in entries:
         brought = "" if entry.package == "affinet" else f" ({entry.package})"
-        console.print(Text.assemble((plain(entry.name + brought).plain, "bold"), "  ", plain(entry.says)))
+        console.print(Text(plain(entry.name + brought).plain, style="bold"))
+        console.print(Padding(plain(entry.says), (0, 0, 0, _INDENT)))
         if entry.parameters:
-            console.print(Padding(_parameters(entry), (0, 0, 0, _INDENT)))
+            console.print(Padding(_parameters(entry), (0, 0, 0, 2 * _INDENT)))
 
 
 def _parameters(entry: Entry) -> Table:

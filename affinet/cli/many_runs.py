@@ -32,7 +32,11 @@ def add_options(run: argparse.ArgumentParser) -> None:
     many = run.add_argument_group("many runs, in this process, which leave a table and no directory")
     many.add_argument("--seeds", type=_seeds, metavar="A-B", help="a run with each of these seeds")
     many.add_argument(
-        "--sweep", action="append", default=[], metavar="KEY=V,V,...", help="runs with each of these values; several combine"
+        "--sweep",
+        action="append",
+        default=[],
+        metavar="KEY=V,V,...",
+        help="runs with each of these values; several combine",
     )
     many.add_argument("--check", metavar="CHECKER", help="what else must hold of each run, like 'bounded(5)'")
 
@@ -58,7 +62,9 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     if parsed.seeds is not None and parsed.seed is not None:
         raise ScenarioError("--seed and --seeds: give the one or the other")
     if given := [name for name in _OF_ONE_RUN if getattr(parsed, name)]:
-        raise ScenarioError(f"--{given[0]} is of one run, and --seeds, --sweep and --check fly many in this process: leave it out")
+        raise ScenarioError(
+            f"--{given[0]} is of one run, and --seeds, --sweep and --check fly many in this process: leave it out"
+        )
     checker = None if parsed.check is None else invariants.parse(parsed.check)
     sweeps = [sweeping.values_of(sweep) for sweep in parsed.sweep]
     plans = sweeping.planned(load, sweeps, None if parsed.seeds is None else parsed.seeds.start)
@@ -120,7 +126,9 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
     for setting in found:
         mean = setting.mean
         between = [f"{mean.low:.4g} to {mean.high:.4g}"] if runs > 1 else []
-        table.add_row(*map(plain, (*setting.labels.values(), f"{mean.found:.4g}", *between, _verdicts(setting.verdicts))))
+        table.add_row(
+            *map(plain, (*setting.labels.values(), f"{mean.found:.4g}", *between, _verdicts(setting.verdicts)))
+        )
     Console().print(table)
 
 

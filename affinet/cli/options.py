@@ -41,9 +41,7 @@ def parser() -> argparse.ArgumentParser:
     for command in (run, check, determinism, replay):
         _add_overrides(command)
     for command in (run, replay):
-        command.add_argument(
-            "--runtime", choices=["processes", "inprocess"], help="default: processes"
-        )
+        command.add_argument("--runtime", choices=["processes", "inprocess"], help="default: processes")
         _add_output(command)
     many_runs.add_options(run)
     _add_hunt(commands)

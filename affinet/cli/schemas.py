@@ -19,7 +19,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Print a JSON schema. A TOML file whose first line is `#:schema ./affinet.schema.json` is completed and "
         "checked by editors with a TOML language server (Even Better TOML, taplo).",
     )
-    schema.add_argument("kind", nargs="?", choices=_KINDS, default="scenario", metavar="KIND", help="scenario (default), or study")
+    schema.add_argument(
+        "kind", nargs="?", choices=_KINDS, default="scenario", metavar="KIND", help="scenario (default), or study"
+    )
     schema.add_argument("--out", type=Path, metavar="FILE", help="into a new file")
 
 

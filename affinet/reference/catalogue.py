@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from importlib.metadata import EntryPoint, entry_points
@@ -14,21 +14,29 @@ from affinet.reference.docstrings import first_line, parameters_of
 from affinet.reference.entries import Entry, Parameter, of_model, plain
 from affinet.scenario import files, loading, profiles, verbs
 from affinet.scenario.events import Lasting
+from affinet.scenario.profiles import Section
 from affinet.scenario.words import one_line, shown
 from affinet.studies import checks, study
 from affinet.verdicts import checkers
+from affinet.verdicts.checking import Checker
 from affinet.verdicts.invariants import NAMED
 from netem.loading.calling import NoSuchAlgorithm, load
 from netem.processes.user_code import UserCodeError
 
-_IN_PYTHON = (checkers.below, checkers.always, checkers.eventually)  # which take more than numbers
+# Those that can be named in words, and those that take more than numbers.
+_CHECKERS: Sequence[Callable[..., Checker]] = (*NAMED.values(), checkers.below, checkers.always, checkers.eventually)
 
 
 def scenarios() -> Iterator[Entry]:
     """Those that come with affinet, with what flies in them."""
     for name in loading.shipped():
         says = files.read(name, "scenarios", "scenario").says
-        of = {"formation": ("preset",), "time": ("duration", "dt"), "agents": ("estimator", "law"), "network": ("profile",)}
+        of = {
+            "formation": ("preset",),
+            "time": ("duration", "dt"),
+            "agents": ("estimator", "law"),
+            "network": ("profile",),
+        }
         given = [(table, key) for table, keys in of.items() for key in keys if key in says.get(table, {})]
         values = (_value(f"{table}.{key}", says[table][key]) for table, key in given)
         yield Entry(name, says.get("description", ""), tuple(values))
@@ -59,10 +67,18 @@ def impairments() -> Iterator[Entry]:
     for name, model in profiles.LOSSES.items():
         yield Entry(name, first_line(model), tuple(of_model(model)))
     yield from _offered(profiles.IMPAIRMENTS)
-    tables = {"delay": profiles.DelayModel, "corrupt": profiles.Corruption, "rate": profiles.RateLimit}
+    tables: Mapping[str, type[Section]] = {
+        "delay": profiles.DelayModel,
+        "corrupt": profiles.Corruption,
+        "rate": profiles.RateLimit,
+    }
     for key in of_model(profiles.LinkProfile):
         if key.name not in ("like", "loss", "netem"):
-            yield Entry(key.name, key.says, tuple(of_model(tables[key.name])) if key.name in tables else (replace(key, says=""),))
+            yield Entry(
+                key.name,
+                key.says,
+                tuple(of_model(tables[key.name])) if key.name in tables else (replace(key, says=""),),
+            )
 
 
 def verb_entries() -> Iterator[Entry]:
@@ -75,7 +91,7 @@ def verb_entries() -> Iterator[Entry]:
 
 def checker_entries() -> Iterator[Entry]:
     """Checkers: what tests, and `--invariant`, can ask of a run."""
-    for made in (*NAMED.values(), *_IN_PYTHON):
+    for made in _CHECKERS:
         yield Entry(made.__name__, first_line(made), tuple(parameters_of(made)))
 
 

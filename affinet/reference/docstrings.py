@@ -32,7 +32,9 @@ def first_line(of: Any) -> str:
     """What something is, in a line; nothing where its docstring is that of a base, or there is none."""
     written = of.__dict__.get("__doc__") if isinstance(of, type) else of.__doc__
     said = inspect.cleandoc(written or "")
-    return "" if said.startswith(f"{getattr(of, '__name__', '')}(") else said.partition("\n")[0]  # dataclasses write one
+    return (
+        "" if said.startswith(f"{getattr(of, '__name__', '')}(") else said.partition("\n")[0]
+    )  # dataclasses write one
 
 
 def unit_of(says: str) -> str:

@@ -46,7 +46,9 @@ def _versions(check: str) -> Finding:
         except PackageNotFoundError:
             missing.append(package)
     if missing:
-        return Finding(check, "error", f"{', '.join(missing)} not installed; install affinet again: pip install affinet")
+        return Finding(
+            check, "error", f"{', '.join(missing)} not installed; install affinet again: pip install affinet"
+        )
     return Finding(check, "ok", ", ".join(found))
 
 
@@ -56,7 +58,9 @@ def _unix_sockets(check: str) -> Finding:
         bound.bind(f"{place}/z.sock")
     own = tempfile.gettempdir()
     if folder != own:
-        return Finding(check, "note", f"{own} is too long or too odd a path for them; runs take {folder} (TMPDIR sets another)")
+        return Finding(
+            check, "note", f"{own} is too long or too odd a path for them; runs take {folder} (TMPDIR sets another)"
+        )
     return Finding(check, "ok", f"can be bound in {folder}")
 
 
@@ -74,9 +78,13 @@ def _descriptors(check: str) -> Finding:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = "any number" if hard == resource.RLIM_INFINITY else f"{hard}"
     if soft != resource.RLIM_INFINITY and soft < _FEW_DESCRIPTORS:
-        return Finding(check, "error", f"{soft} files may be open at once, too few for a swarm; `ulimit -n {_DESCRIPTORS}`")
+        return Finding(
+            check, "error", f"{soft} files may be open at once, too few for a swarm; `ulimit -n {_DESCRIPTORS}`"
+        )
     if soft != resource.RLIM_INFINITY and soft < _DESCRIPTORS:
-        return Finding(check, "note", f"{soft} files may be open at once; large swarms want more: `ulimit -n` takes {most}")
+        return Finding(
+            check, "note", f"{soft} files may be open at once; large swarms want more: `ulimit -n` takes {most}"
+        )
     return Finding(check, "ok", f"{soft} files may be open at once, {most} if asked for")
 
 
@@ -106,14 +114,18 @@ def _kernels(check: str) -> Finding:
     folder = kept.folder()
     above = next(path for path in (folder, *folder.parents) if path.exists())
     if not (above.is_dir() and os.access(above, os.W_OK | os.X_OK)):
-        return Finding(check, "note", f"{folder} cannot be written to: kernels are compiled in every run; set XDG_CACHE_HOME")
+        return Finding(
+            check, "note", f"{folder} cannot be written to: kernels are compiled in every run; set XDG_CACHE_HOME"
+        )
     number = len(list(folder.glob("*.o"))) if folder.exists() else 0
     return Finding(check, "ok", f"{number} are kept in {folder}; others are compiled when they are first called")
 
 
 def _viewer(check: str) -> Finding:
     if shutil.which("rerun", path=os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])) is None:
-        return Finding(check, "note", "the `rerun` command of rerun-sdk is not on the path; recordings are written all the same")
+        return Finding(
+            check, "note", "the `rerun` command of rerun-sdk is not on the path; recordings are written all the same"
+        )
     if sys.platform == "linux" and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")):
         return Finding(check, "note", "no display: fly without --view, and open run.rrd where there is one")
     return Finding(check, "ok", "a display is there, and the `rerun` command")
@@ -124,10 +136,16 @@ def _self_test(check: str) -> Finding:
     with tempfile.TemporaryDirectory(prefix="affinet-doctor-") as folder:
         flown = fly(plan, "processes", Path(folder) / "run", lambda *_: None)
     if flown.verdict != "pass":
-        return Finding(check, "error", f"a short flight over processes came to {flown.verdict}: {'; '.join(flown.reasons)}")
+        return Finding(
+            check, "error", f"a short flight over processes came to {flown.verdict}: {'; '.join(flown.reasons)}"
+        )
     if flown.digest != rehearse(plan).outcome.digest:
-        return Finding(check, "error", "a flight over processes has other bits than the same in process; please report it")
-    return Finding(check, "ok", f"{flown.ticks} ticks over {len(flown.processes)} processes, and in this one: the same bits")
+        return Finding(
+            check, "error", "a flight over processes has other bits than the same in process; please report it"
+        )
+    return Finding(
+        check, "ok", f"{flown.ticks} ticks over {len(flown.processes)} processes, and in this one: the same bits"
+    )
 
 
 _LOOKS: dict[str, Callable[[str], Finding]] = {

@@ -89,7 +89,12 @@ KINDS: Mapping[str, Scaffold] = {
             "$name/$module/law.py": "law.py",
             "$name/tests/test_swarm.py": "project/test_swarm.py",
         },
-        {"estimator": "$module.estimator:$Class", "law": "$module.law:${Class}Law", "Law": "${Class}Law", "scenario": "swarm.toml"},
+        {
+            "estimator": "$module.estimator:$Class",
+            "law": "$module.law:${Class}Law",
+            "Law": "${Class}Law",
+            "scenario": "swarm.toml",
+        },
         (f"$name/{schema.SCENARIO_FILE}", f"$name/{schema.STUDY_FILE}"),
         ("cd $name", "pytest", "affinet run swarm.toml"),
         module=True,

@@ -14,7 +14,10 @@ from affinet.scenario.units import Finite, NotNegative, Positive, Steps
 from netem.faults.fault import Fault, Pairs
 
 Links = Annotated[str, AfterValidator(selectors.check)]
-Whom = Annotated[list[Annotated[int | str, PlainValidator(selectors.agent_or_word, json_schema_input_type=int | str)]], Field(min_length=1)]
+Whom = Annotated[
+    list[Annotated[int | str, PlainValidator(selectors.agent_or_word, json_schema_input_type=int | str)]],
+    Field(min_length=1),
+]
 On = Annotated[list[Links], Field(min_length=1)]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 InFlight = Literal["drop", "deliver", "hold"]
@@ -62,7 +65,9 @@ class Event(Section):
 
     name: str | None = key(None, "by which other entries refer to this one")
     at: NotNegative | None = key(None, "when, counted from the start, or from what `after` or `when` say", "s")
-    after: str | None = key(None, 'another entry by its name, from whose beginning `at` counts; "name.end" from its end')
+    after: str | None = key(
+        None, 'another entry by its name, from whose beginning `at` counts; "name.end" from its end'
+    )
     when: When | None = key(None, "a condition, from which `at` counts")
     every: Positive | None = key(None, "it comes back after so long", "s")
     times: Steps | None = key(None, "so often at most")

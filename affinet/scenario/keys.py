@@ -1,10 +1,11 @@
-"""What a key of a file is, for people: one line and its unit, from which the JSON schema, `affinet list` and the docs are made."""
+"""What a key of a file is, for people: a line and its unit, of which the JSON schema, `affinet list` and the docs are made."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from pydantic import Field
+from pydantic.config import JsonDict
 
 UNIT = "unit"  # in the JSON schema of a key
 
@@ -21,7 +22,7 @@ def key(default: Any, says: str, unit: str = "") -> Any:
     unit
         Of its numbers.
     """
-    extra = {UNIT: unit} if unit else None
+    extra: JsonDict | None = {UNIT: unit} if unit else None
     if default in (list, dict):
         return Field(default_factory=default, description=says, json_schema_extra=extra)
     return Field(default=default, description=says, json_schema_extra=extra)

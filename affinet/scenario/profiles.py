@@ -241,7 +241,9 @@ class DelayModel(Section):
     `table` holds measured delays, or names a file of them.
     """
 
-    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"] = key(..., "how delays are distributed")
+    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"] = key(
+        ..., "how delays are distributed"
+    )
     mean: NotNegative | None = key(None, "of a delay, one way", "s")
     jitter: NotNegative | None = key(None, "half-width (uniform), or standard deviation (normal, pareto)", "s")
     table: Annotated[
@@ -264,7 +266,9 @@ class DelayModel(Section):
 class Corruption(Section):
     """Messages that arrive wrong, with probability p; `by` is what a bias adds to every number."""
 
-    kind: Literal["stale", "bias", "nan", "bit-flip"] = key(..., "how: what was said the tick before, a bias, NaN, or one bit of one number")
+    kind: Literal["stale", "bias", "nan", "bit-flip"] = key(
+        ..., "how: what was said the tick before, a bias, NaN, or one bit of one number"
+    )
     p: Probability = key(..., "probability")
     by: Finite | None = key(None, "of a bias: what is added to every number")
 
@@ -288,7 +292,9 @@ class LinkProfile(Section):
 
     like: str | None = key(None, "a profile to start from, by name")
     # A scenario as resolved has what it means instead.
-    netem: Annotated[str | None, Field(exclude=True)] = key(None, "an option string of tc netem, in place of what it means")
+    netem: Annotated[str | None, Field(exclude=True)] = key(
+        None, "an option string of tc netem, in place of what it means"
+    )
     loss: list[AnyLoss] | None = key(None, "losses, each for itself: a message passes when none holds it")
     delay: DelayModel | None = key(None, "of communication; sensing is not delayed")
     duplicate: Probability | None = key(None, "probability that a message arrives twice")

@@ -75,9 +75,14 @@ class FormationSection(Section):
     nodes: Matrix | None = key(None, "nominal positions, two coordinates each, or three", "m")
     edges: list[Edge] | None = key(None, 'undirected, like "1-2"; wanted with nodes')
     leaders: list[int] | None = key(None, "agents that fly the manoeuvre; wanted with nodes, a preset has its own")
-    weights: list[Finite] | Matrix | None = key(None, "in place of the stress that is solved for, by edge: a number each, or [what i gives j, what j gives i]")
+    weights: list[Finite] | Matrix | None = key(
+        None, "in place of the stress that is solved for, by edge: a number each, or [what i gives j, what j gives i]"
+    )
     scale: Positive = key(1.0, "factor on the nominal positions")
-    start: Literal["targets", "origin"] = key("targets", "targets: leaders on theirs, followers scattered about theirs; origin: all scattered about the origin")
+    start: Literal["targets", "origin"] = key(
+        "targets",
+        "targets: leaders on theirs, followers scattered about theirs; origin: all scattered about the origin",
+    )
     spread: NotNegative = key(1.0, "standard deviation of that scatter, per axis", "m")
 
     @model_validator(mode="after")
@@ -100,7 +105,9 @@ class Keyframe(Section):
     time: NotNegative = key(..., "when the map holds", "s")
     theta: Matrix = key(..., "the map: targets are theta p_i + offset")
     offset: list[Finite] = key(..., "what is added", "m")
-    angle: Finite | None = key(None, "by how much theta p_i is turned, counterclockwise; in every keyframe, or in none", "rad")
+    angle: Finite | None = key(
+        None, "by how much theta p_i is turned, counterclockwise; in every keyframe, or in none", "rad"
+    )
 
 
 class ManoeuvreSection(Section):
@@ -130,9 +137,17 @@ class TimeSection(Section):
 
     dt: Tick = key(..., "tick", "s")
     duration: Positive = key(..., "length of the run, a whole number of ticks", "s")
-    patience: Annotated[float, Field(ge=2.0, le=3600.0)] = key(3.0, "over processes: how long nothing may move before the run has stalled, and what an agent may compute in one go", "s")
-    mode: Literal["lockstep", "real"] = key("lockstep", "lockstep: a tick begins when everybody has answered; real: when its time has come")
-    exchange: Literal["same-tick", "next-tick"] = key("same-tick", "same-tick: undelayed broadcasts arrive in the tick they are sent; next-tick: one later")
+    patience: Annotated[float, Field(ge=2.0, le=3600.0)] = key(
+        3.0,
+        "over processes: how long nothing may move before the run has stalled, and what an agent may compute in one go",
+        "s",
+    )
+    mode: Literal["lockstep", "real"] = key(
+        "lockstep", "lockstep: a tick begins when everybody has answered; real: when its time has come"
+    )
+    exchange: Literal["same-tick", "next-tick"] = key(
+        "same-tick", "same-tick: undelayed broadcasts arrive in the tick they are sent; next-tick: one later"
+    )
     real: RealTimeSection = key(RealTimeSection(), "of runs in real time")
 
     @property
@@ -170,7 +185,9 @@ class SensingSection(Section):
     covariance: Matrix | None = key(None, "or its covariance", "m2")
     sigma_range: Positive | None = key(None, "or the standard deviation of a range, with sigma_bearing", "m")
     sigma_bearing: Bearing | None = key(None, "and of a bearing, in three dimensions of azimuth and elevation", "rad")
-    sigma_along: ShareOfDistance | None = key(None, "or the standard deviation along the line of sight, as a share of the distance, with sigma_across")
+    sigma_along: ShareOfDistance | None = key(
+        None, "or the standard deviation along the line of sight, as a share of the distance, with sigma_across"
+    )
     sigma_across: ShareOfDistance | None = key(None, "and across it, as a share of the distance")
     sigma_direction: Bearing | None = key(None, "or that of a direction, of a sensor that says no distance", "rad")
 
@@ -195,7 +212,9 @@ class SensingSection(Section):
 class KernelSection(Section):
     """How disturbances of two agents are correlated by their distance; `length` in metres, 2 for paper 004 (4.14)."""
 
-    shape: Literal["exponential", "squared-exponential"] = key("exponential", "how the correlation falls: exp(-d / length), or by the square")
+    shape: Literal["exponential", "squared-exponential"] = key(
+        "exponential", "how the correlation falls: exp(-d / length), or by the square"
+    )
     length: Positive = key(..., "over which it falls", "m")
     positions: Literal["nominal", "true"] = key("nominal", "of which distances are taken")
 
@@ -213,7 +232,10 @@ class DynamicsSection(Section):
     wheels.
     """
 
-    model: BodyName = key("single-integrator", "how often bodies integrate their input to a position; a unicycle rolls along its heading, steered by velocities")
+    model: BodyName = key(
+        "single-integrator",
+        "how often bodies integrate their input to a position; a unicycle rolls along its heading, steered by velocities",
+    )
     ahead: Positive | None = key(None, "of a unicycle: how far ahead of its wheels it is steered", "m")
     disturbance: NotNegative | None = key(None, "standard deviation of the displacement per tick, per axis", "m")
     covariance: Matrix | None = key(None, "or its covariance", "m2")
@@ -229,11 +251,11 @@ class DynamicsSection(Section):
     @model_validator(mode="after")
     def _of_its_body(self) -> DynamicsSection:
         for model, keys in _OF_BODIES.items():
-            for key in keys:
-                if (getattr(self, key) is None) == (self.model == model):
-                    missing = f"a {model} needs {key} (m)"
+            for name in keys:
+                if (getattr(self, name) is None) == (self.model == model):
+                    missing = f"a {model} needs {name} (m)"
                     raise ValueError(
-                        missing if self.model == model else f"{key} is of a {model}, not of a {self.model}"
+                        missing if self.model == model else f"{name} is of a {model}, not of a {self.model}"
                     )
         return self
 
@@ -257,11 +279,17 @@ class AgentsSection(Section):
 
     estimator: str = key(..., 'by name, or "module:Class" (`affinet list estimators`)')
     law: str = key(..., 'by name, or "module:Class" (`affinet list laws`)')
-    leaders: Literal["pilot", "distances"] = key("pilot", "pilot: they fly the manoeuvre; distances: they keep their nominal distances from each other")
+    leaders: Literal["pilot", "distances"] = key(
+        "pilot", "pilot: they fly the manoeuvre; distances: they keep their nominal distances from each other"
+    )
     leader_gain: NotNegative = key(1.0, "pull of a leader toward its target; toward distances in 1/(s m2)", "1/s")
-    limit: Positive | None = key(None, "the longest input, longer ones are shortened; m/s2 of double integrators", "m/s")
+    limit: Positive | None = key(
+        None, "the longest input, longer ones are shortened; m/s2 of double integrators", "m/s"
+    )
     per_process: Annotated[int, Field(ge=1, le=1000)] = key(1, "how many agents a process carries, as one batch")
-    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = key(dict, "command lines of programs that fly some agents in place of ours, by their numbers")
+    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = key(
+        dict, "command lines of programs that fly some agents in place of ours, by their numbers"
+    )
     parameters: dict[str, dict[str, Any]] = key(dict, "a table for each estimator or law, by name")
 
 
@@ -312,16 +340,23 @@ class TrustSection(Section):
     The largest message, in bytes, and how many of an agent are looked at in a tick.
     """
 
-    wrong_messages: Literal["fail", "drop"] = key("fail", "a wrong message ends the run (fail), or is dropped and counted while the right one is waited for (drop)")
+    wrong_messages: Literal["fail", "drop"] = key(
+        "fail",
+        "a wrong message ends the run (fail), or is dropped and counted while the right one is waited for (drop)",
+    )
     largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 22)] = key(1 << 20, "what an agent may say at once", "B")
-    messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = key(100, "how many messages of an agent are looked at in a tick")
+    messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = key(
+        100, "how many messages of an agent are looked at in a tick"
+    )
 
 
 class RecordSection(Section):
     """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
     enabled: bool = key(True, "write run.rrd")
-    every: Annotated[int, Field(ge=1, le=10_000)] = key(5, "ticks from one recorded moment, and one look at the realised graph, to the next")
+    every: Annotated[int, Field(ge=1, le=10_000)] = key(
+        5, "ticks from one recorded moment, and one look at the realised graph, to the next"
+    )
     window: Positive = key(1.0, "over which links count as working together", "s")
 
 
@@ -336,7 +371,10 @@ class Scenario(Section):
     sensing: SensingSection = key(..., "what is measured of neighbours")
     dynamics: DynamicsSection = key(DynamicsSection(), "what bodies are, and what displaces them")
     target: TargetSection | None = key(None, "of agents that pursue one")
-    world: Literal["simulated", "recorded", "external"] = key("simulated", "where bodies and sensors are: simulated; recorded, a flight that was flown before; external, robots outside")
+    world: Literal["simulated", "recorded", "external"] = key(
+        "simulated",
+        "where bodies and sensors are: simulated; recorded, a flight that was flown before; external, robots outside",
+    )
     recorded: RecordedSection | None = key(None, "of a world that was recorded")
     external: ExternalSection | None = key(None, "of a world of robots outside")
     agents: AgentsSection = key(..., "what the agents run")

@@ -31,7 +31,9 @@ class Partition(Lasting):
     verb: Literal["partition"] = "partition"
     groups: Annotated[
         list[list[int]] | str,
-        PlainValidator(selectors.groups_or_word, json_schema_input_type=list[list[int]] | Literal["halves", "leaders", "min-cut"]),
+        PlainValidator(
+            selectors.groups_or_word, json_schema_input_type=list[list[int]] | Literal["halves", "leaders", "min-cut"]
+        ),
     ] = key(..., 'lists of agents, or "halves" (by number), "leaders" (and the others), "min-cut"')
     in_flight: InFlight = key("drop", "what becomes of the messages under way between them")
 

@@ -73,7 +73,7 @@ class Claim(Section):
 
     says: str = key(..., "the claim, in words")
     each: list[str] = key(list, "axes for whose labels, one by one, it is judged")
-    check: Literal[ = key(..., "what decides it")
+    check: Literal[
         "flat",
         "approaches",
         "stays_below",
@@ -85,14 +85,16 @@ class Claim(Section):
         "exponential",
         "slower_with_anchor",
         "value",
-    ]
+    ] = key(..., "what decides it")
     of: Labels = key(dict, "labels of the cases that it speaks of")
     to: Labels | None = key(None, "labels of those they are compared with")
     quantity: Quantity | None = key(None, "of what, in place of the study's own")
     to_quantity: Quantity | None = key(None, "of what of those compared with, if of another")
     level: Finite | None = key(None, "what the check compares with")
     levels: dict[str, Finite] | None = key(None, "or a level for each label of the one axis in `each`")
-    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = key(None, "two numbers: of `ratio` what it lies between, of `value` factors of the level")
+    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = key(
+        None, "two numbers: of `ratio` what it lies between, of `value` factors of the level"
+    )
     since: NotNegative = key(0.0, "from when on", "s")
     until: NotNegative | None = key(None, "up to when; without it to the end of the run", "s")
 
@@ -154,7 +156,9 @@ class Study(Section):
 
     title: str = key(..., "of the figure")
     source: str = key(..., "who says so: a paper and its figure, or our own")
-    figure: Literal["curves", "sweep", "indicator", "map", "paths"] = key(..., "curves, sweep, indicator, map or paths (`affinet list figures`)")
+    figure: Literal["curves", "sweep", "indicator", "map", "paths"] = key(
+        ..., "curves, sweep, indicator, map or paths (`affinet list figures`)"
+    )
     scenario: str = key(..., "by name, or a file, relative to this one")
     quantity: Quantity = key("error", "what is drawn and judged")
     also: list[Quantity] = key(list, "further quantities of which curves or a sweep are drawn")

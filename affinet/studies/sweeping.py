@@ -35,6 +35,7 @@ CONFIDENCE = 0.95
 _WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
 
 Load = Callable[[Sequence[str]], Scenario]
+Labelled = tuple[Mapping[str, str], Plan]
 # What the summary of a run calls a quantity.
 _FIGURES = {"localization": "localization_error", "agreed": "target_error"}
 
@@ -86,7 +87,7 @@ def values_of(sweep: str) -> tuple[str, list[str]]:
     return key.strip(), values
 
 
-def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | None) -> list[tuple[Mapping[str, str], Plan]]:
+def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | None) -> list[Labelled]:
     """Every combination of settings, with its plan; whatever cannot fly is found before any has flown.
 
     Parameters
@@ -104,7 +105,7 @@ def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | Non
         When one of them cannot fly, or not in this process.
     """
     first = [] if seed is None else [f"seed={seed}"]
-    plans = []
+    plans = list[Labelled]()
     for values in itertools.product(*(values for _, values in sweeps)):
         labels = dict(zip((key for key, _ in sweeps), values, strict=True))
         plan = planning.make(load([*first, *(f"{key}={value}" for key, value in labels.items())]))
@@ -114,7 +115,7 @@ def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | Non
 
 
 def fly(
-    plans: Sequence[tuple[Mapping[str, str], Plan]],
+    plans: Sequence[Labelled],
     runs: int,
     checker: Checker | None,
     load: Load,
@@ -223,4 +224,3 @@ def _parts(text: str) -> Iterator[str]:
         else:
             part += sign
     yield part
-

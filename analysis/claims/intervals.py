@@ -169,9 +169,7 @@ class _Both:
     quantile: float
 
     @classmethod
-    def of(
-        cls, values: Array, others: Array, *, paired: bool, tests: int, confidence: float = CONFIDENCE
-    ) -> _Both:
+    def of(cls, values: Array, others: Array, *, paired: bool, tests: int, confidence: float = CONFIDENCE) -> _Both:
         fewest = min(len(values), len(others))
         quantile = float(student(np.array(fewest), tests, confidence))
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
