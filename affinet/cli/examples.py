@@ -44,6 +44,7 @@ NEXT: Sequence[Example] = (
     Example("affinet doctor", "is all there that affinet needs?"),
 )
 
+_BESIDE = 50  # characters of a line, behind which there is room
 _BRIEF = "--duration 0.5 --set record.enabled=false"
 
 EXAMPLES: Mapping[str, Sequence[Example]] = {
@@ -78,11 +79,11 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example(
             "affinet hunt corridor --invariant 'bounded(1000)' --verbs dropout --budget 20 --set time.dt=0.05 --duration 5",
             "exit status 1 when something breaks it",
-            "--budget 2 --duration 1",
+            "--budget 1 --duration 0.5",
         ),
     ),
     "study": (
-        Example("affinet study paper-004-fig33 --quick", "a coarse version, in studies/paper-004-fig33-quick/"),
+        Example("affinet study bursts --quick", "a coarse version, of minutes, in studies/bursts-quick/", alone=False),
         Example(
             "affinet study mine.toml --out studies/mine --jobs 1", "your own (`affinet new study mine`)", "--quick"
         ),
@@ -152,6 +153,3 @@ def shown(examples: Sequence[Example]) -> str:
     if width <= _BESIDE:
         return "\n".join(f"  {example.line:{width}}  # {example.says}" for example in examples)
     return "\n".join(f"  # {example.says}\n  {example.line}" for example in examples)
-
-
-_BESIDE = 50

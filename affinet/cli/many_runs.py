@@ -75,7 +75,9 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
             print(one_line(f"note: runs fly one by one, and not side by side: {why}"), file=sys.stderr)  # noqa: T201
     name = Path(parsed.scenario).stem
     with Bar(name, len(plans), bar.BarColumn(), bar.TextColumn("{task.fields[says]}"), says="starting") as shown:
-        found = sweeping.fly(plans, runs, checker, load, lambda done: shown.see(done, f"{done}/{len(plans)} settings"))
+        found = sweeping.fly(
+            plans, runs, checker, load, lambda done: shown.see(done, f"{int(done)}/{len(plans)} settings")
+        )
     if parsed.json:
         print(json.dumps(_plain(found, parsed.seeds), allow_nan=False))  # noqa: T201
     else:
@@ -116,12 +118,12 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
     from affinet.studies import quantities, sweeping
 
     says, unit = quantities.said(found[0].quantity)
-    interval = f"{100 * sweeping.CONFIDENCE:g} % interval (Student's t)"
-    title = f"{name}: {says}, mean over each run" + (f", {runs} runs of each" if runs > 1 else "")
+    of_many = f", {runs} runs of each; {100 * sweeping.CONFIDENCE:g} % interval by Student's t" if runs > 1 else ""
+    title = f"{name}: {says}, mean over each run{of_many}"
     table = Table(title=plain(title))
     for key in found[0].labels:
         table.add_column(plain(key))
-    for heading in (f"mean ({unit})" if unit else "mean", *([interval] if runs > 1 else []), "verdicts"):
+    for heading in (f"mean ({unit})" if unit else "mean", *(["interval"] if runs > 1 else []), "verdicts"):
         table.add_column(heading)
     for setting in found:
         mean = setting.mean

@@ -62,12 +62,12 @@ def parser() -> argparse.ArgumentParser:
 
 def guide() -> str:
     """What one does next, for who has typed no command."""
-    there = _commands(parser())
+    there = commands_of(parser())
     known = [step for step in examples.NEXT if step.line.split()[1] in there]
     return f"{_PURPOSE}\n\nWhat one does next:\n\n{examples.shown(known)}\n\n{_MORE}"
 
 
-def _commands(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+def commands_of(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     """The parser of each command, by its word."""
     (commands,) = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
     return dict(commands.choices)

@@ -41,3 +41,4 @@ def print_schema(parsed: argparse.Namespace) -> None:
         print(text, end="")  # noqa: T201
     else:
         directories.new_file(parsed.out, text)
+        print(f"{parsed.out}: begin a TOML file beside it with `#:schema ./{parsed.out.name}`")  # noqa: T201

@@ -25,7 +25,7 @@ _UNITS: Mapping[str, str] = {
     "seconds": "s",
     "ticks": "ticks",
 }
-_UNIT = re.compile(rf"(?:\bin |, )(1/s\^\([^)]*\)|{'|'.join(_UNITS)})\b")
+_UNIT = re.compile(rf"(?:\bin |, )(1/s\^\([^)]*\)|(?:{'|'.join(_UNITS)})\b)")
 
 
 def first_line(of: Any) -> str:

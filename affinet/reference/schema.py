@@ -11,6 +11,7 @@ from affinet.planning import registry
 from affinet.reference import catalogue
 from affinet.reference.entries import Entry
 from affinet.scenario.keys import UNIT
+from affinet.scenario.profiles import IMPAIRMENTS
 from affinet.scenario.sections import Scenario
 from affinet.studies import quantities
 from affinet.studies.batch import REPORT
@@ -34,6 +35,7 @@ def scenario() -> Schema:
         _name(tables["AgentsSection"]["properties"][key], (entry.name for entry in algorithms[group]))
     every = [entry for entries in algorithms.values() for entry in entries]
     tables["AgentsSection"]["properties"]["parameters"]["properties"] = {e.name: _table(e) for e in every}
+    _name(tables["Own"]["properties"]["model"], registry.names(IMPAIRMENTS))
     _only(tables["FormationSection"]["properties"]["preset"], swarms.NAMES)
     return made
 
@@ -74,7 +76,8 @@ def _say_unit(key: Schema) -> None:
 def _name(key: Schema, names: Iterable[str]) -> None:
     """One of these names, or a class of the user's own."""
     del key["type"]
-    key["anyOf"] = [{"enum": list(names)}, _CLASS]
+    known = list(names)
+    key["anyOf"] = [*([{"enum": known}] if known else []), _CLASS]
 
 
 def _only(key: Schema, names: Iterable[str]) -> None:

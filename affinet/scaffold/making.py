@@ -59,7 +59,7 @@ KINDS: Mapping[str, Scaffold] = {
     ),
     "estimator": Scaffold(
         {"$module.py": "estimator.py", "$module.toml": "scenario.toml", "test_$module.py": "test_flown.py"},
-        _SHIPPED | {"estimator": "$module:$Class"},
+        _SHIPPED | {"estimator": "$module:$Class", "Filter": "$Class"},
         (schema.SCENARIO_FILE,),
         ("pytest test_$module.py", "affinet run $module.toml"),
         module=True,
@@ -90,7 +90,8 @@ KINDS: Mapping[str, Scaffold] = {
             "$name/tests/test_swarm.py": "project/test_swarm.py",
         },
         {
-            "estimator": "$module.estimator:$Class",
+            "estimator": "$module.estimator:${Class}Filter",
+            "Filter": "${Class}Filter",
             "law": "$module.law:${Class}Law",
             "Law": "${Class}Law",
             "scenario": "swarm.toml",

@@ -119,7 +119,7 @@ def fly(
     runs: int,
     checker: Checker | None,
     load: Load,
-    watch: Callable[[int], None],
+    watch: Callable[[float], None],
 ) -> list[Setting]:
     """So many runs of each setting, with successive seeds.
 
@@ -132,7 +132,7 @@ def fly(
     load
         Reads the scenario with overrides.
     watch
-        Told how many settings are done.
+        Told how many settings are done, and which share of others.
 
     Raises
     ------
@@ -144,7 +144,8 @@ def fly(
     together = [number for number, why in enumerate(reasons) if why is None and runs > 1]
     cases = [(Case(dict(plans[number][0]), ()), plans[number][1]) for number in together]
     if cases:
-        for number, result in zip(together, study.fly(cases, runs, _executor(cases, runs)), strict=True):
+        flown = study.fly(cases, runs, _executor(cases, runs), watch=lambda shares: watch(sum(shares)))
+        for number, result in zip(together, flown, strict=True):
             found[number] = _of_runs(result)
             watch(len(found))
     for number, (labels, plan) in enumerate(plans):
