@@ -52,13 +52,14 @@ def limited(soft, hard):
 
 
 class NoUnix(socket.socket):
-    def bind(self, address):
+    def bind(self, _):
         raise PermissionError(1, "Operation not permitted", None)
 
 
 MEMORY = SimpleNamespace(available=100 << 20, total=8 << 30)
 
 
+@pytest.mark.usefixtures("short")
 @pytest.mark.parametrize(
     ("check", "planted", "says"),
     [
@@ -76,7 +77,7 @@ MEMORY = SimpleNamespace(available=100 << 20, total=8 << 30)
         ),
     ],
 )
-def test_what_is_missing_is_said_and_fails(check, planted, says, short, monkeypatch, capsys):
+def test_what_is_missing_is_said_and_fails(check, planted, says, monkeypatch, capsys):
     monkeypatch.setattr(f"{health.__name__}.{planted[0]}", planted[1])
     assert main(["doctor", "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
