@@ -28,7 +28,7 @@ def answer(command, folder):
 
 
 def is_answered(shown, said):
-    """Whether the lines that are shown stand in what is said, one after the other; between them lines may be missing at `...`."""
+    """Whether the lines that are shown stand in what is said, one after the other; at `...` some may be missing."""
     parts = [part.strip("\n").splitlines() for part in re.split(r"^ *\.\.\.$", shown, flags=re.MULTILINE)]
     lines, start = [line.rstrip() for line in said.splitlines()], 0
     for part in parts:
