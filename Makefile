@@ -8,6 +8,7 @@ READY := .venv/.ready
 .PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray coverage lint types imports picture bench clean
 
 demo: $(FLIES) ## bursts of losses with GA-RKF, which holds the formation, beside a filter alone; then over processes
+	@echo "The first flight on a machine compiles its kernels, which takes half a minute; later ones begin at once."
 	$(BIN)/affinet run bursts --duration 20 --sweep agents.estimator=ga-rkf,rkf --check 'bounded(5)' || test $$? = 1
 	$(BIN)/affinet run bursts --duration 10
 

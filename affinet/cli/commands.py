@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn
 from affinet.cli import (
     completing,
     doctoring,
+    helping,
     listing,
     machines,
     many_runs,
@@ -85,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = options.parser()
     parsed = parser.parse_args(arguments)
     if parsed.command is None:
-        print(options.guide(), file=sys.stderr)  # noqa: T201
+        print(helping.guide(parser), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from affinet.cli.helping import commands_of
 from affinet.scenario import files
 
 SHELLS = ("bash", "zsh", "fish")
@@ -27,9 +28,8 @@ def script(shell: str, whole: argparse.ArgumentParser) -> str:
     """What completes the command line that this parser reads."""
     import shtab  # needed for nothing else
 
-    (commands,) = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
     known = {name: made() for name, made in _KNOWN.items()}
-    for parser in commands.choices.values():
+    for parser in commands_of(whole).values():
         for action in parser._actions:
             if action.choices is None and action.dest in known:
                 vars(action)["complete"] = known[action.dest]

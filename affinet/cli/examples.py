@@ -44,7 +44,6 @@ NEXT: Sequence[Example] = (
     Example("affinet doctor", "is all there that affinet needs?"),
 )
 
-_BESIDE = 50  # characters of a line, behind which there is room
 _BRIEF = "--duration 0.5 --set record.enabled=false"
 
 EXAMPLES: Mapping[str, Sequence[Example]] = {
@@ -145,11 +144,3 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet completion fish", "prints it"),
     ),
 }
-
-
-def shown(examples: Sequence[Example]) -> str:
-    """Examples as the end of a help: what a line is for stands above it where both do not fit beside each other."""
-    width = max(len(example.line) for example in examples)
-    if width <= _BESIDE:
-        return "\n".join(f"  {example.line:{width}}  # {example.says}" for example in examples)
-    return "\n".join(f"  # {example.says}\n  {example.line}" for example in examples)

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import textwrap
 from importlib.metadata import version
 from pathlib import Path
 
-from affinet.cli import completing, doctoring, examples, listing, many_runs, scaffolding, schemas
+from affinet.cli import completing, doctoring, helping, listing, many_runs, scaffolding, schemas
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
 from world.formation.layouts import KINDS
 
-_PURPOSE = "Fly a swarm of agents through a network that loses, delays and cuts."
-_MORE = "`affinet --help` lists all commands, `affinet COMMAND --help` says more of one, with examples."
-_WIDTH = 100
 _LONGEST_DAYS = 3650  # as long as the authority
 
 
 def parser() -> argparse.ArgumentParser:
     """Reads a command line; `command` is the word of the command."""
-    whole = argparse.ArgumentParser(prog="affinet", description=_PURPOSE, epilog=_MORE)
+    whole = argparse.ArgumentParser(prog="affinet", description=helping.PURPOSE, epilog=helping.MORE)
     whole.add_argument("--version", action="version", version=f"affinet {version('affinet')}")
     commands = whole.add_subparsers(dest="command", metavar="COMMAND")
     run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
@@ -55,28 +51,8 @@ def parser() -> argparse.ArgumentParser:
     _add_conformance(commands)
     for module in (listing, schemas, scaffolding, doctoring, completing):
         module.add(commands)
-    for name, command in commands.choices.items():
-        _end_with_examples(command, name)
+    helping.end_with_examples(whole)
     return whole
-
-
-def guide() -> str:
-    """What one does next, for who has typed no command."""
-    there = commands_of(parser())
-    known = [step for step in examples.NEXT if step.line.split()[1] in there]
-    return f"{_PURPOSE}\n\nWhat one does next:\n\n{examples.shown(known)}\n\n{_MORE}"
-
-
-def commands_of(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """The parser of each command, by its word."""
-    (commands,) = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
-    return dict(commands.choices)
-
-
-def _end_with_examples(command: argparse.ArgumentParser, name: str) -> None:
-    command.formatter_class = argparse.RawDescriptionHelpFormatter
-    command.description = textwrap.fill(command.description, _WIDTH) if command.description else None
-    command.epilog = f"examples:\n{examples.shown(examples.EXAMPLES[name])}"
 
 
 def _add_overrides(command: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from flying import PROCESSES
 from paths import DOCS
 
 from affinet.cli import options
+from affinet.cli.helping import commands_of
 from affinet.scaffold import making
 
 pytestmark = PROCESSES
@@ -61,7 +62,7 @@ def test_the_page_shows_enough():
 def test_every_command_is_on_the_page():
     table = PAGE.partition("| when | command |")[2].partition("\n\n")[0]
     named = set(re.findall(r"`(?:affinet )?([\w-]+)(?: --\w+)*`", table))
-    assert named == set(options.commands_of(options.parser()))
+    assert named == set(commands_of(options.parser()))
 
 
 def test_every_kind_of_scaffold_is_on_the_page():

@@ -8,6 +8,7 @@ import pytest
 from affinet.cli import options
 from affinet.cli.commands import main
 from affinet.cli.completing import SHELLS
+from affinet.cli.helping import commands_of
 from affinet.scenario import files
 
 BASH = """
@@ -55,7 +56,7 @@ def test_bash_completes(typed, completed, tmp_path, capsys):
 @pytest.mark.parametrize("shell", SHELLS)
 def test_each_shell_has_all_commands_and_names(shell, capsys):
     said = script(shell, capsys)
-    assert [word for word in options.commands_of(options.parser()) if word not in said] == []
+    assert [word for word in commands_of(options.parser()) if word not in said] == []
     assert [name for name in files.shipped("scenarios") if name not in said] == []
     assert "ga-rkf" in said
     assert "runs/" in said

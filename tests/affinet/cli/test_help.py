@@ -7,7 +7,8 @@ from flying import PROCESSES, plan_of
 
 from affinet.cli import options
 from affinet.cli.commands import main
-from affinet.cli.examples import EXAMPLES, NEXT, shown
+from affinet.cli.examples import EXAMPLES, NEXT
+from affinet.cli.helping import commands_of, shown
 from affinet.runtimes.run import fly
 
 pytestmark = PROCESSES
@@ -50,10 +51,10 @@ def test_an_example_can_be_typed(example):
 
 def test_every_command_ends_its_help_with_its_own_examples():
     assert list(EXAMPLES) != []
-    for name, command in options.commands_of(options.parser()).items():
+    for name, command in commands_of(options.parser()).items():
         assert {example.line.split()[1] for example in EXAMPLES[name]} == {name}
         assert command.format_help().endswith(f"examples:\n{shown(EXAMPLES[name])}\n")
-    assert options.commands_of(options.parser()).keys() == EXAMPLES.keys()
+    assert commands_of(options.parser()).keys() == EXAMPLES.keys()
 
 
 def test_the_command_alone_says_what_one_does_next(capfd):
@@ -63,9 +64,9 @@ def test_the_command_alone_says_what_one_does_next(capfd):
     steps = [line.split()[1] for line in said.splitlines() if line.startswith("  affinet ")]
     assert steps == [step.line.split()[1] for step in NEXT if step.line.split()[1] in EXAMPLES]
     assert {"check", "run", "list", "new", "study"} <= set(steps)
-    assert "`affinet --help` lists all commands" in said
+    assert "`affinet --help` lists all commands." in said
 
 
 def test_help_fits_a_screen():
-    for command in options.commands_of(options.parser()).values():
+    for command in commands_of(options.parser()).values():
         assert max(map(len, command.format_help().splitlines())) <= 130
