@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, cast
 
 from affinet.planning import registry
 from affinet.reference.docstrings import first_line, parameters_of
@@ -15,6 +15,7 @@ from affinet.reference.entries import Entry, Parameter, of_model, plain
 from affinet.scenario import files, loading, profiles, verbs
 from affinet.scenario.events import Lasting
 from affinet.scenario.profiles import Section
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line, shown
 from affinet.studies import checks, study
 from affinet.verdicts import checkers
@@ -23,6 +24,14 @@ from affinet.verdicts.invariants import NAMED
 from netem.loading.calling import NoSuchAlgorithm, load
 from netem.processes.user_code import UserCodeError
 
+# Keys that tell a scenario from others.
+_TELLING = {
+    "formation": ("preset",),
+    "time": ("dt", "duration"),
+    "agents": ("estimator", "law"),
+    "network": ("availability", "profile"),
+}
+_MOST = 200  # characters of a default
 # Those that can be named in words, and those that take more than numbers.
 _CHECKERS: Sequence[Callable[..., Checker]] = (*NAMED.values(), checkers.below, checkers.always, checkers.eventually)
 
@@ -31,15 +40,15 @@ def scenarios() -> Iterator[Entry]:
     """Those that come with affinet, with what flies in them."""
     for name in loading.shipped():
         says = files.read(name, "scenarios", "scenario").says
-        of = {
-            "formation": ("preset",),
-            "time": ("duration", "dt"),
-            "agents": ("estimator", "law"),
-            "network": ("profile",),
-        }
-        given = [(table, key) for table, keys in of.items() for key in keys if key in says.get(table, {})]
-        values = (_value(f"{table}.{key}", says[table][key]) for table, key in given)
-        yield Entry(name, says.get("description", ""), tuple(values))
+        yield Entry(name, says.get("description", ""), tuple(_told(says)))
+
+
+def _told(says: Mapping[str, Any]) -> Iterator[Parameter]:
+    """What a scenario says of what tells it from others, with the units of its keys."""
+    for table, keys in _TELLING.items():
+        for key in of_model(cast("type[Section]", Scenario.model_fields[table].annotation)):
+            if key.name in keys and key.name in says.get(table, {}):
+                yield replace(key, name=f"{table}.{key.name}", required=False, default=says[table][key.name], says="")
 
 
 def estimators() -> Iterator[Entry]:
@@ -74,11 +83,7 @@ def impairments() -> Iterator[Entry]:
     }
     for key in of_model(profiles.LinkProfile):
         if key.name not in ("like", "loss", "netem"):
-            yield Entry(
-                key.name,
-                key.says,
-                tuple(of_model(tables[key.name])) if key.name in tables else (replace(key, says=""),),
-            )
+            yield Entry(key.name, key.says, tuple(of_model(tables[key.name])) if key.name in tables else ())
 
 
 def verb_entries() -> Iterator[Entry]:
@@ -144,5 +149,11 @@ def default_of(parameter: Parameter) -> str:
     """The default as a file says it, with its unit; "required" where there is none, and nothing where it may be left out."""
     if parameter.required:
         return f"required, {parameter.unit}" if parameter.unit else "required"
-    said = "" if parameter.default is None else shown(parameter.default)
+    match parameter.default:
+        case None:
+            said = ""
+        case list(words) if words and all(isinstance(word, str) for word in words):
+            said = ", ".join(words)
+        case value:
+            said = shown(value, _MOST)
     return f"{said} {parameter.unit}".strip()

@@ -66,5 +66,5 @@ def _described(made: Any) -> Iterator[tuple[str, str]]:
 
 
 def _one_line(says: str) -> str:
-    """The first sentence, as far as it is one; abbreviations end in no blank and a capital."""
-    return re.split(r"(?<=[.;]) (?=[A-Z])", says, maxsplit=1)[0].removesuffix(".")
+    """The first sentence; abbreviations end in no blank and a capital."""
+    return re.split(r"(?<=\.) (?=[A-Z])", says, maxsplit=1)[0].removesuffix(".")

@@ -80,6 +80,12 @@ def test_parameters_have_kind_unit_and_default():
     velocity = next(one for one in FOUND["verbs"]["gust"].parameters if one.name == "velocity")
     assert catalogue.default_of(velocity) == "required, m/s"
     assert {one.name for one in FOUND["verbs"]["(any)"].parameters} >= {"at", "until", "every"}
+    told = {one.name: catalogue.default_of(one) for one in FOUND["scenarios"]["corridor"].parameters}
+    assert (told["time.dt"], told["network.availability"], told["agents.estimator"]) == ("0.01 s", "0.7", '"ga-rkf"')
+    until = next(one for one in FOUND["checkers"]["always"].parameters if one.name == "until")
+    assert until.says == "Up to when, in seconds; None to the end of the run"
+    (graph, *_) = FOUND["studies"]["bursts"].parameters
+    assert (graph.name, catalogue.default_of(graph)) == ("graph", "zhao7, hexa10")
 
 
 @pytest.mark.parametrize(
