@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,8 +150,8 @@ def fly(
             watch(len(found))
     for number, (labels, plan) in enumerate(plans):
         if number not in found:
-            found[number] = _one_by_one(labels, plan, runs, checker, load, reasons[number] if runs > 1 else None)
-            watch(len(found))
+            alone = _told(_one_by_one(labels, plan, runs, load), len(found), runs, watch)
+            found[number] = _of_evidence(labels, plan, alone, checker, reasons[number] if runs > 1 else None)
     return [found[number] for number in range(len(plans))]
 
 
@@ -188,17 +188,27 @@ def _of_runs(result: study.Result) -> Setting:
     return Setting(result.labels, quantity, values, verdicts, None)
 
 
-def _one_by_one(
-    labels: Mapping[str, str], plan: Plan, runs: int, checker: Checker | None, load: Load, why: str | None
+def _one_by_one(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
+    yield rehearse(plan)
+    overrides, first = [f"{key}={value}" for key, value in labels.items()], plan.scenario.seed
+    for seed in range(first + 1, first + runs):
+        yield rehearse(planning.make(load([*overrides, f"seed={seed}"])))
+
+
+def _told(flown: Iterable[Evidence], done: int, runs: int, watch: Callable[[float], None]) -> Iterator[Evidence]:
+    """The same runs; after each it is told how many settings are done."""
+    for number, run in enumerate(flown, start=1):
+        yield run
+        watch(done + number / runs)
+
+
+def _of_evidence(
+    labels: Mapping[str, str], plan: Plan, flown: Iterable[Evidence], checker: Checker | None, why: str | None
 ) -> Setting:
-    seeds = range(plan.scenario.seed, plan.scenario.seed + runs)
-    overrides = [f"{key}={value}" for key, value in labels.items()]
-    plans = [plan, *(planning.make(load([*overrides, f"seed={seed}"])) for seed in seeds[1:])]
     quantity, values, verdicts = _quantity(plan), list[float](), Counter[str]()
-    for one in plans:
-        flown = rehearse(one)
-        values.append(_figure(flown, quantity))
-        verdicts[summed_up(flown, [] if checker is None else [checker(flown)])] += 1
+    for run in flown:
+        values.append(_figure(run, quantity))
+        verdicts[summed_up(run, [] if checker is None else [checker(run)])] += 1
     return Setting(labels, quantity, np.array(values), verdicts, why)
 
 
