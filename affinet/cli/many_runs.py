@@ -119,8 +119,8 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
 
     says, unit = quantities.said(found[0].quantity)
     of_many = f", {runs} runs of each; {100 * sweeping.CONFIDENCE:g} % interval by Student's t" if runs > 1 else ""
-    title = f"{name}: {says}, mean over each run{of_many}"
-    table = Table(title=plain(title))
+    console, table = Console(), Table()
+    console.print(plain(f"{name}: {says}, mean over each run{of_many}"), soft_wrap=True)
     for key in found[0].labels:
         table.add_column(plain(key))
     for heading in (f"mean ({unit})" if unit else "mean", *(["interval"] if runs > 1 else []), "verdicts"):
@@ -131,7 +131,7 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
         table.add_row(
             *map(plain, (*setting.labels.values(), f"{mean.found:.4g}", *between, _verdicts(setting.verdicts)))
         )
-    Console().print(table)
+    console.print(table)
 
 
 def _verdicts(counted: Mapping[str, int]) -> str:
