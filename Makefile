@@ -2,13 +2,15 @@
 
 UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
+FLIES := .venv/.flies
 READY := .venv/.ready
 
 .PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray test-browser coverage lint types imports picture bench clean
 
-demo: $(READY) ## fly through bursts of losses over processes, and the same losses again with a filter alone
-	$(BIN)/affinet run bursts
-	$(BIN)/affinet run bursts --estimator rkf --runtime inprocess
+demo: $(FLIES) ## bursts of losses with GA-RKF, which holds the formation, beside a filter alone; then over processes
+	@echo "The first flight on a machine compiles its kernels, which takes half a minute; later ones begin at once."
+	$(BIN)/affinet run bursts --duration 20 --sweep agents.estimator=ga-rkf,rkf --check 'bounded(5)' || test $$? = 1
+	$(BIN)/affinet run bursts --duration 10
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk -F '  ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -66,6 +68,13 @@ $(READY): pyproject.toml uv.lock
 	$(UV) sync --locked --quiet --compile-bytecode
 	$(BIN)/python -m compileall -q affinet agents analysis netem world
 	$(BIN)/python packaging/compiled.py
+	touch $@ $(FLIES)
+
+# All that a flight needs, and no more: it is there in seconds, and kernels are compiled as they are called.
+$(FLIES): pyproject.toml uv.lock
+	test -x $(BIN)/python || python3 -m venv .venv
+	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
+	$(UV) sync --locked --quiet --no-dev --inexact
 	touch $@
 
 clean: ## without environments and runs

@@ -21,7 +21,21 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import machines, options, rendering, show, terminal, watching
+from affinet.cli import (
+    completing,
+    doctoring,
+    helping,
+    listing,
+    machines,
+    many_runs,
+    options,
+    rendering,
+    scaffolding,
+    schemas,
+    show,
+    terminal,
+    watching,
+)
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process
@@ -74,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = options.parser()
     parsed = parser.parse_args(arguments)
     if parsed.command is None:
-        parser.print_help(sys.stderr)
+        print(helping.guide(parser), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     try:
         status = _COMMANDS[parsed.command](parsed)
@@ -139,8 +153,8 @@ def _overrides(parsed: argparse.Namespace) -> list[str]:
     return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
 
 
-def _scenario(parsed: argparse.Namespace) -> Scenario:
-    return loading.load(parsed.scenario, _overrides(parsed), files.working_directory())
+def _scenario(parsed: argparse.Namespace, more: Sequence[str] = ()) -> Scenario:
+    return loading.load(parsed.scenario, [*_overrides(parsed), *more], files.working_directory())
 
 
 def _check(parsed: argparse.Namespace) -> int:
@@ -154,11 +168,13 @@ def _check(parsed: argparse.Namespace) -> int:
         report = [{"check": f.check, "level": f.level, "says": f.says} for f in findings]
         print(json.dumps({"flies": flies, "findings": report}))  # noqa: T201
     else:
-        show.findings(parsed.scenario, findings, flies=flies)
+        show.findings(f"{parsed.scenario}: {'can fly' if flies else 'cannot fly'}", findings)
     return PASS if flies else BAD_INPUT
 
 
 def _run(parsed: argparse.Namespace) -> int:
+    if many_runs.are_asked_for(parsed):
+        return PASS if many_runs.fly(parsed, lambda more: _scenario(parsed, more)) else FAIL
     plan = planning.make(_scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed)
 
@@ -309,7 +325,8 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
-    if parsed.runtime == "inprocess":
+    runtime: Runtime = parsed.runtime or "processes"
+    if runtime == "inprocess":
         refuse_in_process(plan)
     if parsed.out:
         refuse_taken(parsed.out)
@@ -318,7 +335,7 @@ def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Pa
         claim(parsed.out)
         with show.Progress(plan, name, parsed.out) as watch:
             elsewhere = None if spread is None else spread(parsed.out)
-            outcome = fly(plan, parsed.runtime, parsed.out, watch.see, viewer, elsewhere)
+            outcome = fly(plan, runtime, parsed.out, watch.see, viewer, elsewhere)
         if parsed.json:
             print(json.dumps(outcome.to_json(), allow_nan=False), flush=True)  # noqa: T201
         else:
@@ -363,6 +380,30 @@ def _conformance(parsed: argparse.Namespace) -> int:
     return PASS if conforming.judge_and_report(parsed) else FAIL
 
 
+def _list(parsed: argparse.Namespace) -> int:
+    listing.print_list(parsed)
+    return PASS
+
+
+def _new(parsed: argparse.Namespace) -> int:
+    scaffolding.write(parsed)
+    return PASS
+
+
+def _doctor(parsed: argparse.Namespace) -> int:
+    return PASS if doctoring.examine(parsed) else FAIL
+
+
+def _completion(parsed: argparse.Namespace) -> int:
+    print(completing.script(parsed.shell, options.parser()), end="")  # noqa: T201
+    return PASS
+
+
+def _schema(parsed: argparse.Namespace) -> int:
+    schemas.print_schema(parsed)
+    return PASS
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -380,4 +421,9 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "world": _world,
     **dict.fromkeys(("agent", "host", "netem"), machines.hold),
     "conformance": _conformance,
+    "list": _list,
+    "schema": _schema,
+    "new": _new,
+    "doctor": _doctor,
+    "completion": _completion,
 }

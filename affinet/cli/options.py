@@ -6,7 +6,7 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
-from affinet.cli import rendering, watching
+from affinet.cli import completing, doctoring, helping, listing, many_runs, rendering, scaffolding, schemas, watching
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
@@ -17,9 +17,7 @@ _LONGEST_DAYS = 3650  # as long as the authority
 
 def parser() -> argparse.ArgumentParser:
     """Reads a command line; `command` is the word of the command."""
-    whole = argparse.ArgumentParser(
-        prog="affinet", description="Fly a swarm of agents through a network that loses, delays and cuts."
-    )
+    whole = argparse.ArgumentParser(prog="affinet", description=helping.PURPOSE, epilog=helping.MORE)
     whole.add_argument("--version", action="version", version=f"affinet {version('affinet')}")
     commands = whole.add_subparsers(dest="command", metavar="COMMAND")
     run = commands.add_parser("run", help="fly a scenario", description="Fly a scenario and leave a run directory.")
@@ -39,12 +37,9 @@ def parser() -> argparse.ArgumentParser:
     for command in (run, check, determinism, replay):
         _add_overrides(command)
     for command in (run, replay):
-        command.add_argument(
-            "--runtime", choices=["processes", "inprocess"], default="processes", help="default: %(default)s"
-        )
+        command.add_argument("--runtime", choices=["processes", "inprocess"], help="default: processes")
         _add_output(command)
-    watching.add_to(commands)
-    rendering.add_to(commands)
+    many_runs.add_options(run)
     _add_hunt(commands)
     _add_study(commands)
     _add_design(commands)
@@ -54,6 +49,9 @@ def parser() -> argparse.ArgumentParser:
     _add_coordinators(commands)
     _add_seats(commands)
     _add_conformance(commands)
+    for module in (watching, rendering, listing, schemas, scaffolding, doctoring, completing):
+        module.add(commands)
+    helping.end_with_examples(whole)
     return whole
 
 

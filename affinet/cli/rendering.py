@@ -26,7 +26,7 @@ _STILL, _MOVING = (".png", ".pdf", ".svg", ".jpg"), (".mp4", ".gif")
 _MOST_FRAMES = 20_000
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command `render`."""
     render = commands.add_parser("render", help="a picture or a film of runs, for a paper or a page")
     render.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories, side by side")

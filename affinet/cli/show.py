@@ -163,16 +163,16 @@ class Grid:
 def claims(judged: StudyRecord, full: StudyRecord | None, out: Path) -> None:
     """What a study says of the claims it examines, and where a quick one contradicts the full one."""
     quick = f", quick: {judged.runs} runs of a coarse form" if judged.quick else ""
-    table = Table("claim", "", "found", title=_plain(f"{judged.title} ({judged.source}){quick}"))
+    table = Table("claim", "", "found", title=plain(f"{judged.title} ({judged.source}){quick}"))
     for claim in judged.claims:
-        table.add_row(_plain(claim.says), _DECISIONS[claim.decision], _plain(claim.found))
+        table.add_row(plain(claim.says), _DECISIONS[claim.decision], plain(claim.found))
     console = Console()
     console.print(table)
     if judged.quick and full is not None:
         for other in judged.contradicted(full):
             said = f"{other.says}: in the full study, of {full.runs} runs, it {other.decision}: {other.found}"
-            console.print(_plain(said))
-    console.print(_plain(f"data and figure in {out}"))
+            console.print(plain(said))
+    console.print(plain(f"data and figure in {out}"))
 
 
 def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
@@ -181,14 +181,14 @@ def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
     if counterexample is None:
         console.print("nothing found that breaks it", highlight=False)
     else:
-        console.print(_plain(f"{counterexample.finding}"))
+        console.print(plain(f"{counterexample.finding}"))
         for entry in counterexample.scenario.timeline:
             said = entry.model_dump(mode="json", exclude_none=True)
-            console.print(_plain(f"  {said.pop('verb')} {said}"))
+            console.print(plain(f"  {said.pop('verb')} {said}"))
     table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
     for counted in (coverage.verbs, coverage.selectors):
         for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
-            table.add_row(_plain(name), str(number))
+            table.add_row(plain(name), str(number))
         table.add_section()
     console.print(table)
 
@@ -247,11 +247,11 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         ("directory", outcome.out),
     ]
     for name, value in rows:
-        table.add_row(name, _plain(value))
+        table.add_row(name, plain(value))
     console = Console()
     console.print(table)
     for reason in outcome.reasons:
-        console.print(_plain(reason), soft_wrap=True)
+        console.print(plain(reason), soft_wrap=True)
 
 
 def _titled(outcome: Outcome) -> str:
@@ -279,11 +279,11 @@ def _milliseconds(of: Lateness | DelayError) -> str:
     return f"p50 {of.p50_ms:.2f}, p99 {of.p99_ms:.2f}, max {of.max_ms:.2f} ms"
 
 
-def findings(name: str, found: Sequence[Finding], *, flies: bool) -> None:
+def findings(title: str, found: Sequence[Finding]) -> None:
     """What was checked."""
-    table = Table("check", "", "says", title=_plain(f"{name}: {'can fly' if flies else 'cannot fly'}"))
+    table = Table("check", "", "says", title=plain(title))
     for finding in found:
-        table.add_row(_plain(finding.check), _LEVELS[finding.level], _plain(finding.says))
+        table.add_row(plain(finding.check), _LEVELS[finding.level], plain(finding.says))
     Console().print(table)
 
 
@@ -292,10 +292,10 @@ def answer(told: Answer, dt: float) -> None:
     console = Console()
     console.print(f"from tick {told.k} ({told.k * dt:.2f} s) on:", highlight=False)
     for line in told.holds or ["nothing is imposed"]:
-        console.print(_plain(f"  {line}"))
+        console.print(plain(f"  {line}"))
 
 
-def _plain(text: str) -> Text:
+def plain(text: str) -> Text:
     """Text of a user's as it stands: no markup, no emoji, and nothing that moves the terminal's cursor."""
     return Text("".join(letter if letter.isprintable() or letter == "\n" else repr(letter)[1:-1] for letter in text))
 

@@ -24,7 +24,7 @@ from netem.core.parts import parts
 RECORDING = "run.rrd"
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command `watch`."""
     watch = commands.add_parser("watch", help="watch what was flown: one run, or several on one timeline")
     watch.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories")

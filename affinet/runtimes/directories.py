@@ -60,6 +60,22 @@ def for_design(file: Path | str) -> Path:
     return _file(file, "designed")
 
 
+def new_file(file: Path, text: str) -> None:
+    """Write a file that is not there yet.
+
+    Raises
+    ------
+    OSError
+        When it is there already, or cannot be written.
+    """
+    with system_errors.about(file):
+        try:
+            with file.open("x", encoding="utf-8") as new:
+                new.write(text)
+        except FileExistsError as error:
+            raise FileExistsError(f"{str(file)!r} is there already; name another") from error
+
+
 @contextmanager
 def unless_empty(path: Path) -> Iterator[None]:
     """A directory or file made for what the block finds; it goes again where that was nothing."""

@@ -8,12 +8,16 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, Field, PlainValidator, model_validator
 
 from affinet.scenario import selectors
+from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
 from affinet.scenario.units import Finite, NotNegative, Positive, Steps
 from netem.faults.fault import Fault, Pairs
 
 Links = Annotated[str, AfterValidator(selectors.check)]
-Whom = Annotated[list[Annotated[int | str, PlainValidator(selectors.agent_or_word)]], Field(min_length=1)]
+Whom = Annotated[
+    list[Annotated[int | str, PlainValidator(selectors.agent_or_word, json_schema_input_type=int | str)]],
+    Field(min_length=1),
+]
 On = Annotated[list[Links], Field(min_length=1)]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 InFlight = Literal["drop", "deliver", "hold"]
@@ -45,9 +49,9 @@ class Found(NamedTuple):
 class When(Section):
     """What an entry waits for: the tracking error (m2) below or above a level, for some simulated seconds in a row."""
 
-    tracking_error_below: Positive | None = None
-    tracking_error_above: NotNegative | None = None
-    lasting: NotNegative = 0.0
+    tracking_error_below: Positive | None = key(None, "it waits until the tracking error is below this", "m2")
+    tracking_error_above: NotNegative | None = key(None, "or above this", "m2")
+    lasting: NotNegative = key(0.0, "for so long in a row", "s")
 
     @model_validator(mode="after")
     def _one(self) -> When:
@@ -59,12 +63,14 @@ class When(Section):
 class Event(Section):
     """When something happens: `at` counts in simulated seconds from the start, from another entry, or from a condition."""
 
-    name: str | None = None
-    at: NotNegative | None = None
-    after: str | None = None
-    when: When | None = None
-    every: Positive | None = None
-    times: Steps | None = None
+    name: str | None = key(None, "by which other entries refer to this one")
+    at: NotNegative | None = key(None, "when, counted from the start, or from what `after` or `when` say", "s")
+    after: str | None = key(
+        None, 'another entry by its name, from whose beginning `at` counts; "name.end" from its end'
+    )
+    when: When | None = key(None, "a condition, from which `at` counts")
+    every: Positive | None = key(None, "it comes back after so long", "s")
+    times: Steps | None = key(None, "so often at most")
 
     @model_validator(mode="after")
     def _timed(self) -> Event:
@@ -89,8 +95,8 @@ class Event(Section):
 class Lasting(Event):
     """What lasts: `until` a time, or for as long as it `lasts`; without either, to the end of the run."""
 
-    until: Positive | None = None
-    lasts: Positive | None = None
+    until: Positive | None = key(None, "when it ends, counted from the start", "s")
+    lasts: Positive | None = key(None, "or how long it lasts; without either to the end of the run", "s")
 
     @model_validator(mode="after")
     def _ordered(self) -> Lasting:

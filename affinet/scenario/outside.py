@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
+from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
 from affinet.scenario.programs import words
 
@@ -18,10 +19,12 @@ def _command(line: str) -> str:
 class RecordedSection(Section):
     """A flight that stands in for bodies and sensors: a CSV file, or the directory of a run."""
 
-    flight: str
+    flight: str = key(..., "a CSV file, or the directory of a run")
 
 
 class ExternalSection(Section):
     """The command line of the driver, which says what is measured on the robots and has them fly what agents command."""
 
-    driver: Annotated[str, AfterValidator(_command)]
+    driver: Annotated[str, AfterValidator(_command)] = key(
+        ..., "command line of the driver that says what is measured, and has the robots fly what agents command"
+    )

@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from affinet.scenario.keys import key
 from affinet.scenario.units import (
     AtLeast1,
     Below1,
@@ -50,17 +51,17 @@ class Bernoulli(Section):
     """Independent loss with probability p."""
 
     model: Literal["bernoulli"]
-    p: Probability
+    p: Probability = key(..., "probability that a message is lost")
 
 
 class Gilbert(Section):
     """Bursts of losses, by what they look like: mean loss, and mean burst in steps."""
 
     model: Literal["gilbert"]
-    loss: Probability
-    burst: AtLeast1
-    extra_delay: NotNegative = 0.0
-    step: Step = "time"
+    loss: Probability = key(..., "mean loss")
+    burst: AtLeast1 = key(..., "mean length of a burst, in steps")
+    extra_delay: NotNegative = key(0.0, "how much longer messages take in a burst", "s")
+    step: Step = key("time", "the chain steps once a tick (time), or with each message offered (packet)")
 
     @model_validator(mode="after")
     def _possible(self) -> Gilbert:
@@ -76,61 +77,61 @@ class GilbertElliott(Section):
     """Good and bad periods: p and r are the chances to go from good to bad and back, `good` and `bad` the losses in them."""
 
     model: Literal["gilbert-elliott"]
-    p: Probability
-    r: Probability
-    bad: Probability = 1.0
-    good: Probability = 0.0
-    extra_delay: NotNegative = 0.0
-    step: Step = "time"
+    p: Probability = key(..., "chance to go from good to bad, in a step")
+    r: Probability = key(..., "chance to go back")
+    bad: Probability = key(1.0, "loss in a bad period")
+    good: Probability = key(0.0, "loss in a good one")
+    extra_delay: NotNegative = key(0.0, "how much longer messages take in a bad period", "s")
+    step: Step = key("time", "the chain steps once a tick (time), or with each message offered (packet)")
 
 
 class Markov(Section):
     """The four-state model of netem's `loss state`."""
 
     model: Literal["markov"]
-    p13: Probability
-    p31: Probability
-    p32: Probability
-    p23: Probability
-    p14: Probability
-    step: Step = "time"
+    p13: Probability = key(..., "chance from state 1 (received in a gap) to 3 (lost in a burst)")
+    p31: Probability = key(..., "from 3 to 1")
+    p32: Probability = key(..., "from 3 to 2 (received in a burst)")
+    p23: Probability = key(..., "from 2 to 3")
+    p14: Probability = key(..., "from 1 to 4 (lost by itself)")
+    step: Step = key("time", "the chain steps once a tick (time), or with each message offered (packet)")
 
 
 class Bursts(Section):
     """Mean loss, in bursts whose lengths 1, 2, ... have these probabilities."""
 
     model: Literal["bursts"]
-    loss: Probability
-    lengths: Annotated[list[NotNegative], Field(min_length=1)]
+    loss: Probability = key(..., "mean loss")
+    lengths: Annotated[list[NotNegative], Field(min_length=1)] = key(..., "probabilities of bursts of 1, 2, ...")
 
 
 class Listed(Section):
     """Exactly these messages of every link and channel, counted from 0."""
 
     model: Literal["list"]
-    messages: Annotated[list[Ticks], Field(min_length=1)]
+    messages: Annotated[list[Ticks], Field(min_length=1)] = key(..., "their numbers")
 
 
 class Traced(Section):
     """Availability from a CSV file (time,src,dst,availability), or from the journal of an earlier run (its directory)."""
 
     model: Literal["trace"]
-    file: str
+    file: str = key(..., "CSV file, or the directory of a run")
 
 
 class Disk(Section):
     """Everything within `range` metres, nothing beyond."""
 
     model: Literal["disk"]
-    range: Positive
+    range: Positive = key(..., "how far messages reach", "m")
 
 
 class Ramp(Section):
     """Everything up to `inner` metres, nothing from `outer` on, in proportion between."""
 
     model: Literal["ramp"]
-    inner: NotNegative
-    outer: Positive
+    inner: NotNegative = key(..., "up to where everything passes", "m")
+    outer: Positive = key(..., "from where on nothing does", "m")
 
     @model_validator(mode="after")
     def _ordered(self) -> Ramp:
@@ -143,32 +144,32 @@ class LogDistance(Section):
     """Log-distance path loss with shadowing: half of the messages pass at `range` metres."""
 
     model: Literal["log-distance"]
-    range: Positive
-    exponent: Positive = 3.0
-    shadowing: NotNegative = 4.0
-    coherence: NotNegative = 0.0
+    range: Positive = key(..., "where half of the messages pass", "m")
+    exponent: Positive = key(3.0, "of the path loss")
+    shadowing: NotNegative = key(4.0, "its standard deviation", "dB")
+    coherence: NotNegative = key(0.0, "over which shadowing stays alike", "s")
 
 
 class RoundRobin(Section):
     """Every agent attends to one neighbour at a time, for `hold` ticks."""
 
     model: Literal["round-robin"]
-    hold: Steps = 1
+    hold: Steps = key(1, "ticks for each neighbour")
 
 
 class Slotted(Section):
     """Every agent speaks in its own slot of `hold` ticks, one after the other."""
 
     model: Literal["slotted"]
-    hold: Steps = 1
+    hold: Steps = key(1, "ticks of a slot")
 
 
 class DutyCycle(Section):
     """Open for `on` ticks of every `period`."""
 
     model: Literal["duty-cycle"]
-    period: Steps
-    on: Steps
+    period: Steps = key(..., "ticks from one opening to the next")
+    on: Steps = key(..., "ticks for which it is open")
 
     @model_validator(mode="after")
     def _shorter(self) -> DutyCycle:
@@ -204,7 +205,7 @@ class Own(Section):
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
 
-    model: str
+    model: str = key(..., '"module:Class", or a name that a package offers')
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -223,7 +224,7 @@ def _own_or(given: Any, built_in: ValidatorFunctionWrapHandler) -> Any:
     return Own.model_validate(given)
 
 
-AnyLoss = Annotated[Loss, WrapValidator(_own_or), SerializeAsAny()]
+AnyLoss = Annotated[Loss, WrapValidator(_own_or, json_schema_input_type=Loss | Own), SerializeAsAny()]
 
 
 def _delays(given: Any) -> list[float] | str | None:
@@ -240,12 +241,16 @@ class DelayModel(Section):
     `table` holds measured delays, or names a file of them.
     """
 
-    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"]
-    mean: NotNegative | None = None
-    jitter: NotNegative | None = None
-    table: Annotated[list[float] | str | None, PlainValidator(_delays)] = None
-    correlation: Below1 = 0.0
-    order: Literal["free", "kept"] = "free"
+    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"] = key(
+        ..., "how delays are distributed"
+    )
+    mean: NotNegative | None = key(None, "of a delay, one way", "s")
+    jitter: NotNegative | None = key(None, "half-width (uniform), or standard deviation (normal, pareto)", "s")
+    table: Annotated[
+        list[float] | str | None, PlainValidator(_delays, json_schema_input_type=list[NotNegative] | str | None)
+    ] = key(None, "measured delays, each as probable as the others, or a file of them", "s")
+    correlation: Below1 = key(0.0, "from tick to tick")
+    order: Literal["free", "kept"] = key("free", "whether messages may overtake each other")
 
     @model_validator(mode="after")
     def _whole(self) -> DelayModel:
@@ -261,9 +266,11 @@ class DelayModel(Section):
 class Corruption(Section):
     """Messages that arrive wrong, with probability p; `by` is what a bias adds to every number."""
 
-    kind: Literal["stale", "bias", "nan", "bit-flip"]
-    p: Probability
-    by: Finite | None = None
+    kind: Literal["stale", "bias", "nan", "bit-flip"] = key(
+        ..., "how: what was said the tick before, a bias, NaN, or one bit of one number"
+    )
+    p: Probability = key(..., "probability")
+    by: Finite | None = key(None, "of a bias: what is added to every number")
 
     @model_validator(mode="after")
     def _whole(self) -> Corruption:
@@ -275,22 +282,25 @@ class Corruption(Section):
 class RateLimit(Section):
     """A token bucket: rate in bits per second, burst and queue in bytes."""
 
-    rate: BitsPerSecond
-    queue: Steps = 10_000
-    burst: Ticks = 0
+    rate: BitsPerSecond = key(..., "per directed link", "bit/s")
+    queue: Steps = key(10_000, "what may wait", "B")
+    burst: Ticks = key(0, "what may pass at once", "B")
 
 
 class LinkProfile(Section):
     """What happens to the messages of a link. `like` names a profile to start from, `netem` is an option string of tc netem."""
 
-    like: str | None = None
-    netem: Annotated[str | None, Field(exclude=True)] = None  # a scenario as resolved has what it means instead
-    loss: list[AnyLoss] | None = None
-    delay: DelayModel | None = None
-    duplicate: Probability | None = None
-    reorder: Probability | None = None
-    corrupt: list[Corruption] | None = None
-    rate: RateLimit | None = None
+    like: str | None = key(None, "a profile to start from, by name")
+    # A scenario as resolved has what it means instead.
+    netem: Annotated[str | None, Field(exclude=True)] = key(
+        None, "an option string of tc netem, in place of what it means"
+    )
+    loss: list[AnyLoss] | None = key(None, "losses, each for itself: a message passes when none holds it")
+    delay: DelayModel | None = key(None, "of communication; sensing is not delayed")
+    duplicate: Probability | None = key(None, "probability that a message arrives twice")
+    reorder: Probability | None = key(None, "probability that a message does not wait its delay, and overtakes")
+    corrupt: list[Corruption] | None = key(None, "how messages arrive wrong")
+    rate: RateLimit | None = key(None, "how much passes in a time")
 
     @model_validator(mode="before")
     @classmethod

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from affinet.scenario.events import Whom
+from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
 from affinet.scenario.units import Positive, Rate
 
@@ -22,12 +23,12 @@ class TimerSetting(Section):
     `listens`, and act. Without `agents` it is everybody.
     """
 
-    agents: Whom = Field(default=["all"])
-    rate: WakeRate = 1.0
-    phase: Share = 0.2
-    jitter: Swing = 0.0
-    drift: Rate = 0.0
-    listens: Share = 0.4
+    agents: Whom = key(["all"], "whose; without it everybody's")
+    rate: WakeRate = key(1.0, "how often in a tick they wake")
+    phase: Share = key(0.2, "when in a tick they wake, as a share of it")
+    jitter: Swing = key(0.0, "by how much of a tick too early or too late, at most")
+    drift: Rate = key(0.0, "seconds that their clocks gain per second")
+    listens: Share = key(0.4, "for which share of a tick they listen before they act")
 
 
 class RealTimeSection(Section):
@@ -36,9 +37,9 @@ class RealTimeSection(Section):
     Of several timers that name an agent the last one holds.
     """
 
-    factor: Positive = 1.0
-    late: Positive = 1.0
-    timers: list[TimerSetting] = Field(default_factory=list)
+    factor: Positive = key(1.0, "simulated seconds in a second")
+    late: Positive = key(1.0, "by how much a process may be late, or silent, before the run fails", "s")
+    timers: list[TimerSetting] = key(list, "when some agents act; the last that names an agent holds")
 
     @model_validator(mode="after")
     def _whole(self) -> RealTimeSection:

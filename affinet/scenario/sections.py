@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from affinet.scenario.events import Links
+from affinet.scenario.keys import key
 from affinet.scenario.outside import ExternalSection, RecordedSection
 from affinet.scenario.profiles import LinkProfile, Section
 from affinet.scenario.programs import of_agents
@@ -70,14 +71,19 @@ class FormationSection(Section):
     what j gives i.
     """
 
-    preset: str | None = None
-    nodes: Matrix | None = None
-    edges: list[Edge] | None = None
-    leaders: list[int] | None = None
-    weights: list[Finite] | Matrix | None = None
-    scale: Positive = 1.0
-    start: Literal["targets", "origin"] = "targets"
-    spread: NotNegative = 1.0
+    preset: str | None = key(None, "a formation by name, in place of nodes, edges and leaders")
+    nodes: Matrix | None = key(None, "nominal positions, two coordinates each, or three", "m")
+    edges: list[Edge] | None = key(None, 'undirected, like "1-2"; wanted with nodes')
+    leaders: list[int] | None = key(None, "agents that fly the manoeuvre; wanted with nodes, a preset has its own")
+    weights: list[Finite] | Matrix | None = key(
+        None, "in place of the stress that is solved for, by edge: a number each, or [what i gives j, what j gives i]"
+    )
+    scale: Positive = key(1.0, "factor on the nominal positions")
+    start: Literal["targets", "origin"] = key(
+        "targets",
+        "targets: leaders on theirs, followers scattered about theirs; origin: all scattered about the origin",
+    )
+    spread: NotNegative = key(1.0, "standard deviation of that scatter, per axis", "m")
 
     @model_validator(mode="after")
     def _whole(self) -> FormationSection:
@@ -96,21 +102,22 @@ class FormationSection(Section):
 class Keyframe(Section):
     """An affine map at a time: targets are theta p_i + offset, in metres; or theta p_i turned by an angle (rad), + offset."""
 
-    time: NotNegative
-    theta: Matrix
-    offset: list[Finite]
-    angle: Finite | None = None
+    time: NotNegative = key(..., "when the map holds", "s")
+    theta: Matrix = key(..., "the map: targets are theta p_i + offset")
+    offset: list[Finite] = key(..., "what is added", "m")
+    angle: Finite | None = key(
+        None, "by how much theta p_i is turned, counterclockwise; in every keyframe, or in none", "rad"
+    )
 
 
 class ManoeuvreSection(Section):
-    """What the leaders fly: a preset, or keyframes joined by monotone cubics.
+    """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
 
-    `walls` are lines through points, in metres, that pictures show.
-    """
-
-    preset: Literal["hover", "corridor", "ravine"] | None = None
-    keyframes: list[Keyframe] = Field(default_factory=list)
-    walls: list[Annotated[Matrix, Field(min_length=2)]] = Field(default_factory=list)
+    preset: Literal["hover", "corridor", "ravine"] | None = key(None, "a manoeuvre by name, in place of keyframes")
+    keyframes: list[Keyframe] = key(list, "affine maps at times, joined by monotone cubics; at rest before and after")
+    walls: list[Annotated[Matrix, Field(min_length=2)]] = key(
+        list, "lines through points that recordings and pictures show; nothing collides with them", "m"
+    )
 
     @model_validator(mode="after")
     def _whole(self) -> ManoeuvreSection:
@@ -131,12 +138,20 @@ class TimeSection(Section):
     has come, whoever has answered by then.
     """
 
-    dt: Tick
-    duration: Positive
-    patience: Annotated[float, Field(ge=2.0, le=3600.0)] = 3.0
-    mode: Literal["lockstep", "real"] = "lockstep"
-    exchange: Literal["same-tick", "next-tick"] = "same-tick"
-    real: RealTimeSection = RealTimeSection()
+    dt: Tick = key(..., "tick", "s")
+    duration: Positive = key(..., "length of the run, a whole number of ticks", "s")
+    patience: Annotated[float, Field(ge=2.0, le=3600.0)] = key(
+        3.0,
+        "over processes: how long nothing may move before the run has stalled, and what an agent may compute in one go",
+        "s",
+    )
+    mode: Literal["lockstep", "real"] = key(
+        "lockstep", "lockstep: a tick begins when everybody has answered; real: when its time has come"
+    )
+    exchange: Literal["same-tick", "next-tick"] = key(
+        "same-tick", "same-tick: undelayed broadcasts arrive in the tick they are sent; next-tick: one later"
+    )
+    real: RealTimeSection = key(RealTimeSection(), "of runs in real time")
 
     @property
     def ticks(self) -> int:
@@ -168,14 +183,16 @@ class SensingSection(Section):
     It makes `samples` of them in a tick, and reports their mean.
     """
 
-    samples: Steps = 1
-    sigma: NotNegative | None = None
-    covariance: Matrix | None = None
-    sigma_range: Positive | None = None
-    sigma_bearing: Bearing | None = None
-    sigma_along: ShareOfDistance | None = None
-    sigma_across: ShareOfDistance | None = None
-    sigma_direction: Bearing | None = None
+    samples: Steps = key(1, "measurements of an edge in a tick, of which the sensor reports the mean")
+    sigma: NotNegative | None = key(None, "standard deviation of a relative measurement, per axis", "m")
+    covariance: Matrix | None = key(None, "or its covariance", "m2")
+    sigma_range: Positive | None = key(None, "or the standard deviation of a range, with sigma_bearing", "m")
+    sigma_bearing: Bearing | None = key(None, "and of a bearing, in three dimensions of azimuth and elevation", "rad")
+    sigma_along: ShareOfDistance | None = key(
+        None, "or the standard deviation along the line of sight, as a share of the distance, with sigma_across"
+    )
+    sigma_across: ShareOfDistance | None = key(None, "and across it, as a share of the distance")
+    sigma_direction: Bearing | None = key(None, "or that of a direction, of a sensor that says no distance", "rad")
 
     @model_validator(mode="after")
     def _whole(self) -> SensingSection:
@@ -198,9 +215,11 @@ class SensingSection(Section):
 class KernelSection(Section):
     """How disturbances of two agents are correlated by their distance; `length` in metres, 2 for paper 004 (4.14)."""
 
-    shape: Literal["exponential", "squared-exponential"] = "exponential"
-    length: Positive
-    positions: Literal["nominal", "true"] = "nominal"
+    shape: Literal["exponential", "squared-exponential"] = key(
+        "exponential", "how the correlation falls: exp(-d / length), or by the square"
+    )
+    length: Positive = key(..., "over which it falls", "m")
+    positions: Literal["nominal", "true"] = key("nominal", "of which distances are taken")
 
 
 BodyName = Literal["single-integrator", "double-integrator", "triple-integrator", "quadruple-integrator", "unicycle"]
@@ -216,12 +235,15 @@ class DynamicsSection(Section):
     wheels.
     """
 
-    model: BodyName = "single-integrator"
-    ahead: Positive | None = None
-    disturbance: NotNegative | None = None
-    covariance: Matrix | None = None
-    kernel: KernelSection | None = None
-    persistence: Below1 = 0.0
+    model: BodyName = key(
+        "single-integrator",
+        "how often bodies integrate their input to a position; a unicycle rolls along its heading, steered by velocities",
+    )
+    ahead: Positive | None = key(None, "of a unicycle: how far ahead of its wheels it is steered", "m")
+    disturbance: NotNegative | None = key(None, "standard deviation of the displacement per tick, per axis", "m")
+    covariance: Matrix | None = key(None, "or its covariance", "m2")
+    kernel: KernelSection | None = key(None, "correlation of the displacements of agents, by their distance")
+    persistence: Below1 = key(0.0, "correlation of a displacement with that of the tick before")
 
     @model_validator(mode="after")
     def _one(self) -> DynamicsSection:
@@ -232,11 +254,11 @@ class DynamicsSection(Section):
     @model_validator(mode="after")
     def _of_its_body(self) -> DynamicsSection:
         for model, keys in _OF_BODIES.items():
-            for key in keys:
-                if (getattr(self, key) is None) == (self.model == model):
-                    missing = f"a {model} needs {key} (m)"
+            for name in keys:
+                if (getattr(self, name) is None) == (self.model == model):
+                    missing = f"a {model} needs {name} (m)"
                     raise ValueError(
-                        missing if self.model == model else f"{key} is of a {model}, not of a {self.model}"
+                        missing if self.model == model else f"{name} is of a {model}, not of a {self.model}"
                     )
         return self
 
@@ -258,34 +280,40 @@ class AgentsSection(Section):
     is how many of them a process carries; `programs` are command lines of programs that fly some of them, by their numbers.
     """
 
-    estimator: str
-    law: str
-    leaders: Literal["pilot", "distances"] = "pilot"
-    leader_gain: NotNegative = 1.0
-    limit: Positive | None = None
-    per_process: Annotated[int, Field(ge=1, le=1000)] = 1
-    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = Field(default_factory=dict)
-    parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    estimator: str = key(..., 'by name, or "module:Class" (`affinet list estimators`)')
+    law: str = key(..., 'by name, or "module:Class" (`affinet list laws`)')
+    leaders: Literal["pilot", "distances"] = key(
+        "pilot", "pilot: they fly the manoeuvre; distances: they keep their nominal distances from each other"
+    )
+    leader_gain: NotNegative = key(1.0, "pull of a leader toward its target; toward distances in 1/(s m2)", "1/s")
+    limit: Positive | None = key(
+        None, "the longest input, longer ones are shortened; m/s2 of double integrators", "m/s"
+    )
+    per_process: Annotated[int, Field(ge=1, le=1000)] = key(1, "how many agents a process carries, as one batch")
+    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = key(
+        dict, "command lines of programs that fly some agents in place of ours, by their numbers"
+    )
+    parameters: dict[str, dict[str, Any]] = key(dict, "a table for each estimator or law, by name")
 
 
 class LinkSetting(Section):
     """Links that differ from the others, in all channels or in those of one class."""
 
-    links: Links
-    channels: Literal["sensing", "comms"] | None = None
-    profile: str | None = None
-    availability: Probability | None = None
-    delay_ticks: Ticks | None = None
+    links: Links = key(..., 'which, like "2->4", "2-4", "leaders->followers"')
+    channels: Literal["sensing", "comms"] | None = key(None, "only those of this class")
+    profile: str | None = key(None, "what happens on them, in place of the profile of all")
+    availability: Probability | None = key(None, "probability that a message gets through")
+    delay_ticks: Ticks | None = key(None, "one-way delay of communication, in ticks")
 
 
 class JammedZone(Section):
     """A disk (ball) in which nobody hears anything in a `share` of all ticks, all at once; metres."""
 
-    centre: list[Finite]
-    radius: Positive
-    share: Probability = 1.0
-    links: Links = "all"
-    channels: Literal["sensing", "comms"] | None = None
+    centre: list[Finite] = key(..., "of the disk, or ball", "m")
+    radius: Positive = key(..., "of it", "m")
+    share: Probability = key(1.0, "of all ticks in which nobody in it hears anything")
+    links: Links = key("all", "to which links it does so")
+    channels: Literal["sensing", "comms"] | None = key(None, "only to channels of this class")
 
 
 class NetworkSection(Section):
@@ -294,13 +322,13 @@ class NetworkSection(Section):
     `coupled` is Assumption 1 of paper 000: one verdict per directed link and tick for sensing and communication.
     """
 
-    availability: Probability = 1.0
-    delay_ticks: Ticks = 0
-    coupled: bool = True
-    profile: str = "perfect"
-    profiles: dict[str, LinkProfile] = Field(default_factory=dict)
-    links: list[LinkSetting] = Field(default_factory=list)
-    zones: list[JammedZone] = Field(default_factory=list)
+    availability: Probability = key(1.0, "probability that a message gets through")
+    delay_ticks: Ticks = key(0, "one-way delay of communication, in ticks; sensing is not delayed")
+    coupled: bool = key(True, "one verdict per directed link and tick for sensing and communication (Assumption 1)")
+    profile: str = key("perfect", "what happens on all links, by name (`affinet list profiles`)")
+    profiles: dict[str, LinkProfile] = key(dict, "profiles of your own, a table each")
+    links: list[LinkSetting] = key(list, "links that differ from the others; later ones win")
+    zones: list[JammedZone] = key(list, "disks (balls) in which nobody hears anything")
 
     @model_validator(mode="after")
     def _apart(self) -> NetworkSection:
@@ -315,38 +343,48 @@ class TrustSection(Section):
     The largest message, in bytes, and how many of an agent are looked at in a tick.
     """
 
-    wrong_messages: Literal["fail", "drop"] = "fail"
-    largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 22)] = 1 << 20
-    messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = 100
+    wrong_messages: Literal["fail", "drop"] = key(
+        "fail",
+        "a wrong message ends the run (fail), or is dropped and counted while the right one is waited for (drop)",
+    )
+    largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 22)] = key(1 << 20, "what an agent may say at once", "B")
+    messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = key(
+        100, "how many messages of an agent are looked at in a tick"
+    )
 
 
 class RecordSection(Section):
     """The Rerun recording, and the realised graph: one moment every so many ticks, joint over a window in seconds."""
 
-    enabled: bool = True
-    every: Annotated[int, Field(ge=1, le=10_000)] = 5
-    window: Positive = 1.0
+    enabled: bool = key(True, "write run.rrd")
+    every: Annotated[int, Field(ge=1, le=10_000)] = key(
+        5, "ticks from one recorded moment, and one look at the realised graph, to the next"
+    )
+    window: Positive = key(1.0, "over which links count as working together", "s")
 
 
 class Scenario(Section):
     """A whole scenario."""
 
-    description: str = ""
-    seed: Annotated[int, Field(ge=0, lt=2**64)] = 1
-    formation: FormationSection
-    manoeuvre: ManoeuvreSection
-    time: TimeSection
-    sensing: SensingSection
-    dynamics: DynamicsSection = DynamicsSection()
-    target: TargetSection | None = None
-    world: Literal["simulated", "recorded", "external"] = "simulated"
-    recorded: RecordedSection | None = None
-    external: ExternalSection | None = None
-    agents: AgentsSection
-    network: NetworkSection = NetworkSection()
-    timeline: list[AnyEvent] = Field(default_factory=list)
-    trust: TrustSection = TrustSection()
-    record: RecordSection = RecordSection()
+    description: str = key("", "for people")
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = key(1, "of every draw")
+    formation: FormationSection = key(..., "who flies")
+    manoeuvre: ManoeuvreSection = key(..., "what the leaders fly")
+    time: TimeSection = key(..., "ticks, and how long it goes")
+    sensing: SensingSection = key(..., "what is measured of neighbours")
+    dynamics: DynamicsSection = key(DynamicsSection(), "what bodies are, and what displaces them")
+    target: TargetSection | None = key(None, "of agents that pursue one")
+    world: Literal["simulated", "recorded", "external"] = key(
+        "simulated",
+        "where bodies and sensors are: simulated; recorded, a flight that was flown before; external, robots outside",
+    )
+    recorded: RecordedSection | None = key(None, "of a world that was recorded")
+    external: ExternalSection | None = key(None, "of a world of robots outside")
+    agents: AgentsSection = key(..., "what the agents run")
+    network: NetworkSection = key(NetworkSection(), "what happens to messages")
+    timeline: list[AnyEvent] = key(list, "faults, each with a verb and a time (`affinet list verbs`)")
+    trust: TrustSection = key(TrustSection(), "what is taken from agents, over processes")
+    record: RecordSection = key(RecordSection(), "what is recorded")
     _source: Source | None = PrivateAttr(default=None)
     _own: dict[str, Path] = PrivateAttr(default_factory=dict)
 

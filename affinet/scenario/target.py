@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
 from affinet.scenario.units import Finite, NotNegative, Positive, Probability, Steps, refuse_unordered
 
@@ -15,8 +16,8 @@ _ROUNDING = 1e-9
 class Waypoint(Section):
     """Where a target is at a time, in metres."""
 
-    time: NotNegative
-    position: list[Finite]
+    time: NotNegative = key(..., "when it is there", "s")
+    position: list[Finite] = key(..., "where", "m")
 
 
 class TargetSection(Section):
@@ -29,20 +30,34 @@ class TargetSection(Section):
     `false_positives` something else, about the target by the standard deviation `clutter` (m).
     """
 
-    order: Annotated[int, Field(ge=1, le=4)] = 2
-    intensity: NotNegative = 1.0
-    true_intensity: NotNegative | None = None
-    path: Annotated[list[Waypoint], Field(min_length=2)] | None = None
-    position: list[Finite] | None = None
-    velocity: list[Finite] | None = None
-    latencies: Annotated[list[Positive], Field(min_length=1)]
-    variances: Annotated[list[Positive], Field(min_length=1)]
-    probabilities: list[Probability] | None = None
-    schedule: Annotated[list[Steps], Field(min_length=1)] | None = None
-    methods: list[Steps] | None = None
-    misses: Probability = 0.0
-    false_positives: Probability = 0.0
-    clutter: NotNegative = 5.0
+    order: Annotated[int, Field(ge=1, le=4)] = key(
+        2, "how often the noise that drives the target is integrated to a position"
+    )
+    intensity: NotNegative = key(1.0, "W of that noise, per axis, as agents know it", "m2/s^(2 order - 1)")
+    true_intensity: NotNegative | None = key(
+        None, "the W that truly drives it, where it is another", "m2/s^(2 order - 1)"
+    )
+    path: Annotated[list[Waypoint], Field(min_length=2)] | None = key(
+        None, "or no noise, but a way through points; monotone cubics between, at rest before and after"
+    )
+    position: list[Finite] | None = key(None, "where it begins, by default the origin", "m")
+    velocity: list[Finite] | None = key(None, "how fast it begins, by default at rest", "m/s")
+    latencies: Annotated[list[Positive], Field(min_length=1)] = key(
+        ..., "of the methods of detection: how long each takes, a whole number of ticks", "s"
+    )
+    variances: Annotated[list[Positive], Field(min_length=1)] = key(
+        ..., "of the methods: the variance per axis of what each finds", "m2"
+    )
+    probabilities: list[Probability] | None = key(
+        None, "of the methods, where one is chosen at random; by default all alike"
+    )
+    schedule: Annotated[list[Steps], Field(min_length=1)] | None = key(
+        None, "or the methods by turns, with numbers from 1, like [1, 2, 2]"
+    )
+    methods: list[Steps] | None = key(None, "or a method for each agent, with numbers from 1")
+    misses: Probability = key(0.0, "share of detections that find nothing")
+    false_positives: Probability = key(0.0, "share of detections that find something else")
+    clutter: NotNegative = key(5.0, "how far about the target that lies, standard deviation per axis", "m")
 
     @model_validator(mode="after")
     def _paired(self) -> TargetSection:
@@ -60,9 +75,9 @@ class TargetSection(Section):
                 raise ValueError("give a probability for each latency")
             if abs(sum(self.probabilities) - 1.0) > _ROUNDING:
                 raise ValueError(f"probabilities come to {sum(self.probabilities):g}, not to 1")
-        for key in ("schedule", "methods"):
-            if max(getattr(self, key) or [1]) > len(self.latencies):
-                raise ValueError(f"{key} has a method {max(getattr(self, key))}, and there are {len(self.latencies)}")
+        for name in ("schedule", "methods"):
+            if max(getattr(self, name) or [1]) > len(self.latencies):
+                raise ValueError(f"{name} has a method {max(getattr(self, name))}, and there are {len(self.latencies)}")
         return self
 
     @model_validator(mode="after")

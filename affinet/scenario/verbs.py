@@ -8,6 +8,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from affinet.scenario import selectors
 from affinet.scenario.events import Event, Found, InFlight, Lasting, On, Vector, Whom
+from affinet.scenario.keys import key
 from affinet.scenario.units import Finite, Positive, Probability, Rate
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
 
@@ -16,8 +17,8 @@ class Cut(Lasting):
     """Links that carry nothing; `in_flight` says what becomes of the messages under way on them."""
 
     verb: Literal["cut"] = "cut"
-    links: On
-    in_flight: InFlight = "drop"
+    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    in_flight: InFlight = key("drop", "what becomes of the messages under way on them")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -28,8 +29,13 @@ class Partition(Lasting):
     """Groups between which nothing passes: lists of agents, or how to split the swarm in two."""
 
     verb: Literal["partition"] = "partition"
-    groups: Annotated[list[list[int]] | str, PlainValidator(selectors.groups_or_word)]
-    in_flight: InFlight = "drop"
+    groups: Annotated[
+        list[list[int]] | str,
+        PlainValidator(
+            selectors.groups_or_word, json_schema_input_type=list[list[int]] | Literal["halves", "leaders", "min-cut"]
+        ),
+    ] = key(..., 'lists of agents, or "halves" (by number), "leaders" (and the others), "min-cut"')
+    in_flight: InFlight = key("drop", "what becomes of the messages under way between them")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -40,8 +46,8 @@ class Lose(Lasting):
     """Links that lose messages with a probability, on top of what else they lose."""
 
     verb: Literal["lose"] = "lose"
-    links: On
-    loss: Probability
+    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    loss: Probability = key(..., "probability that a message is lost")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -52,8 +58,8 @@ class Delay(Lasting):
     """Links whose communication takes longer, in seconds; sensing is not delayed."""
 
     verb: Literal["delay"] = "delay"
-    links: On
-    delay: Positive
+    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    delay: Positive = key(..., "by how much longer it takes", "s")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -64,8 +70,8 @@ class Degrade(Lasting):
     """Links that have another profile in place of their own."""
 
     verb: Literal["degrade"] = "degrade"
-    links: On
-    profile: str
+    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    profile: str = key(..., "by name")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -77,14 +83,14 @@ class Heal(Event):
     """The end of what is scripted on links: of the entries named, or of all."""
 
     verb: Literal["heal"] = "heal"
-    names: Annotated[list[str], Field(min_length=1)] | None = None
+    names: Annotated[list[str], Field(min_length=1)] | None = key(None, "of the entries to end; without it all")
 
 
 class Kill(Event):
     """Agents whose processes are killed (SIGKILL); their bodies hold."""
 
     verb: Literal["kill"] = "kill"
-    agents: Whom
+    agents: Whom = key(..., 'whose, like [4, "leaders"]')
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -95,16 +101,16 @@ class Restart(Event):
     """Killed agents, or all of them, that come back as new processes: cold, knowing nothing, or warm, with their last state."""
 
     verb: Literal["restart"] = "restart"
-    agents: Whom | None = None
-    state: Literal["cold", "warm"] = "cold"
+    agents: Whom | None = key(None, "which, of those killed; without it all")
+    state: Literal["cold", "warm"] = key("cold", "cold: knowing nothing; warm: with the last state of its own")
 
 
 class Pause(Lasting):
     """Agents whose processes are stopped (SIGSTOP); their bodies fly on. What is sent to them waits, or is dropped."""
 
     verb: Literal["pause"] = "pause"
-    agents: Whom
-    in_flight: Literal["hold", "drop"] = "hold"
+    agents: Whom = key(..., 'whose, like [4, "leaders"]')
+    in_flight: Literal["hold", "drop"] = key("hold", "what is sent to them waits (hold), or is lost (drop)")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -116,15 +122,15 @@ class Resume(Event):
     """Paused agents, or all of them, that go on (SIGCONT)."""
 
     verb: Literal["resume"] = "resume"
-    agents: Whom | None = None
+    agents: Whom | None = key(None, "which, of those paused; without it all")
 
 
 class Clock(Lasting):
     """Agents whose clocks gain (or lose) `rate` seconds per second; at its end they are right again."""
 
     verb: Literal["clock"] = "clock"
-    agents: Whom
-    rate: Rate
+    agents: Whom = key(..., 'whose, like [4, "leaders"]')
+    rate: Rate = key(..., "seconds that they gain per second")
 
     @model_validator(mode="after")
     def _drifts(self) -> Clock:
@@ -141,8 +147,8 @@ class Depart(Lasting):
     """Agents that leave the formation on purpose; their bodies hold, drift on, or vanish."""
 
     verb: Literal["depart"] = "depart"
-    agents: Whom
-    body: Literal["hold", "drift", "vanish"] = "hold"
+    agents: Whom = key(..., 'which, like [4, "leaders"]')
+    body: Literal["hold", "drift", "vanish"] = key("hold", "what becomes of their bodies")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -154,22 +160,22 @@ class Rejoin(Event):
     """Departed agents, or all of them, that take part again."""
 
     verb: Literal["rejoin"] = "rejoin"
-    agents: Whom | None = None
+    agents: Whom | None = key(None, "which, of those departed; without it all")
 
 
 class Replace(Event):
     """Departed agents, or all of them, whose places are taken: new processes, which know nothing, in the bodies left behind."""
 
     verb: Literal["replace"] = "replace"
-    agents: Whom | None = None
+    agents: Whom | None = key(None, "which, of those departed; without it all")
 
 
 class Gust(Lasting):
     """A push: agents whose bodies are carried along, in metres per second."""
 
     verb: Literal["gust"] = "gust"
-    agents: Whom
-    velocity: Vector
+    agents: Whom = key(..., 'which, like [4, "leaders"]')
+    velocity: Vector = key(..., "with which they are carried along", "m/s")
 
     @model_validator(mode="after")
     def _blows(self) -> Gust:
@@ -184,8 +190,8 @@ class Bias(Lasting):
     """Sensors that are off by a vector, in metres: of what is measured over these links."""
 
     verb: Literal["bias"] = "bias"
-    links: On
-    by: Vector
+    links: On = key(..., "what the last agent of each measures of the first")
+    by: Vector = key(..., "what is added to every measurement", "m")
 
     @model_validator(mode="after")
     def _biased(self) -> Bias:
@@ -201,9 +207,9 @@ class Outlier(Lasting):
     """Sensors that are wildly wrong now and then: with probability `p`, by a normal error of `sigma` metres per axis."""
 
     verb: Literal["outlier"] = "outlier"
-    links: On
-    p: Probability
-    sigma: Positive
+    links: On = key(..., "what the last agent of each measures of the first")
+    p: Probability = key(..., "probability that a measurement is wrong")
+    sigma: Positive = key(..., "standard deviation of the error, per axis", "m")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -216,8 +222,8 @@ class Dropout(Lasting):
     """Sensors that make no measurement, with probability `p` in each tick."""
 
     verb: Literal["dropout"] = "dropout"
-    links: On
-    p: Probability = 1.0
+    links: On = key(..., "what the last agent of each measures of the first")
+    p: Probability = key(1.0, "probability that no measurement is made")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -228,7 +234,7 @@ class Freeze(Lasting):
     """Sensors that repeat their last measurement."""
 
     verb: Literal["freeze"] = "freeze"
-    links: On
+    links: On = key(..., "what the last agent of each measures of the first")
 
     def faults(self, found: Found) -> list[Fault]:
         """What it does, but for the times."""
@@ -239,8 +245,8 @@ class Lie(Lasting):
     """Byzantine agents: every map Theta they tell is multiplied by a matrix from the left."""
 
     verb: Literal["lie"] = "lie"
-    agents: Whom
-    matrix: list[list[Finite]]
+    agents: Whom = key(..., 'which, like [4, "leaders"]')
+    matrix: list[list[Finite]] = key(..., "by which every Theta is multiplied, 2 x 2, or 3 x 3")
 
     @model_validator(mode="after")
     def _false(self) -> Lie:

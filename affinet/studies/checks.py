@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 Wrong = tuple[str, str]  # a key of the study, and what is wrong with it
 Planned = tuple["Case", Plan]
 
+# What a study can draw.
+FIGURES = {
+    "curves": "A quantity over time: panels by two axes, in each a curve for every label of a third.",
+    "map": "The mean of the tracking error as a colour: panels by one axis, rows and columns by two others.",
+    "sweep": "The mean of a quantity along an axis of numbers, with its interval: panels and curves by two others.",
+    "indicator": "The convergence indicators psi beside the tracking error, over time, of one case.",
+    "paths": "Where the agents of the first run of each case go, and what one of them flies.",
+}
 _PANELS = {
     "curves": "one for columns, one for rows, one for the curves",
     "map": "one for panels, one for rows, one for columns",

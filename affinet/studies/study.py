@@ -23,6 +23,7 @@ from affinet.runtimes.side_by_side import Flight
 from affinet.scenario import files
 from affinet.scenario import loading as scenarios
 from affinet.scenario.explain import explained, named_in
+from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.source import Source
@@ -60,8 +61,8 @@ _LEAST_LEVEL: dict[str, float] = {"flat": 1.0, "stays_below": 0.0, "leaves": 0.0
 class Axis(Section):
     """A setting that is varied: for each value its label, and the overrides it stands for."""
 
-    name: str
-    values: dict[str, list[str]]
+    name: str = key(..., "of the axis")
+    values: dict[str, list[str]] = key(..., "for each label the overrides that it stands for")
 
 
 class Claim(Section):
@@ -70,8 +71,8 @@ class Claim(Section):
     With `levels`, a level for each label of the one axis in `each`, it says so of these labels only.
     """
 
-    says: str
-    each: list[str] = Field(default_factory=list)
+    says: str = key(..., "the claim, in words")
+    each: list[str] = key(list, "axes for whose labels, one by one, it is judged")
     check: Literal[
         "flat",
         "approaches",
@@ -84,16 +85,18 @@ class Claim(Section):
         "exponential",
         "slower_with_anchor",
         "value",
-    ]
-    of: Labels = Field(default_factory=dict)
-    to: Labels | None = None
-    quantity: Quantity | None = None
-    to_quantity: Quantity | None = None
-    level: Finite | None = None
-    levels: dict[str, Finite] | None = None
-    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
-    since: NotNegative = 0.0
-    until: NotNegative | None = None
+    ] = key(..., "what decides it")
+    of: Labels = key(dict, "labels of the cases that it speaks of")
+    to: Labels | None = key(None, "labels of those they are compared with")
+    quantity: Quantity | None = key(None, "of what, in place of the study's own")
+    to_quantity: Quantity | None = key(None, "of what of those compared with, if of another")
+    level: Finite | None = key(None, "what the check compares with")
+    levels: dict[str, Finite] | None = key(None, "or a level for each label of the one axis in `each`")
+    between: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = key(
+        None, "two numbers: of `ratio` what it lies between, of `value` factors of the level"
+    )
+    since: NotNegative = key(0.0, "from when on", "s")
+    until: NotNegative | None = key(None, "up to when; without it to the end of the run", "s")
 
     @model_validator(mode="after")
     def _compared(self) -> Claim:
@@ -134,15 +137,15 @@ class Claim(Section):
 class Bound(Section):
     """A line in the figure that no curve should cross, and what it says."""
 
-    at: Finite
-    says: str
+    at: Finite = key(..., "where the line is, in the unit of the quantity")
+    says: str = key(..., "what is said of it")
 
 
 class Size(Section):
     """How large the study is: runs of each case, and overrides for all of them."""
 
-    runs: Annotated[int, Field(ge=1, le=1_000_000)]
-    set: list[str] = Field(default_factory=list)
+    runs: Annotated[int, Field(ge=1, le=1_000_000)] = key(..., "of each case")
+    set: list[str] = key(list, "overrides for all cases")
 
 
 class Study(Section):
@@ -151,21 +154,23 @@ class Study(Section):
     Curves and sweeps are drawn of its quantity, and of those in `also`.
     """
 
-    title: str
-    source: str
-    figure: Literal["curves", "sweep", "indicator", "map", "paths"]
-    scenario: str
-    quantity: Quantity = "error"
-    also: list[Quantity] = Field(default_factory=list)
-    bound: Bound | None = None
-    set: list[str] = Field(default_factory=list)
-    full: Size
-    quick: Size
-    axes: list[Axis]
-    along: str | None = None
-    since: NotNegative = 0.0
-    skip: list[Labels] = Field(default_factory=list)
-    claims: list[Claim] = Field(default_factory=list)
+    title: str = key(..., "of the figure")
+    source: str = key(..., "who says so: a paper and its figure, or our own")
+    figure: Literal["curves", "sweep", "indicator", "map", "paths"] = key(
+        ..., "curves, sweep, indicator, map or paths (`affinet list figures`)"
+    )
+    scenario: str = key(..., "by name, or a file, relative to this one")
+    quantity: Quantity = key("error", "what is drawn and judged")
+    also: list[Quantity] = key(list, "further quantities of which curves or a sweep are drawn")
+    bound: Bound | None = key(None, "a line in the figure that no curve should cross")
+    set: list[str] = key(list, "overrides for all cases")
+    full: Size = key(..., "how large it is")
+    quick: Size = key(..., "how large it is with --quick")
+    axes: list[Axis] = key(..., "settings that are varied; every combination is a case")
+    along: str | None = key(None, "of a sweep: the axis it runs along")
+    since: NotNegative = key(0.0, "from when on a sweep takes its mean", "s")
+    skip: list[Labels] = key(list, "cases that are left out: those with all labels of an entry")
+    claims: list[Claim] = key(list, "what is judged")
     _source: Source | None = PrivateAttr(default=None)
     _folder: Path | None = PrivateAttr(default=None)
 

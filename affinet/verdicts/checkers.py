@@ -34,7 +34,19 @@ def error_below(level: float) -> Signal:
 
 
 def always(signal: Signal, *, since: float = 0.0, until: float | None = None, name: str = "always") -> Checker:
-    """A signal (T,) holds in every tick from `since` to `until`, in seconds."""
+    """A signal (T,) holds in every tick from `since` to `until`, in seconds.
+
+    Parameters
+    ----------
+    signal
+        What should hold: of a run, in each tick, shape (T,).
+    since
+        From when on, in seconds.
+    until
+        Up to when, in seconds; None to the end of the run.
+    name
+        Under which it is reported.
+    """
     times(name, since=since, until=until)
 
     def check(evidence: Evidence) -> CheckResult:
@@ -48,7 +60,19 @@ def always(signal: Signal, *, since: float = 0.0, until: float | None = None, na
 
 
 def eventually(signal: Signal, *, since: float = 0.0, within: float | None = None, name: str = "eventually") -> Checker:
-    """A signal (T,) holds in some tick from `since` on, `within` so many seconds."""
+    """A signal (T,) holds in some tick from `since` on, `within` so many seconds.
+
+    Parameters
+    ----------
+    signal
+        What should hold: of a run, in each tick, shape (T,).
+    since
+        From when on, in seconds.
+    within
+        For how long it is waited for, in seconds; None to the end of the run.
+    name
+        Under which it is reported.
+    """
     times(name, since=since, within=within)
 
     def check(evidence: Evidence) -> CheckResult:
@@ -65,14 +89,28 @@ def eventually(signal: Signal, *, since: float = 0.0, within: float | None = Non
 
 
 def bounded(level: float) -> Checker:
-    """The tracking error stays below a level, in square metres."""
+    """The tracking error stays below a level, in square metres.
+
+    Parameters
+    ----------
+    level
+        Of the tracking error, in square metres.
+    """
     name = f"bounded({level:g})"
     above_zero(name, level=level)
     return always(error_below(level), name=name)
 
 
 def converged(level: float, by: float) -> Checker:
-    """From a time on, in seconds, the tracking error stays below a level, in square metres."""
+    """From a time on, in seconds, the tracking error stays below a level, in square metres.
+
+    Parameters
+    ----------
+    level
+        Of the tracking error, in square metres.
+    by
+        From when on, in seconds.
+    """
     name = f"converged({level:g}, by={by:g})"
     above_zero(name, level=level)
     times(name, by=by)
@@ -85,6 +123,13 @@ def recovers(level: float, within: float) -> Checker:
     A fault is looked at where it lifted the error: it rose from below the level to above it since the fault began, or since
     an earlier one did and has been above ever since. Not where another fault still holds at its end, or begins before the
     error has had its time. Vacuous where no fault is left to look at.
+
+    Parameters
+    ----------
+    level
+        Of the tracking error, in square metres.
+    within
+        How long after the end of a fault, in seconds.
     """
     name = f"recovers({level:g}, within={within:g})"
     above_zero(name, level=level)
@@ -121,7 +166,19 @@ def recovers(level: float, within: float) -> Checker:
 
 
 def below(metric: str, level: float, *, since: float = 0.0, until: float | None = None) -> Checker:
-    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever there is any."""
+    """A metric of `METRICS` stays below a level, in its unit, from `since` to `until`, in seconds, wherever there is any.
+
+    Parameters
+    ----------
+    metric
+        One of `METRICS`, by name.
+    level
+        Of the metric, in its unit.
+    since
+        From when on, in seconds.
+    until
+        Up to when, in seconds; None to the end of the run.
+    """
     name = f"below({metric!r}, {level:g})"
     if metric not in METRICS:
         raise ValueError(f"{name}: no metric {metric!r}; {among(metric, METRICS)}")
@@ -175,6 +232,15 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
     dimension out; it is vacuous where the interval is wider than a share `within` of it to either side, or where the run is
     shorter than forty times what its ticks are correlated over, which says nothing, unless the mean is out of what a single
     draw can be. The interval is by batch means: edges share their noise, and ticks are correlated.
+
+    Parameters
+    ----------
+    level
+        Confidence of the interval, a probability.
+    within
+        How wide it may be to either side, as a share of the dimension.
+    since
+        From when on, in seconds.
     """
     name = f"consistent({level:g}, within={within:g}, since={since:g})"
     if not 0.0 < level < 1.0:
@@ -221,7 +287,13 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
 
 
 def collision_free(distance: float) -> Checker:
-    """No two bodies come closer than a distance, in metres; vacuous where there never are two."""
+    """No two bodies come closer than a distance, in metres; vacuous where there never are two.
+
+    Parameters
+    ----------
+    distance
+        Which two bodies keep at least, in metres.
+    """
     name = f"collision_free({distance:g})"
     above_zero(name, distance=distance)
 
@@ -248,6 +320,13 @@ def agreement(level: float, by: float = 0.0) -> Checker:
     """From a time on, in seconds, the maps Theta that neighbours perceive differ by an indicator psi (16) below a level.
 
     Vacuous for estimators that perceive no map.
+
+    Parameters
+    ----------
+    level
+        Of the indicator psi, which has no unit.
+    by
+        From when on, in seconds.
     """
     name = f"agreement({level:g}, by={by:g})"
     above_zero(name, level=level)
@@ -271,7 +350,13 @@ def agreement(level: float, by: float = 0.0) -> Checker:
 
 
 def energy(level: float) -> Checker:
-    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s (m2/s3 of accelerations)."""
+    """The inputs spend less than a level: the sum of |u|^2 dt over all agents present, in m2/s (m2/s3 of accelerations).
+
+    Parameters
+    ----------
+    level
+        Of what is spent, in metres squared per second.
+    """
     name = f"energy({level:g})"
     above_zero(name, level=level)
 
@@ -287,6 +372,13 @@ def localized(level: float, by: float = 0.0) -> Checker:
     """From a time on, in seconds, agents are where the best answer to all first measurements puts them, to a level, in metres.
 
     That is the root of the mean squared distance, both relative to their weighted centroid; vacuous where nobody localizes.
+
+    Parameters
+    ----------
+    level
+        Of how far off they are, in metres.
+    by
+        From when on, in seconds.
     """
     name = f"localized({level:g}, by={by:g})"
     above_zero(name, level=level)
@@ -308,7 +400,13 @@ def localized(level: float, by: float = 0.0) -> Checker:
 
 
 def smooth(share: float) -> Checker:
-    """Estimated positions do not ring: no more than a share of their steps go back on the step before."""
+    """Estimated positions do not ring: no more than a share of their steps go back on the step before.
+
+    Parameters
+    ----------
+    share
+        Of the steps that may go back, at least 0 and below 1.
+    """
     name = f"smooth({share:g})"
     if not 0.0 <= share < 1.0:
         raise ValueError(f"{name}: share is one of the steps, at least 0 and below 1")

@@ -16,6 +16,13 @@ def found(within: float, by: float = 0.0) -> Checker:
     """From a time on, in seconds, the target is within so many metres of where each agent takes it to be.
 
     That is where it steers for, with what others tell it; vacuous where nobody pursues a target.
+
+    Parameters
+    ----------
+    within
+        How far off an agent may be, in metres.
+    by
+        From when on, in seconds.
     """
     return _all_within("found", 1, within, by, lambda evidence, steered: steered - _target(evidence), "from the target")
 
@@ -24,6 +31,13 @@ def agreed(within: float, by: float = 0.0) -> Checker:
     """From a time on, in seconds, where each agent takes the target to be is within so many metres of the mean of all.
 
     Vacuous where nobody pursues a target, or in some tick nobody but one does.
+
+    Parameters
+    ----------
+    within
+        How far from the mean an agent may be, in metres.
+    by
+        From when on, in seconds.
     """
     return _all_within(
         "agreed",

@@ -63,7 +63,7 @@ class EdgeKalmanFilter(Estimator[EdgeStates]):
     sigma_n
         Standard deviation of what drives that model, per axis, in metres per second; 0 takes what is guessed for known.
     memory
-        How many ticks late an input may be heard, and be of use: later ones count as lost. No more are remembered than the
+        How late an input may be heard, and be of use, in ticks: later ones count as lost. No more are remembered than the
         network can make messages late.
     """
 

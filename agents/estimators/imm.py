@@ -51,9 +51,13 @@ class InteractingMultipleModel(Estimator[Modes]):
     sigma_constant_acceleration, sigma_constant_velocity
         Standard deviations of the acceleration that drives these models, in metres per second squared.
     sigma_random_walk
-        Of the velocity that drives this one, in metres per second.
-    prior_position, prior_velocity, prior_acceleration
-        Standard deviations before the first measurement, in SI units.
+        Standard deviation of the velocity that drives this one, in metres per second.
+    prior_position
+        Standard deviation of a relative position before the first measurement, in metres.
+    prior_velocity
+        Of a relative velocity, in metres per second.
+    prior_acceleration
+        Of a relative acceleration, in metres per second squared.
     """
 
     stay: float = 0.98

@@ -47,8 +47,12 @@ class JointEdgeFilter(Estimator[Joint]):
     ----------
     prior_position
         Standard deviation of an agent's initial position, per axis, in metres.
-    coefficients, sigma_n, memory
-        The model of inputs that are not heard, and how late one may be heard, as in the edge filter.
+    coefficients
+        Of the autoregressive model for inputs that are not heard, the latest first, as in the edge filter.
+    sigma_n
+        Standard deviation of what drives that model, per axis, in metres per second.
+    memory
+        How late an input may be heard, and be of use, in ticks.
     """
 
     prior_position: float = 1.0

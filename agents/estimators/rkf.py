@@ -38,8 +38,12 @@ class EdgeFilters:
     sigma_w
         Standard deviation of the noise that drives the model: of the acceleration, in metres per second squared; with a random
         walk of the velocity, in metres per second.
-    prior_position, prior_velocity, prior_acceleration
-        Standard deviations before the first measurement, in SI units, as far as the model has them.
+    prior_position
+        Standard deviation of a relative position before the first measurement, in metres.
+    prior_velocity
+        Of a relative velocity, in metres per second, where the model has one.
+    prior_acceleration
+        Of a relative acceleration, in metres per second squared, where the model has one.
     model
         How a relative position moves (`kalman.motion`).
     """

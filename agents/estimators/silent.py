@@ -62,7 +62,7 @@ class SilentEdgeFilter(Estimator[Silent]):
     sigma_u
         Standard deviation of inputs, per axis, in metres per second: the square root of R_u(0).
     window
-        Ticks between the two estimates from which an input is made: more average it over more time.
+        Time between the two estimates from which an input is made, in ticks: more average it over more time.
     """
 
     prior_position: float = 1.0

@@ -87,12 +87,18 @@ class TargetEstimator(Estimator[Track]):
     derivatives
         Whose derivatives go with the position found together: those found together too (Algorithm 1), or the agent's own. Those
         of REDCHO want far shorter ticks than networks have (docs/studies.md).
-    theta, k, gamma
-        Gains of REDCHO (14): theta and gamma per second, k without a unit; k and gamma one for each derivative from 0 to m.
+    theta
+        Gain of REDCHO (14), per second.
+    k
+        Its gains without a unit, one for each derivative from 0 to m.
+    gamma
+        Its gains on the internal variables, per second, one for each derivative from 0 to m.
     hold
-        For how many ticks REDCHO counts a neighbour that it does not hear with what that said last.
-    prior_position, prior_derivatives
-        Standard deviations of the target's position and of each of its derivatives in tick 0, in SI units.
+        For how long REDCHO counts a neighbour that it does not hear with what that said last, in ticks.
+    prior_position
+        Standard deviation of the target's position in tick 0, in metres.
+    prior_derivatives
+        Of each of its derivatives in tick 0, in metres per second and so on.
     lag
         Of the low-pass filter: the time constant of each of its m + 1 equal stages, in seconds.
     gate

@@ -61,9 +61,9 @@ class DoubleConstantVelocity(_Damped):
     Parameters
     ----------
     position_gain
-        k_p, per second squared.
+        Gain k_p on positions, per second squared.
     velocity_gain
-        k_v, per second.
+        Gain k_v on velocities, per second.
     source
         Where zdot_j comes from.
     """
@@ -102,9 +102,9 @@ class DoubleVaryingVelocity(_Damped):
     Parameters
     ----------
     position_gain
-        k_p, per second squared.
+        Gain k_p on positions, per second squared.
     velocity_gain
-        k_v, per second.
+        Gain k_v on velocities, per second.
     source
         Where zdot_j comes from.
     relaxation

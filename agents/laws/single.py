@@ -110,7 +110,7 @@ class ConstantVelocity(Law[Integral]):
     alpha
         Proportional gain, per second.
     eta
-        Integral gain, per second. The sum over ticks is bare, so eta stands for a continuous gain times dt.
+        Integral gain, per second, dt included. The sum over ticks is bare, so eta stands for a continuous gain times dt.
     """
 
     order: ClassVar[int] = 1

@@ -53,7 +53,7 @@ class Interval:
         return f"{self.found:.3g} ({self.low:.3g} to {self.high:.3g})"
 
 
-def mean(values: Array, tests: int = 1) -> Interval:
+def mean(values: Array, tests: int = 1, confidence: float = CONFIDENCE) -> Interval:
     """The mean of runs (R,), by Student's t; of one run, or one that is no number, nothing is known.
 
     Parameters
@@ -62,11 +62,15 @@ def mean(values: Array, tests: int = 1) -> Interval:
         Of the runs, shape (R,); where some are infinite in one direction, so is the mean.
     tests
         How many intervals are to hold at once (Bonferroni).
+    confidence
+        With which they do.
     """
-    return difference(values, np.zeros_like(values), paired=True, tests=tests)
+    return difference(values, np.zeros_like(values), paired=True, tests=tests, confidence=confidence)
 
 
-def difference(values: Array, others: Array, *, paired: bool, tests: int = 1) -> Interval:
+def difference(
+    values: Array, others: Array, *, paired: bool, tests: int = 1, confidence: float = CONFIDENCE
+) -> Interval:
     """By how much the mean of runs (R,) is above that of others (S,).
 
     Parameters
@@ -77,8 +81,10 @@ def difference(values: Array, others: Array, *, paired: bool, tests: int = 1) ->
         Whether run r of the one meets the draws of run r of the other.
     tests
         How many intervals are to hold at once (Bonferroni).
+    confidence
+        With which they do.
     """
-    both = _Both.of(values, others, paired=paired, tests=tests)
+    both = _Both.of(values, others, paired=paired, tests=tests, confidence=confidence)
     found = both.mean - both.other
     if not np.isfinite(found) or both.quantile == np.inf:
         return _unsure(found)
@@ -121,8 +127,8 @@ def _over_nothing(one: Interval) -> Interval:
     return _unsure(np.nan)
 
 
-def student(runs: Integers, tests: int) -> Array:
-    """How many standard errors of means over so many runs reach the confidence (Student's t); infinite for fewer than two.
+def student(runs: Integers, tests: int, confidence: float = CONFIDENCE) -> Array:
+    """How many standard errors of means over so many runs reach a confidence (Student's t); infinite for fewer than two.
 
     Parameters
     ----------
@@ -130,8 +136,10 @@ def student(runs: Integers, tests: int) -> Array:
         Any shape.
     tests
         How many intervals are to hold at once (Bonferroni).
+    confidence
+        With which they do.
     """
-    quantile = -special.stdtrit(np.maximum(runs - 1, 1), (1.0 - CONFIDENCE) / (2.0 * tests))
+    quantile = -special.stdtrit(np.maximum(runs - 1, 1), (1.0 - confidence) / (2.0 * tests))
     return np.where(runs > 1, quantile, np.inf)
 
 
@@ -161,9 +169,9 @@ class _Both:
     quantile: float
 
     @classmethod
-    def of(cls, values: Array, others: Array, *, paired: bool, tests: int) -> _Both:
+    def of(cls, values: Array, others: Array, *, paired: bool, tests: int, confidence: float = CONFIDENCE) -> _Both:
         fewest = min(len(values), len(others))
-        quantile = float(student(np.array(fewest), tests))
+        quantile = float(student(np.array(fewest), tests, confidence))
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return cls(
                 mean=float(values.mean()),

@@ -177,9 +177,37 @@ def tried(wheel: Path, folder: Path) -> None:
         same(own, digest(module, runtime, "agents.held:HoldLast", home), f"python -m affinet run, {runtime}")
         same(own, _digest(_run([programs / "python", "program.py", runtime], home)), f"affinet.run, {runtime}")
         _run([programs / "python", "-m", "pytest", "-q", f"--affinet-runtime={runtime}"], home)
+    scaffolded(programs, folder)
     file = Path(_run([programs / "python", "-P", "-c", NEIGHBOUR], folder).strip())
     if file.parent.parent.name != "site-packages":
         raise Failed(f"agents is {file}, and not that of openai-agents")
+
+
+def scaffolded(programs: Path, folder: Path) -> None:
+    """A project of `affinet new` passes, flies over processes, and offers its estimator everywhere once it is installed."""
+    _run([programs / "affinet", "new", "project", "my-swarm"], folder)
+    home, bits = folder / "my-swarm", []
+    _run([programs / "python", "-m", "pytest", "-q"], home)
+    for runtime in ("inprocess", "processes"):
+        options = [
+            "--runtime",
+            runtime,
+            "--out",
+            f"runs/{runtime}",
+            "--json",
+            "--duration",
+            "1",
+            "--set",
+            "timeline=[]",
+        ]
+        bits.append(_digest(_run([programs / "affinet", "run", "swarm.toml", *options], home)))
+    same(bits[0], bits[1], "the scaffolded project over processes")
+    _run([uv(), "pip", "install", "--quiet", "--python", programs.parent, "--no-deps", home])
+    said = json.loads(_run([programs / "affinet", "list", "estimators", "my-swarm-filter", "--json"], folder))
+    (offered,) = said["estimators"]
+    if (offered["package"], offered["parameters"][0]["name"]) != ("my-swarm", "gain"):
+        raise Failed(f"an installed estimator is listed as {offered}")
+    digest([programs / "affinet"], "processes", "my-swarm-filter", folder)
 
 
 def uv() -> str:

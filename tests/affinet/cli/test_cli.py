@@ -95,13 +95,6 @@ def test_an_empty_path_is_none(words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_alone_says_what_commands_there_are():
-    done = affinet()
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == affinet("--help").stdout
-    assert "check-determinism" in done.stderr
-
-
 def test_check_says_why_a_scenario_cannot_fly():
     done = affinet("check", "hexa", "--set", "formation.leaders=[4,5,7]", "--json")
     assert done.returncode == 2

@@ -1,0 +1,1 @@
+"""Small working things to begin with, outside of the repository: `affinet new`."""

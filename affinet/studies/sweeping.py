@@ -1,0 +1,237 @@
+"""A scenario over settings and seeds, without a study file: a figure of each run, and what the runs came to.
+
+Runs fly side by side in process, as those of studies do, where all that is asked of them is known of such a flight; else one by
+one, and it is said why.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from affinet.planning import making as planning
+from affinet.planning.plan import Plan
+from affinet.planning.programs import refuse_in_process
+from affinet.runtimes.run import rehearse
+from affinet.runtimes.side_by_side import NotABatch, side_by_side
+from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.studies import pool, study
+from affinet.studies.executor import Executor, Here
+from affinet.studies.study import Case
+from affinet.verdicts.checkers import summed_up
+from affinet.verdicts.checking import Checker
+from affinet.verdicts.evidence import Evidence
+from analysis.claims import intervals
+from analysis.claims.intervals import Interval
+from analysis.models.arrays import Array
+from analysis.models.information import reported
+from netem.core.channels import PLACE
+
+CONFIDENCE = 0.95
+_WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
+
+Load = Callable[[Sequence[str]], Scenario]
+Labelled = tuple[Mapping[str, str], Plan]
+# What the summary of a run calls a quantity.
+_FIGURES = {"localization": "localization_error", "agreed": "target_error"}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What came of the runs of one setting.
+
+    Parameters
+    ----------
+    labels
+        Its value of each key that is varied.
+    quantity
+        What `values` are of, by its name in studies.
+    values
+        Its mean over each run, shape (R,).
+    verdicts
+        How many runs came to each verdict.
+    alone
+        Why its runs flew one by one; None of those that flew side by side, or of a single one.
+    """
+
+    labels: Mapping[str, str]
+    quantity: str
+    values: Array
+    verdicts: Counter[str]
+    alone: str | None
+
+    @property
+    def mean(self) -> Interval:
+        """Over the runs, with its interval by Student's t."""
+        return intervals.mean(self.values, confidence=CONFIDENCE)
+
+
+def values_of(sweep: str) -> tuple[str, list[str]]:
+    """A key and its values, as in `network.availability=0.2,0.5,1`; commas within brackets or quotes part none.
+
+    Raises
+    ------
+    ScenarioError
+        When it says none.
+    """
+    key, _, text = sweep.partition("=")
+    values = [value.strip() for value in _parts(text)]
+    if not key.strip() or not all(values):
+        raise ScenarioError(f"--sweep {sweep}: write it as key=value,value, like network.availability=0.2,0.5,1")
+    if again := [value for value, times in Counter(values).items() if times > 1]:
+        raise ScenarioError(f"--sweep {sweep}: {again[0]} stands there twice")
+    return key.strip(), values
+
+
+def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | None) -> list[Labelled]:
+    """Every combination of settings, with its plan; whatever cannot fly is found before any has flown.
+
+    Parameters
+    ----------
+    load
+        Reads the scenario with overrides.
+    sweeps
+        Keys with their values.
+    seed
+        The first; None is that of the scenario.
+
+    Raises
+    ------
+    ScenarioError, PlanError
+        When one of them cannot fly, or not in this process.
+    """
+    first = [] if seed is None else [f"seed={seed}"]
+    plans = list[Labelled]()
+    for values in itertools.product(*(values for _, values in sweeps)):
+        labels = dict(zip((key for key, _ in sweeps), values, strict=True))
+        plan = planning.make(load([*first, *(f"{key}={value}" for key, value in labels.items())]))
+        refuse_in_process(plan)
+        plans.append((labels, plan))
+    return plans
+
+
+def fly(
+    plans: Sequence[Labelled],
+    runs: int,
+    checker: Checker | None,
+    load: Load,
+    watch: Callable[[float], None],
+) -> list[Setting]:
+    """So many runs of each setting, with successive seeds.
+
+    Parameters
+    ----------
+    plans, runs
+        The settings, and how many runs of each.
+    checker
+        What else must hold of each run.
+    load
+        Reads the scenario with overrides.
+    watch
+        Told how many settings are done, and which share of others.
+
+    Raises
+    ------
+    UserCodeError
+        When a user's own code does something wrong.
+    """
+    found: dict[int, Setting] = {}
+    reasons = [why_alone(plan, checker) for _, plan in plans]
+    together = [number for number, why in enumerate(reasons) if why is None and runs > 1]
+    cases = [(Case(dict(plans[number][0]), ()), plans[number][1]) for number in together]
+    if cases:
+        flown = study.fly(cases, runs, _executor(cases, runs), watch=lambda shares: watch(sum(shares)))
+        for number, result in zip(together, flown, strict=True):
+            found[number] = _of_runs(result)
+            watch(len(found))
+    for number, (labels, plan) in enumerate(plans):
+        if number not in found:
+            alone = _told(_one_by_one(labels, plan, runs, load), len(found), runs, watch)
+            found[number] = _of_evidence(labels, plan, alone, checker, reasons[number] if runs > 1 else None)
+    return [found[number] for number in range(len(plans))]
+
+
+def why_alone(plan: Plan, checker: Checker | None) -> str | None:
+    """Why runs of a plan do not fly side by side; None if they do."""
+    if checker is not None:
+        return "a check looks at all of each run"
+    if plan.faults or plan.triggers:
+        return "whether a fault of the timeline touches something is known of each run by itself"
+    try:
+        side_by_side(plan, [0])
+    except NotABatch as error:
+        return str(error).partition(";")[0]
+    return None
+
+
+def _executor(cases: Sequence[tuple[Case, Plan]], runs: int) -> Executor:
+    ticks = runs * sum(plan.world.ticks for _, plan in cases)
+    return pool.on_this_machine() if ticks > _WORTH_PROCESSES else Here()
+
+
+def _quantity(plan: Plan) -> str:
+    """What matters of agents that find out where they are, pursue a target, or keep a formation."""
+    if PLACE in plan.reports:
+        return "localization"
+    return "agreed" if plan.world.pursuit is not None and reported(plan.reports) else "error"
+
+
+def _of_runs(result: study.Result) -> Setting:
+    quantity = _quantity(result.plan)
+    error = result.runs.mean_error
+    values = error if quantity == "error" else np.nanmean(result.runs.quantities[quantity], axis=1)
+    verdicts = Counter("pass" if finite else "fail" for finite in np.isfinite(error).tolist())
+    return Setting(result.labels, quantity, values, verdicts, None)
+
+
+def _one_by_one(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
+    yield rehearse(plan)
+    overrides, first = [f"{key}={value}" for key, value in labels.items()], plan.scenario.seed
+    for seed in range(first + 1, first + runs):
+        yield rehearse(planning.make(load([*overrides, f"seed={seed}"])))
+
+
+def _told(flown: Iterable[Evidence], done: int, runs: int, watch: Callable[[float], None]) -> Iterator[Evidence]:
+    """The same runs; after each it is told how many settings are done."""
+    for number, run in enumerate(flown, start=1):
+        yield run
+        watch(done + number / runs)
+
+
+def _of_evidence(
+    labels: Mapping[str, str], plan: Plan, flown: Iterable[Evidence], checker: Checker | None, why: str | None
+) -> Setting:
+    quantity, values, verdicts = _quantity(plan), list[float](), Counter[str]()
+    for run in flown:
+        values.append(_figure(run, quantity))
+        verdicts[summed_up(run, [] if checker is None else [checker(run)])] += 1
+    return Setting(labels, quantity, np.array(values), verdicts, why)
+
+
+def _figure(flown: Evidence, quantity: str) -> float:
+    if quantity == "error":
+        return float(flown.error.mean())
+    mean = flown.outcome.errors[_FIGURES[quantity]]["mean"]
+    return np.nan if mean is None else mean
+
+
+def _parts(text: str) -> Iterator[str]:
+    """What stands between commas that are in no brackets and no quotes."""
+    part, depth, quote = "", 0, ""
+    for sign in text:
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'":
+            quote = sign
+        else:
+            depth += (sign in "[{(") - (sign in "]})")
+        if sign == "," and not depth and not quote:
+            yield part
+            part = ""
+        else:
+            part += sign
+    yield part
