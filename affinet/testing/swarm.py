@@ -14,6 +14,7 @@ from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.runtimes.run import Runtime, evidence, fly, rehearse
 from affinet.scenario import loading as scenarios
+from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario
 from affinet.verdicts.checking import CheckResult, as_checker
 from affinet.verdicts.evidence import Evidence
@@ -151,8 +152,8 @@ class SwarmRuns:
         self._rooms: list[Path] = []
         self.failed = False
 
-    def __call__(self, scenario: str | Path, *overrides: str) -> Swarm:
-        """A run of a scenario, shipped or a file, with `key=value` overrides; paths are relative to the test's folder.
+    def __call__(self, scenario: str | Path, *overrides: Given, **settings: Any) -> Swarm:
+        """A run of a scenario, shipped or a file, changed as by `affinet.run`; paths are relative to the test's folder.
 
         Raises
         ------
@@ -161,7 +162,9 @@ class SwarmRuns:
         """
         seed = () if self._seed is None else (f"seed={self._seed}",)
         name = str(self._folder / scenario) if str(scenario).endswith(".toml") else str(scenario)
-        return Swarm(scenarios.load(name, (*seed, *overrides), self._folder), self._launch)
+        return Swarm(
+            scenarios.load(name, (*seed, *overrides, *([settings] if settings else [])), self._folder), self._launch
+        )
 
     def keep(self) -> list[tuple[Plan, Path]]:
         """The last runs, each with a directory that holds all of it; those flown in process are flown again to record them."""

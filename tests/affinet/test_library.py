@@ -1,6 +1,8 @@
 """`import affinet`: all that a user's code needs, light, typed and documented; runs flown and read again."""
 
 import ast
+import asyncio
+import importlib
 import inspect
 import json
 import pickle
@@ -16,7 +18,7 @@ import numpy as np
 import pytest
 from flying import PROCESSES, digest_of
 from kept_arrays import rewrite
-from own_code import ESTIMATOR, broken, write
+from own_code import ESTIMATOR, LAW, broken, write
 
 import affinet
 from affinet.cli import commands
@@ -153,6 +155,76 @@ def test_a_run_in_process_leaves_nothing_and_has_the_bits_of_the_command(tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_overrides_are_texts_tables_and_keywords():
+    flown = affinet.run("corridor", {"network": {"availability": 0.5}}, "seed=2", estimator="rkf", dt=0.05, duration=1)
+    as_texts = (*SHORT, "network.availability=0.5", "seed=2", "agents.estimator=rkf")
+    assert flown.outcome.digest == digest_of("corridor", *as_texts)
+    again = affinet.run(
+        affinet.scenario.load("corridor", [*SHORT, {"network.availability": 0.5}], seed=2, estimator="rkf")
+    )
+    assert again.outcome.digest == flown.outcome.digest
+
+
+PLACES = {
+    "in process": {},
+    "kept": {"out": "run"},
+    "processes": {"runtime": "processes"},
+}
+
+
+@PROCESSES
+@pytest.mark.parametrize("place", PLACES)
+def test_an_estimator_and_a_law_that_are_objects_of_a_module_fly_anywhere(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    names = {"estimator": write(tmp_path, ESTIMATOR), "law": write(tmp_path, LAW)}
+    objects = {key: importlib.import_module(name).Own() for key, name in names.items()}
+    flown = affinet.run("corridor", *SHORT, **objects, **PLACES[place])
+    by_name = affinet.run("corridor", *SHORT, **{key: f"{name}:Own" for key, name in names.items()})
+    assert flown.outcome.digest == by_name.outcome.digest
+    assert flown.outcome.flown["estimator"] == f"{names['estimator']}:Own"
+
+
+SCRIPT = """
+import affinet
+{estimator}
+short = {{"duration": 1, "dt": 0.05}}
+flown = affinet.run("corridor", estimator=Own(), **short, out="run")
+assert affinet.load("run").outcome.digest == flown.outcome.digest
+print(flown.outcome.digest)
+try:
+    affinet.run("corridor", estimator=Own(), **short, runtime="processes")
+except affinet.PlanError as error:
+    print(error)
+"""
+
+
+def test_an_object_of_a_script_flies_in_its_process_alone(tmp_path, monkeypatch):
+    (tmp_path / "elsewhere").mkdir()
+    script = tmp_path / "elsewhere" / "script.py"
+    script.write_text(SCRIPT.format(estimator=ESTIMATOR))
+    (tmp_path / "__main__.py").write_text("1 / 0\n")  # a file of that name is another module
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path, check=True)
+    digest, refusal = done.stdout.splitlines()
+    name = write(tmp_path, ESTIMATOR)
+    monkeypatch.chdir(tmp_path)
+    assert digest == affinet.run("corridor", *SHORT, estimator=f"{name}:Own").outcome.digest
+    assert refusal.startswith(
+        "processes: __main__:Own is of the script or notebook that runs, which no other process has: "
+    )
+    with pytest.raises(affinet.ScenarioError, match=r"only the script or notebook that made it has it$"):
+        affinet.load(tmp_path / "run")
+
+
+@PROCESSES
+@pytest.mark.parametrize("runtime", ["inprocess", "processes"])
+def test_a_run_flies_within_a_running_event_loop(runtime):
+    async def cell():
+        return affinet.run("corridor", *SHORT, runtime=runtime).outcome.digest
+
+    assert asyncio.run(cell()) == digest_of("corridor", *SHORT)
+
+
 WAITING = [
     {"verb": "cut", "links": ["1-2"], "at": 0.2, "until": 0.4},
     {"verb": "kill", "name": "gone", "when": {"tracking_error_below": 5.0, "lasting": 0.1}, "agents": [5]},
@@ -185,9 +257,10 @@ def test_a_run_over_processes_needs_no_directory(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_overrides_of_what_is_read_already_are_refused():
-    with pytest.raises(affinet.ScenarioError, match=r"^seed=3: give overrides where the scenario is read"):
-        affinet.run(affinet.scenario.load("corridor"), "seed=3")
+@pytest.mark.parametrize(("given", "settings", "said"), [(["seed=3"], {}, "seed=3"), ([], {"seed": 3}, "seed")])
+def test_overrides_of_what_is_read_already_are_refused(given, settings, said):
+    with pytest.raises(affinet.ScenarioError, match=f"^{said}: give overrides where the scenario is read"):
+        affinet.run(READ, *given, **settings)
 
 
 @PROCESSES
