@@ -4,7 +4,7 @@ UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel coverage lint types imports picture bench clean
 
 demo: $(READY) ## fly through bursts of losses over processes, and the same losses again with a filter alone
 	$(BIN)/affinet run bursts
@@ -19,7 +19,7 @@ test: lint types imports ## everything that must hold, in minutes
 test-room: $(READY) ## a room's own tests, without flights over processes: make test-room ROOM=netem/medium
 	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
-test-all: lint types imports test-xarray ## and the slow proofs
+test-all: lint types imports ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
 
 test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every Python from 3.11 on that is found
@@ -27,10 +27,6 @@ test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every
 
 test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose modules are called like the rooms
 	$(BIN)/python tests/programs/wheel.py
-
-test-xarray: $(READY) ## what studies leave, read with xarray, in an environment of its own
-	UV_PROJECT_ENVIRONMENT=.venv-xarray $(UV) sync --locked --quiet --no-dev --group xarray
-	.venv-xarray/bin/pytest -n0 tests/affinet/studies/test_labelled.py
 
 coverage: $(READY) ## which lines the tests in this process run, by room, into docs/coverage.md
 	$(BIN)/coverage erase
@@ -65,4 +61,4 @@ $(READY): pyproject.toml uv.lock
 	touch $@
 
 clean: ## without environments and runs
-	rm -rf .venv .venv-3.* .venv-xarray runs
+	rm -rf .venv .venv-3.* runs

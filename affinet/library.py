@@ -14,9 +14,10 @@ from affinet.runtimes.run import Runtime, rehearse, runtime_of
 from affinet.scenario import files, loading
 from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.testing.swarm import Broken, FlownRun, flown
+from affinet.testing.swarm import flown
 from affinet.verdicts import reading
 from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.flown import Broken, FlownRun
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from netem.core.plain import shown

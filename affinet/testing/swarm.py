@@ -16,48 +16,11 @@ from affinet.runtimes.run import Runtime, evidence, fly, rehearse
 from affinet.scenario import loading as scenarios
 from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario
-from affinet.verdicts.checking import CheckResult, as_checker
-from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.flown import Broken, FlownRun
 from affinet.verdicts.outcome import RunVerdict
 from netem.processes.user_code import UserCodeError
 
 _KEPT = 4
-
-
-class Broken(AssertionError):
-    """A run, or what was checked of it, did not come out as the test expects."""
-
-
-class FlownRun(Evidence):
-    """A run that was flown: its arrays, and its faults with what they touched."""
-
-    @classmethod
-    def of(cls, evidence: Evidence) -> FlownRun:
-        """The run that left this evidence."""
-        return cls(evidence.plan, evidence.arrays, evidence.outcome)
-
-    def check(self, *checkers: Callable[[Evidence], CheckResult]) -> FlownRun:
-        """The run itself if every checker passes; one that is vacuous proves nothing, and fails.
-
-        Parameters
-        ----------
-        checkers
-            Each a `Checker`, or a function that is to be one under its own name.
-
-        Raises
-        ------
-        Broken
-            When one does not pass: which, why, and the first tick that offends.
-        UserCodeError
-            When one fails itself, or returns no `CheckResult`.
-        TypeError
-            When one is none.
-        """
-        __tracebackhide__ = True
-        findings = [checker(self) for checker in map(as_checker, checkers)]
-        if wrong := [finding for finding in findings if finding.verdict != "pass"]:
-            raise Broken("\n".join(map(str, wrong)))
-        return self
 
 
 def flown(plan: Plan, runtime: Runtime, out: Path) -> FlownRun:
