@@ -21,7 +21,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from affinet.cli import machines, options, show, terminal
+from affinet.cli import exporting, machines, options, show, terminal
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process
@@ -353,6 +353,11 @@ def _conformance(parsed: argparse.Namespace) -> int:
     return PASS if conforming.judge_and_report(parsed) else FAIL
 
 
+def _export(parsed: argparse.Namespace) -> int:
+    exporting.write(parsed)
+    return PASS
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -368,4 +373,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "world": _world,
     **dict.fromkeys(("agent", "host", "netem"), machines.hold),
     "conformance": _conformance,
+    "export": _export,
 }

@@ -6,6 +6,7 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
+from affinet.cli import exporting
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
@@ -51,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     _add_coordinators(commands)
     _add_seats(commands)
     _add_conformance(commands)
+    exporting.add(commands)
     return whole
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import labelled, tables
+from affinet.verdicts.export import folder, labelled, tables
 from affinet.verdicts.export.tables import Column
 
 
@@ -21,8 +21,7 @@ def write(run: Evidence, out: Path) -> None:
     OSError
         When it cannot be written.
     """
-    out.mkdir()
-    with ExitStack() as files:
+    with folder.new(out), ExitStack() as files:
         sinks = {
             name: csv.writer(files.enter_context((out / f"{name}.csv").open("w", encoding="utf-8", newline="")))
             for name in tables.NAMES

@@ -28,4 +28,6 @@ def needed(library: str, extra: str, what: str) -> ModuleType:
     try:
         return import_module(library)
     except ModuleNotFoundError as error:
-        raise NotInstalled(f"{what} is made with {library}: pip install 'affinet[{extra}]'") from error
+        raise NotInstalled(
+            f"{what} is made with {library.partition('.')[0]}: pip install 'affinet[{extra}]'"
+        ) from error

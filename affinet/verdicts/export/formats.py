@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import csv, mcap, netcdf, parquet
 from netem.processes.system_errors import about
 
 
 class Format(NamedTuple):
-    """What writes it to a path where nothing is, how the names of its files or folders end, and what it is, for people."""
+    """How the names of its files or folders end, and what it is, for people."""
 
-    write: Callable[[Evidence, Path], None]
     ending: str
     says: str
 
 
 FORMATS: Mapping[str, Format] = {
-    "parquet": Format(parquet.write, "-parquet", "a folder of tables that pandas, Polars and DuckDB read"),
-    "netcdf": Format(netcdf.write, ".nc", "a file of labelled arrays that xarray, MATLAB and R open"),
-    "mcap": Format(mcap.write, ".mcap", "a file that Foxglove and PlotJuggler open"),
-    "csv": Format(csv.write, "-csv", "a folder of tables as text"),
+    "parquet": Format("-parquet", "a folder of tables that pandas, Polars and DuckDB read"),
+    "netcdf": Format(".nc", "a file of labelled arrays that xarray, MATLAB and R open"),
+    "mcap": Format(".mcap", "a file that Foxglove and PlotJuggler open"),
+    "csv": Format("-csv", "a folder of tables as text"),
 }
 
 
@@ -39,7 +37,10 @@ def write(run: Evidence, form: str, out: Path) -> None:
     OSError
         When it cannot be written.
     """
+    from affinet.verdicts.export import csv, mcap, netcdf, parquet  # the command line knows their names alone
+
     if out.exists():
         raise FileExistsError(f"{str(out)!r} is there already; name another place")
+    writers = {"parquet": parquet.write, "netcdf": netcdf.write, "mcap": mcap.write, "csv": csv.write}
     with about(out):
-        FORMATS[form].write(run, out)
+        writers[form](run, out)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import labelled, tables
+from affinet.verdicts.export import folder, labelled, tables
 from affinet.verdicts.export.tables import Column, Table
 
 
@@ -23,8 +23,7 @@ def write(run: Evidence, out: Path) -> None:
     """
     from pyarrow.parquet import ParquetWriter  # takes a while to import
 
-    out.mkdir()
-    with ExitStack() as files:
+    with folder.new(out), ExitStack() as files:
         writers: dict[str, Any] = {}
         first = 0
         for span in labelled.spans(run):

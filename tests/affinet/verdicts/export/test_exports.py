@@ -1,6 +1,7 @@
 """A run in the formats of others has the numbers of its arrays, bit for bit, and nothing where there was nothing."""
 
 import csv
+import errno
 import json
 import sys
 
@@ -12,7 +13,7 @@ import xarray
 from mcap.reader import make_reader
 
 import affinet
-from affinet.verdicts.export import foxglove, tables
+from affinet.verdicts.export import foxglove, labelled, tables
 from affinet.verdicts.export.extras import NotInstalled
 from affinet.verdicts.export.formats import FORMATS, write
 from netem.medium.verdict import Verdict
@@ -323,6 +324,18 @@ def test_a_place_that_is_not_there_is_named(form, run, tmp_path):
         write(run, form, tmp_path / "nowhere" / "run")
 
 
+@pytest.mark.parametrize("form", FORMATS)
+def test_nothing_is_left_of_what_could_not_be_written_to_its_end(form, run, tmp_path, monkeypatch):
+    def break_off(given):
+        yield from list(history.by_span(given.arrays))[:1]
+        raise OSError(errno.ENOSPC, "full")
+
+    monkeypatch.setattr(labelled, "spans", break_off)
+    with pytest.raises(OSError, match="full"):
+        write(run, form, tmp_path / "run")
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.parametrize(
     ("library", "want", "extra"),
     [
@@ -333,7 +346,7 @@ def test_a_place_that_is_not_there_is_named(form, run, tmp_path):
 )
 def test_a_library_that_is_missing_is_named_with_how_to_have_it(library, want, extra, run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(NotInstalled, match=rf"is made with {library}: pip install 'affinet\[{extra}\]'$"):
+    with pytest.raises(NotInstalled, match=rf"is made with {library.split('.')[0]}: pip install 'affinet\[{extra}\]'$"):
         want(run, tmp_path)
     assert not [*tmp_path.iterdir()]
 
