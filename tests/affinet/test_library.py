@@ -124,10 +124,13 @@ def test_the_command_is_the_module():
 # ---- the docs
 
 
+def python_of(page):
+    return re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+
+
 def blocks():
     """Every piece of Python in the docs."""
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    return [text for page in pages for text in re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)]
+    return [text for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) for text in python_of(page)]
 
 
 def test_users_are_told_to_import_from_affinet_alone():
@@ -136,12 +139,23 @@ def test_users_are_told_to_import_from_affinet_alone():
     assert [found for text in [*blocks(), ESTIMATOR] for found in rooms.findall(text)] == []
 
 
-def test_the_programs_of_the_docs_run(tmp_path, monkeypatch):
+def test_the_program_of_the_readme_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    programs = [text for text in blocks() if "affinet.run(" in text and "def test_" not in text]
-    assert len(programs) == 2
-    for program in programs:
-        exec(program, {})
+    (program,) = (text for text in python_of(ROOT / "README.md") if "affinet.run(" in text)
+    exec(program, {})
+
+
+_PROGRAM = re.compile(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
+
+
+def test_the_programs_of_the_page_run_one_after_the_other_and_print_what_stands_there(tmp_path):
+    programs, printed = zip(*_PROGRAM.findall((ROOT / "docs" / "library.md").read_text()), strict=True)
+    (tmp_path / "page.py").write_text("\nprint('---')\n".join(programs))
+    done = subprocess.run([sys.executable, "page.py"], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    digest = re.compile("[0-9a-f]{64}")  # other processors have other bits
+    assert digest.sub("", done.stdout).split("---\n") == [digest.sub("", text) for text in printed]
+    assert sum(map(bool, printed)) >= 5
 
 
 # ---- runs
@@ -509,12 +523,11 @@ def test_a_run_can_be_pickled_compared_and_shown(scenario):
     assert len({flown, again, flown}) == 2
     assert flown.plan != again.plan
     assert affinet.realised(flown) != affinet.realised(again)
-    digest, ticks = flown.outcome.digest, flown.ticks
-    assert (
-        repr(flown)
-        == repr(again)
-        == f"<FlownRun: {scenario}.toml, {flown.outcome.verdict}, {digest[:12]}, {ticks} ticks>"
-    )
+    digest = flown.outcome.digest
+    assert repr(flown) == repr(again)
+    assert repr(flown).startswith(f"<FlownRun: {scenario}.toml, {flown.outcome.verdict}\n")
+    assert f" {flown.ticks} ticks of " in repr(flown)
+    assert repr(flown).endswith(f"digest: {digest}>")
     assert affinet.run(again.plan.scenario).outcome.digest == digest
     assert (affinet.realised(again).heard == affinet.realised(flown).heard).all()
     assert again.check(affinet.bounded(1e9)) is again
