@@ -22,6 +22,7 @@ from own_code import ESTIMATOR, LAW, broken, write
 
 import affinet
 from affinet.cli import commands
+from affinet.scenario import overrides
 from netem.medium.verdict import Verdict
 from world.books.history import ARRAYS, load
 
@@ -65,6 +66,12 @@ def test_the_functions_say_all_of_their_arguments():
         told = inspect.signature(function)
         assert all(one.annotation is not inspect.Parameter.empty for one in told.parameters.values())
         assert told.return_annotation is not inspect.Signature.empty
+
+
+def test_the_short_names_are_keywords_that_help_and_editors_know():
+    known = inspect.signature(affinet.run).parameters
+    short = [name for name in known if name not in ("scenario", "overrides", "runtime", "out", "tables")]
+    assert short == [*overrides.SHORT]
 
 
 def test_what_is_not_there_is_said_as_of_any_module():

@@ -108,10 +108,9 @@ def present(run: Evidence, span: Arrays, form: Described, values: NDArray[Any]) 
         return np.asarray(values != form.absent)
     if described.SLOT not in form.axes or form.kind == "b":
         return None
-    of_slots = run.plan.world.links.present & (True if form.where is None else span[form.where])
-    behind = values.ndim - len(form.axes[: form.axes.index(SLOT) + 1])
-    broad = np.broadcast_to(of_slots, values.shape[: values.ndim - behind])
-    return np.broadcast_to(broad.reshape(*broad.shape, *[1] * behind), values.shape)
+    there = run.plan.world.links.present & (True if form.where is None else span[form.where])
+    of_slots = np.broadcast_to(there, values.shape[:3])  # behind the ticks and the agents
+    return np.broadcast_to(of_slots.reshape(*of_slots.shape, *[1] * (values.ndim - 3)), values.shape)
 
 
 def filled(values: NDArray[Any], there: NDArray[np.bool_]) -> NDArray[Any]:

@@ -1,6 +1,7 @@
 """What a scenario file says, changed by texts, tables and keywords, and by estimators and laws that are objects."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 
@@ -128,6 +129,8 @@ class Filter:
     weights: tuple[float, ...] = (1.0, 2.0)
     prior: Inside = Inside()
     names: list[str] = field(default_factory=list)
+    how: Callable[[float], float] = abs
+    kept: object = field(init=False, default_factory=object)
 
 
 @dataclass(frozen=True)
