@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import folder, labelled, tables
+from affinet.verdicts.export import folder, tables
 from affinet.verdicts.export.tables import Column
+from world.books.history import by_span
 
 
 def write(run: Evidence, out: Path) -> None:
@@ -27,7 +28,7 @@ def write(run: Evidence, out: Path) -> None:
             for name in tables.NAMES
         }
         first = 0
-        for span in labelled.spans(run):
+        for span in by_span(run.arrays):
             for name, table in tables.of_span(run, span, first).items():
                 if not first:
                     sinks[name].writerow(heading(of, column) for of, column in table.items())

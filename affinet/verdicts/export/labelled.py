@@ -14,7 +14,7 @@ from analysis.models.arrays import Integers
 from netem.medium.verdict import Verdict
 from world.books import described
 from world.books.described import AGENT, AXIS, CHANNEL, LINK, PAIR, SLOT, TIME, VERDICT, Described
-from world.books.history import Arrays, by_span
+from world.books.history import Arrays
 
 LETTERS = "xyz"
 NEIGHBOUR, SENDER, RECEIVER, TICK = "neighbour", "sender", "receiver", "tick"
@@ -126,13 +126,6 @@ def attributes(name: str, form: Described) -> dict[str, Any]:
     codes: Integers = np.array([int(verdict) for verdict in Verdict], dtype=np.uint8)
     words = " ".join(verdict.label for verdict in Verdict)
     return said | {"flag_values": codes, "flag_meanings": words}
-
-
-def spans(run: Evidence) -> Iterator[Arrays]:
-    """The arrays of consecutive ticks, of so many at a time that they are small, whatever the run has."""
-    for span in by_span(run.arrays):
-        if len(span["error"]):
-            yield span
 
 
 def pairs(dimension: int) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.export import folder, labelled, tables
 from affinet.verdicts.export.tables import Column, Table
+from world.books.history import by_span
 
 
 def write(run: Evidence, out: Path) -> None:
@@ -26,7 +27,7 @@ def write(run: Evidence, out: Path) -> None:
     with folder.new(out), ExitStack() as files:
         writers: dict[str, Any] = {}
         first = 0
-        for span in labelled.spans(run):
+        for span in by_span(run.arrays):
             for name, table in tables.of_span(run, span, first).items():
                 rows = _arrow(table, labelled.about(run))
                 if name not in writers:

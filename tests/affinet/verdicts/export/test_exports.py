@@ -13,7 +13,8 @@ import xarray
 from mcap.reader import make_reader
 
 import affinet
-from affinet.verdicts.export import foxglove, labelled, tables
+from affinet.verdicts.export import csv as csv_files
+from affinet.verdicts.export import foxglove, mcap, netcdf, parquet, tables
 from affinet.verdicts.export.extras import NotInstalled
 from affinet.verdicts.export.formats import FORMATS, write
 from netem.medium.verdict import Verdict
@@ -306,7 +307,20 @@ def test_every_message_fits_its_schema(messages):
     }
 
 
-# ---- what is refused
+# ---- what is short, and what is refused
+
+
+def test_a_run_that_ended_before_its_first_tick_has_its_labels_and_nothing_else(run, tmp_path):
+    none = affinet.FlownRun(
+        run.plan, {name: array[: name == "position"] for name, array in run.arrays.items()}, run.outcome
+    )
+    assert (none.dataset.sizes["time"], none.dataset.sizes["link"]) == (0, 24)
+    for form in FORMATS:
+        write(none, form, tmp_path / form)
+    assert (tmp_path / "csv" / "agents.csv").read_text().startswith("time [s],tick,agent,position_x [m],")
+    assert pyarrow.parquet.read_table(tmp_path / "parquet" / "links.parquet").num_rows == 0
+    with xarray.open_dataset(tmp_path / "netcdf", engine="h5netcdf") as opened:
+        xarray.testing.assert_equal(opened, none.dataset)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -326,11 +340,12 @@ def test_a_place_that_is_not_there_is_named(form, run, tmp_path):
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_nothing_is_left_of_what_could_not_be_written_to_its_end(form, run, tmp_path, monkeypatch):
-    def break_off(given):
-        yield from list(history.by_span(given.arrays))[:1]
+    def break_off(arrays):
+        yield {name: array[:5] for name, array in arrays.items()}
         raise OSError(errno.ENOSPC, "full")
 
-    monkeypatch.setattr(labelled, "spans", break_off)
+    for module in (csv_files, parquet, netcdf, mcap):
+        monkeypatch.setattr(module, "by_span", break_off)
     with pytest.raises(OSError, match="full"):
         write(run, form, tmp_path / "run")
     assert [*tmp_path.iterdir()] == []
