@@ -5,7 +5,7 @@ BIN := .venv/bin
 FLIES := .venv/.flies
 READY := .venv/.ready
 
-.PHONY: demo help test test-room test-all test-pythons test-wheel test-xarray test-browser coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel test-browser coverage lint types imports picture bench clean
 
 demo: $(FLIES) ## bursts of losses with GA-RKF, which holds the formation, beside a filter alone; then over processes
 	@echo "The first flight on a machine compiles its kernels, which takes half a minute; later ones begin at once."
@@ -21,7 +21,7 @@ test: lint types imports ## everything that must hold, in minutes
 test-room: $(READY) ## a room's own tests, without flights over processes: make test-room ROOM=netem/medium
 	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
-test-all: lint types imports test-xarray test-browser ## and the slow proofs
+test-all: lint types imports test-browser ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
 
 test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every Python from 3.11 on that is found
@@ -29,10 +29,6 @@ test-pythons: $(READY) ## set-up, demo and the tests that depend on it, on every
 
 test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose modules are called like the rooms
 	$(BIN)/python tests/programs/wheel.py
-
-test-xarray: $(READY) ## what studies leave, read with xarray, in an environment of its own
-	UV_PROJECT_ENVIRONMENT=.venv-xarray $(UV) sync --locked --quiet --no-dev --group xarray
-	.venv-xarray/bin/pytest -n0 tests/affinet/studies/test_labelled.py
 
 test-browser: $(READY) ## the web viewer in headless Chromium, in an environment of its own
 	UV_PROJECT_ENVIRONMENT=.venv-browser $(UV) sync --locked --quiet --no-dev --group browser
@@ -78,4 +74,4 @@ $(FLIES): pyproject.toml uv.lock
 	touch $@
 
 clean: ## without environments and runs
-	rm -rf .venv .venv-3.* .venv-xarray runs
+	rm -rf .venv .venv-3.* runs

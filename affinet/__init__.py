@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from affinet.scenario.sections import Scenario as Scenario
     from affinet.scenario.sections import ScenarioError as ScenarioError
     from affinet.testing import strategies as strategies
-    from affinet.testing.swarm import Broken as Broken
-    from affinet.testing.swarm import FlownRun as FlownRun
     from affinet.verdicts.checkers import agreement as agreement
     from affinet.verdicts.checkers import always as always
     from affinet.verdicts.checkers import below as below
@@ -39,6 +37,8 @@ if TYPE_CHECKING:
     from affinet.verdicts.checking import Checker as Checker
     from affinet.verdicts.checking import CheckResult as CheckResult
     from affinet.verdicts.evidence import Evidence as Evidence
+    from affinet.verdicts.flown import Broken as Broken
+    from affinet.verdicts.flown import FlownRun as FlownRun
     from affinet.verdicts.pursued import agreed as agreed
     from affinet.verdicts.pursued import found as found
     from agents.brief import Brief as Brief
@@ -80,7 +80,6 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "library"): ("journal", "load", "realised", "run"),
     ("affinet", "planning.plan"): ("PlanError",),
     ("affinet", "scenario.sections"): ("Scenario", "ScenarioError"),
-    ("affinet", "testing.swarm"): ("Broken", "FlownRun"),
     ("affinet", "verdicts.checkers"): (
         *(
             "agreement",
@@ -98,6 +97,7 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "verdicts.pursued"): ("agreed", "found"),
     ("affinet", "verdicts.checking"): ("Checker", "CheckResult"),
     ("affinet", "verdicts.evidence"): ("Evidence",),
+    ("affinet", "verdicts.flown"): ("Broken", "FlownRun"),
     ("agents", "brief"): ("Brief", "Gap", "Own", "Reading"),
     ("agents", "estimate"): ("Estimate", "no_edges", "no_indicator"),
     ("agents", "estimators.base"): ("Centre", "CentreEstimate", "Estimator"),

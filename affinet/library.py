@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from affinet.planning import making
 from affinet.runtimes.run import Runtime, rehearse, runtime_of
 from affinet.scenario import files, loading
+from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.testing.swarm import Broken, FlownRun, flown
+from affinet.testing.swarm import flown
 from affinet.verdicts import reading
 from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.flown import Broken, FlownRun
+from agents.estimators.base import Estimator
+from agents.laws.base import Law
 from netem.core.plain import shown
 from netem.processes.user_code import UserCodeError
 from world.books import realised as graphs
@@ -27,22 +31,45 @@ if TYPE_CHECKING:
 
 def run(
     scenario: str | Path | Scenario,
-    *overrides: str,
+    *overrides: Given,
+    estimator: str | Estimator[Any] | None = None,
+    law: str | Law[Any] | None = None,
+    availability: float | None = None,
+    seed: int | None = None,
+    duration: float | None = None,
+    dt: float | None = None,
     runtime: Runtime = "inprocess",
     out: str | Path | None = None,
+    **tables: Any,
 ) -> FlownRun:
     """Fly a scenario.
+
+    >>> run = affinet.run("corridor", estimator="rkf", availability=0.5, network={"delay_ticks": 1})
+
+    Whatever is not given stays as the scenario says it. Of two that give the same key the later holds, and keywords come last.
 
     Parameters
     ----------
     scenario
-        The name of one that is shipped, the path of a file, or one that `affinet.scenario.load` read.
+        The name of one that is shipped, the path of a file, or one that `affinet.scenario.load` read, with its overrides.
     overrides
-        Changes to one that is named, as `key=value`; paths and modules in them are relative to the working directory.
+        Of any key: tables like `{"network.delay_ticks": 1}`, or texts like "network.delay_ticks=1", as behind --set. Paths and
+        modules in them are relative to the working directory.
+    estimator, law
+        Which the agents run: a name, "module:Class", or an object, `MyFilter(gain=2.0)`. Over processes its class has to be in
+        a module, not in the script or notebook that runs.
+    availability
+        The probability that a message gets through.
+    seed
+        Of all random draws.
+    duration, dt
+        Of the run and of a tick, in seconds.
     runtime
         "inprocess", or "processes": every agent one of its own. The answers are the same bits.
     out
         The run directory, new; without one the run leaves nothing behind.
+    tables
+        Tables of the scenario by their names (docs/scenario.md), of each what is to change: `time={"exchange": "next-tick"}`.
 
     Raises
     ------
@@ -64,7 +91,15 @@ def run(
     """
     flying = runtime_of(runtime)
     place = None if out is None else _path("out", out)
-    given = _scenario(scenario, overrides)
+    short = {
+        "estimator": estimator,
+        "law": law,
+        "availability": availability,
+        "seed": seed,
+        "duration": duration,
+        "dt": dt,
+    }
+    given = _scenario(scenario, overrides, {name: value for name, value in short.items() if value is not None} | tables)
     try:
         plan = making.make(given)
         if place is not None:
@@ -122,11 +157,11 @@ def realised(evidence: Evidence) -> Realised:
     return graphs.realise(evidence.arrays["newest"], world.formation, evidence.timeline, world.dt, plan.window)
 
 
-def _scenario(given: str | Path | Scenario, overrides: Sequence[str]) -> Scenario:
+def _scenario(given: str | Path | Scenario, overrides: Sequence[Given], settings: Mapping[str, Any]) -> Scenario:
     if not isinstance(given, Scenario):
-        return loading.load(given, overrides, files.working_directory())
-    if overrides:
-        raise ScenarioError(f"{overrides[0]}: give overrides where the scenario is read: affinet.scenario.load")
+        return loading.load(given, (*overrides, *([settings] if settings else [])), files.working_directory())
+    for one in (*overrides, *settings):
+        raise ScenarioError(f"{one}: give overrides where the scenario is read: affinet.scenario.load")
     return loading.checked(given)
 
 

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NoReturn
 from affinet.cli import (
     completing,
     doctoring,
+    exporting,
     helping,
     listing,
     machines,
@@ -404,6 +405,11 @@ def _schema(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _export(parsed: argparse.Namespace) -> int:
+    exporting.write(parsed)
+    return PASS
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "check": _check,
@@ -426,4 +432,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "new": _new,
     "doctor": _doctor,
     "completion": _completion,
+    "export": _export,
 }

@@ -80,6 +80,10 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet render runs/kept --at 0.3 --out swarm.png", "a moment, for a paper or a page"),
         Example("affinet render runs/kept --speed 4 --out swarm.gif", "a film", "--fps 1"),
     ),
+    "export": (
+        Example("affinet export runs/kept --to parquet", "a folder of tables, runs/kept-parquet"),
+        Example("affinet export runs/kept --to mcap --out kept.mcap", "for Foxglove and PlotJuggler"),
+    ),
     "check-determinism": (
         Example("affinet check-determinism corridor --duration 2", "the same bits, three times", "--duration 0.5"),
     ),

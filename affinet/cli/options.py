@@ -6,7 +6,18 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
-from affinet.cli import completing, doctoring, helping, listing, many_runs, rendering, scaffolding, schemas, watching
+from affinet.cli import (
+    completing,
+    doctoring,
+    exporting,
+    helping,
+    listing,
+    many_runs,
+    rendering,
+    scaffolding,
+    schemas,
+    watching,
+)
 from affinet.scenario import files, loading
 from affinet.scenario.programs import words
 from affinet.scenario.units import LARGEST, SMALLEST
@@ -49,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     _add_coordinators(commands)
     _add_seats(commands)
     _add_conformance(commands)
-    for module in (watching, rendering, listing, schemas, scaffolding, doctoring, completing):
+    for module in (watching, rendering, exporting, listing, schemas, scaffolding, doctoring, completing):
         module.add(commands)
     helping.end_with_examples(whole)
     return whole

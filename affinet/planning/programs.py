@@ -1,4 +1,4 @@
-"""What needs processes: agents that fly by programs of a user's own, in place of ours, and runs in real time."""
+"""What needs processes: agents that fly by programs of a user's own, and runs in real time; and what cannot have them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from affinet.planning.plan import Plan, PlanError
 from affinet.scenario.sections import ScenarioError
 from analysis.models.finding import Finding
 from netem.core.listing import listed
+from netem.loading import modules
 
 
 def refuse_strangers(programs: Mapping[str, str], agents: int) -> None:
@@ -47,3 +48,19 @@ def refuse_in_process(plan: Plan) -> None:
             "(`affinet run` does, or --affinet-runtime=processes), or without agents.programs"
         )
         raise PlanError([Finding("programs", "error", says)])
+
+
+def refuse_over_processes(plan: Plan) -> None:
+    """Refuse to fly over processes what none but this one has.
+
+    Raises
+    ------
+    PlanError
+        When estimator or law are of the script or notebook that runs.
+    """
+    if here := [choice.path for choice in (plan.estimator, plan.law) if modules.is_running(choice.path)]:
+        says = (
+            f"{listed(here)} is of the script or notebook that runs, which no other process has: write its class to a "
+            "module (my_module.py), and import it from there, or fly in one process"
+        )
+        raise PlanError([Finding("processes", "error", says)])

@@ -15,7 +15,7 @@ from affinet.scenario.words import among, one_line
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from netem.impairments.own import Loss
-from netem.loading import parameters
+from netem.loading import modules, parameters
 from netem.loading.calling import Calling, NoSuchAlgorithm, load, name_of
 from netem.loading.choice import Choice, offered
 from netem.loading.parameters import ParameterError
@@ -142,7 +142,8 @@ def _load(key: str, path: str, folder: Path | None) -> type:
     try:
         algorithm = load(path, None if folder is None else str(folder))
     except NoSuchAlgorithm as error:
-        raise ScenarioError(f"{key}: cannot load {path}: {error}") from error
+        only_there = "; only the script or notebook that made it has it" if modules.is_running(path) else ""
+        raise ScenarioError(f"{key}: cannot load {path}: {error}{only_there}") from error
     if not is_dataclass(algorithm):
         raise UserCodeError(name_of(algorithm), "is not a dataclass of its parameters", definition(algorithm))
     return algorithm

@@ -13,7 +13,7 @@ import psutil
 
 from affinet.planning import limits
 from affinet.planning.plan import Plan, PlanError
-from affinet.planning.programs import refuse_in_process
+from affinet.planning.programs import refuse_in_process, refuse_over_processes
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
 from affinet.runtimes.launcher import Launcher
@@ -76,7 +76,7 @@ def fly(
     FileExistsError
         When `out` holds a run already.
     PlanError
-        When programs of a user's own are to fly some of it in this process.
+        When programs of a user's own are to fly some of it in this process, or a class of this process in others.
     ValueError
         When there is no such runtime.
     OSError
@@ -85,8 +85,8 @@ def fly(
         When a signal asked the run to end; its outcome is written down all the same.
     """
     fly_in = _RUNTIMES[runtime_of(runtime)] if spread is None else partial(_over_processes, spread=spread)
-    if runtime == "inprocess":
-        refuse_in_process(plan)
+    refuse = refuse_in_process if runtime == "inprocess" else refuse_over_processes
+    refuse(plan)
     outcome.prepare(plan, out)
     with interruptible() as interruption:
         done = fly_in(plan, out, watch, viewer, interruption)

@@ -55,6 +55,8 @@ def anchored(said: Any, folder: Path) -> Any:
 def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[str, Path]:
     """The folders in which the modules that a scenario names lie, by "module:Class"; without those that are installed.
 
+    A class of `__main__` is one of the script or notebook that runs, whatever file of that name there is.
+
     Parameters
     ----------
     given
@@ -70,7 +72,9 @@ def own(given: Scenario, folders: Callable[[str, str], Iterable[Path]]) -> dict[
         for number, loss in said.own
     }
     found = {
-        name: modules.holder(name.partition(":")[0], folders(key, name)) for key, name in named.items() if ":" in name
+        name: modules.holder(name.partition(":")[0], folders(key, name))
+        for key, name in named.items()
+        if ":" in name and not modules.is_running(name)
     }
     return {name: folder for name, folder in found.items() if folder is not None}
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +12,10 @@ import tomli_w
 from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
-from affinet.scenario import files, inputs, sections, source
+from affinet.scenario import files, inputs
+from affinet.scenario import overrides as changes
 from affinet.scenario.explain import explained
+from affinet.scenario.overrides import Given, Override
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.words import one_line
@@ -23,7 +23,6 @@ from netem.core.plain import shown
 
 FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
-_WAYS = "behind --set, or among the overrides in Python"
 
 
 def shipped() -> list[str]:
@@ -31,17 +30,20 @@ def shipped() -> list[str]:
     return files.shipped(_FOLDER)
 
 
-def load(name: str | Path, overrides: Sequence[str] = (), folder: Path | None = None) -> Scenario:
-    """The scenario in a file, or one that is shipped, with `a.b=c` overrides applied.
+def load(name: str | Path, overrides: Sequence[Given] = (), folder: Path | None = None, **settings: Any) -> Scenario:
+    """The scenario in a file, or one that is shipped, changed.
 
     Parameters
     ----------
     name
         Of the scenario, or the path of its file. Paths in the file, and modules it names, are relative to its folder.
     overrides
-        Changes to it.
+        Changes to it, the last of which hold: texts like `network.availability=0.5`, and tables like
+        `{"network.availability": 0.5}`.
     folder
         What paths and modules in the overrides are relative to; by default the scenario's own folder.
+    settings
+        One more table of overrides: `estimator="rkf"`, `network={"availability": 0.5}`.
 
     Raises
     ------
@@ -49,14 +51,18 @@ def load(name: str | Path, overrides: Sequence[str] = (), folder: Path | None = 
         When there is no such scenario, or something in it is wrong.
     TypeError
         When name or overrides are something else.
+    UserCodeError
+        When the class of an estimator or a law that is given as an object fails.
     """
     if not isinstance(name, str | os.PathLike):
         raise TypeError(f"{shown(name)} is no scenario: give the name of one that is shipped, or the path of a file")
-    if not isinstance(overrides, list | tuple) or not all(isinstance(one, str) for one in overrides):
-        raise TypeError(f"{shown(overrides)} are no overrides: give a list of texts, each like 'time.duration=5'")
+    if not isinstance(overrides, list | tuple) or not all(isinstance(one, str | Mapping) for one in overrides):
+        says = "give a list of texts like 'time.duration=5', and of tables like {'time.duration': 5}"
+        raise TypeError(f"{shown(overrides)} are no overrides: {says}")
     file = files.read(os.fspath(name), _FOLDER, "scenario")
-    origin, asked_from = Source(file.name, file.text, tuple(overrides)), folder or file.folder
-    scenario = _validated(inputs.anchored(file.says, file.folder), origin, asked_from)
+    changed = changes.read([*overrides, settings])
+    origin, asked_from = _source(file.name, file.text, changed), folder or file.folder
+    scenario = _validated(inputs.anchored(file.says, file.folder), origin, changed, asked_from)
     scenario._own = inputs.own(scenario, lambda key, _: _folders(origin, key, asked_from, file.folder))
     return scenario
 
@@ -85,8 +91,9 @@ def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = Non
         of_tests = "" if out.exists() else ", or a failed test: pytest keeps those of its last three sessions"
         named = f"name one that `affinet run` printed{of_tests}"
         raise ScenarioError(f"{out}: no run directory: {error}; {named}") from error
-    origin, asked_from = Source(str(file), "", tuple(overrides)), folder or out.absolute()
-    scenario = _validated(inputs.anchored(raw, out.absolute()), origin, asked_from)
+    changed = changes.read(overrides)
+    origin, asked_from = _source(str(file), "", changed), folder or out.absolute()
+    scenario = _validated(inputs.anchored(raw, out.absolute()), origin, changed, asked_from)
     shelves = {name: out.absolute() / inputs.FOLDER / shelf for name, shelf in inputs.kept(out).modules.items()}
 
     def folders(key: str, name: str) -> Sequence[Path]:
@@ -157,9 +164,12 @@ def _folders(origin: Source, key: str, asked_from: Path, *folders: Path) -> Sequ
     return (asked_from, *folders) if origin.overrides_say(key) else folders
 
 
-def _validated(raw: dict[str, Any], origin: Source, folder: Path) -> Scenario:
-    for override in origin.overrides:
-        _override(raw, override, folder)
+def _source(name: str, text: str, changed: Sequence[Override]) -> Source:
+    return Source(name, text, tuple(one.key for one in changed))
+
+
+def _validated(raw: dict[str, Any], origin: Source, changed: Sequence[Override], folder: Path) -> Scenario:
+    changes.put(raw, changed, folder)
     scenario = _valid(raw, origin)
     scenario._source = origin
     return scenario
@@ -172,45 +182,3 @@ def _valid(raw: dict[str, Any], origin: Source) -> Scenario:
         raise ScenarioError(
             explained(error, Scenario, origin)
         ) from None  # it has all that pydantic says, in better words
-
-
-def _value(override: str, text: str) -> Any:
-    """What the text behind the = says: a value as a file says it, or a word without quotes."""
-    try:
-        text.encode()
-        said = tomllib.loads(f"value = {text}")
-    except UnicodeEncodeError as error:
-        raise ScenarioError(f"override {one_line(override)}: not UTF-8, as TOML must be") from error
-    except (ValueError, RecursionError):
-        return text.strip()
-    if said.keys() != {"value"}:
-        raise ScenarioError(
-            f"override {one_line(override)}: it says more than one value; give each key an override of its own"
-        )
-    return said["value"]
-
-
-def _override(raw: dict[str, Any], override: str, folder: Path) -> None:
-    key, equals, text = override.partition("=")
-    *tables, name = source.parts(key)
-    if not equals or not name:
-        raise ScenarioError(
-            f"override {one_line(override)}: write it as key=value, like network.availability=0.5, {_WAYS}"
-        )
-    value = _value(override, text)
-    table: Any = raw
-    for step in tables:
-        table = table.setdefault(step, {})
-        if not isinstance(table, dict):
-            raise ScenarioError(f"override {one_line(override)}: {step} is not a table")
-    if tables == ["sensing"]:
-        _make_room(table, name)
-    said = reduce(lambda inner, step: {step: inner}, reversed([*tables, name]), value)
-    table[name] = reduce(lambda outer, step: outer[step], [*tables, name], inputs.anchored(said, folder))
-
-
-def _make_room(sensing: dict[str, Any], name: str) -> None:
-    """Leave out what a file says of another sensor than the one that this key is of."""
-    own = [kind for kind in sections.SENSORS if name in kind]
-    for other in (key for kind in sections.SENSORS if own and kind not in own for key in kind):
-        sensing.pop(other, None)

@@ -11,11 +11,11 @@ _DOT = re.compile(r"""\.(?=(?:[^"']|"[^"]*"|'[^']*')*$)""")  # not inside quotes
 
 @dataclass(frozen=True)
 class Source:
-    """Where a scenario came from: the file, its text, and the overrides."""
+    """Where a scenario came from: the file, its text, and the keys that were overridden."""
 
     file: str
     text: str
-    overrides: tuple[str, ...]
+    overridden: tuple[str, ...]
 
     def place(self, key: str) -> str:
         """Where a key was given: an override, or the file with the line of the key."""
@@ -27,7 +27,7 @@ class Source:
 
     def overrides_say(self, key: str) -> bool:
         """Whether a key was given by an override, or a part of it, or a table that it is part of."""
-        given = [".".join(parts(override.partition("=")[0])) for override in self.overrides]
+        given = self.overridden
         return any(one == key or one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in given)
 
 

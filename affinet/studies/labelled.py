@@ -11,13 +11,15 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from affinet.studies.batch import REPORT
 from affinet.studies.quantities import NAMES, over_time, said, stands_for
+from affinet.verdicts.export import netcdf
+from affinet.verdicts.export.labelled import Variable
 from analysis.models.arrays import Array
 from netem.processes.whole import whole
 
@@ -28,13 +30,6 @@ FILE = "results.nc"
 # The dimension of moments: where all cases share them, and where they do not.
 _TIME, _MOMENT = "time", "moment"
 _NAME = re.compile(r"[^\x00-/:-@\[-^`{-\x7f][^\x00-\x1f/\x7f]*(?<! )")
-_COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-
-
-class _Variable(NamedTuple):
-    dimensions: Sequence[str]
-    values: NDArray[Any]
-    attributes: Mapping[str, str]
 
 
 def is_name(name: str) -> bool:
@@ -74,37 +69,26 @@ def write(out: Path, study: Study, results: Sequence[Result], about: Mapping[str
     with whole(out / FILE) as unfinished, h5netcdf.File(unfinished, "w") as file:
         file.attrs.update(words | dict(about))
         file.dimensions = {
-            name: length
-            for one in variables.values()
-            for name, length in zip(one.dimensions, one.values.shape, strict=True)
+            name: length for one in variables.values() for name, length in zip(one.axes, one.values.shape, strict=True)
         }
         for name, one in variables.items():
-            _write(file, name, one)
+            netcdf.create(file, name, one)[...] = one.values
 
 
-def _write(file: Any, name: str, one: _Variable) -> None:
-    import h5py  # takes a while to import
-
-    numbers = one.values.dtype == np.float64 and one.values.ndim > 0 and name not in one.dimensions
-    how = {**_COMPRESSED, "fillvalue": np.nan} if numbers else {}
-    kind = h5py.string_dtype() if one.values.dtype == object else one.values.dtype
-    file.create_variable(name, tuple(one.dimensions), data=one.values, dtype=kind, **how).attrs.update(one.attributes)
-
-
-def _coordinates(study: Study, results: Sequence[Result]) -> dict[str, _Variable]:
-    axes = {axis.name: _Variable([axis.name], _labels(list(axis.values)), {}) for axis in study.axes}
+def _coordinates(study: Study, results: Sequence[Result]) -> dict[str, Variable]:
+    axes = {axis.name: Variable([axis.name], _labels(list(axis.values)), {}) for axis in study.axes}
     first, *others = results
     seeds = np.uint64(first.plan.scenario.seed) + np.arange(len(first.runs.mean_error), dtype=np.uint64)
     seconds = {"units": "s", "long_name": "time"}
     if all(np.array_equal(first.runs.seconds, other.runs.seconds) for other in others):
-        time = _Variable([_TIME], first.runs.seconds, seconds)
+        time = Variable([_TIME], first.runs.seconds, seconds)
     else:
         by_case = _by_case(study, results, [one.runs.seconds for one in results])
-        time = _Variable([*axes, _MOMENT], by_case, seconds)
+        time = Variable([*axes, _MOMENT], by_case, seconds)
     dt, ticks = [one.plan.world.dt for one in results], [float(one.plan.world.ticks) for one in results]
     return {
         **axes,
-        "run": _Variable(["run"], seeds, {"long_name": "seed"}),
+        "run": Variable(["run"], seeds, {"long_name": "seed"}),
         _TIME: time,
         "tick_length": _of_case(study, results, dt, {"units": "s", "long_name": "length of a tick"}),
         "tick_count": _of_case(study, results, ticks, {"units": "1", "long_name": "ticks of a run"}),
@@ -113,12 +97,12 @@ def _coordinates(study: Study, results: Sequence[Result]) -> dict[str, _Variable
 
 def _of_case(
     study: Study, results: Sequence[Result], values: Sequence[float], attributes: Mapping[str, str]
-) -> _Variable:
+) -> Variable:
     """A number of each case, or one for all."""
     if len(set(values)) == 1:
-        return _Variable([], np.array(values[0]), attributes)
+        return Variable([], np.array(values[0]), attributes)
     by_case = _by_case(study, results, [np.array([value]) for value in values])
-    return _Variable([axis.name for axis in study.axes], by_case[..., 0], attributes)
+    return Variable([axis.name for axis in study.axes], by_case[..., 0], attributes)
 
 
 def _labels(labels: Sequence[str]) -> NDArray[Any]:
@@ -129,17 +113,17 @@ def _labels(labels: Sequence[str]) -> NDArray[Any]:
 
 
 def _quantities(
-    study: Study, results: Sequence[Result], coordinates: Mapping[str, _Variable]
-) -> Iterator[tuple[str, _Variable]]:
+    study: Study, results: Sequence[Result], coordinates: Mapping[str, Variable]
+) -> Iterator[tuple[str, Variable]]:
     for quantity in dict.fromkeys(name for one in results for name in one.runs.quantities):
         having = [one for one in results if not np.isnan(one.runs.quantities.get(quantity, np.nan)).all()]
         if having:
-            for name, one in _summed_up(study, having, quantity, coordinates[_TIME].dimensions[-1]):
+            for name, one in _summed_up(study, having, quantity, coordinates[_TIME].axes[-1]):
                 beside = _coordinates_of(one, coordinates)
                 yield name, one._replace(attributes={**one.attributes, **_unit(quantity), **beside})
 
 
-def _summed_up(study: Study, results: Sequence[Result], quantity: str, moments: str) -> Iterator[tuple[str, _Variable]]:
+def _summed_up(study: Study, results: Sequence[Result], quantity: str, moments: str) -> Iterator[tuple[str, Variable]]:
     """Over the time of each run; and over the runs in each moment."""
     axes, name, says = [axis.name for axis in study.axes], _named(quantity), said(quantity)[0]
     over = stands_for(quantity)
@@ -150,23 +134,19 @@ def _summed_up(study: Study, results: Sequence[Result], quantity: str, moments: 
             "long_name": f"{says}, {over.replace('_', ' ')} over time{since}",
             "cell_methods": f"time: {over}",
         }
-        yield name, _Variable([*axes, "run"], _by_case(study, results, of_runs), attributes)
+        yield name, Variable([*axes, "run"], _by_case(study, results, of_runs), attributes)
         for what, statistic, make in (("mean", "mean", np.mean), ("std", "standard_deviation", np.std)):
             of_moments = [make(one.runs.quantities[quantity], axis=0) for one in results]
             attributes = {
                 "long_name": f"{says}, {statistic.replace('_', ' ')} over the runs",
                 "cell_methods": f"run: {statistic}",
             }
-            yield f"{what}_{name}", _Variable([*axes, moments], _by_case(study, results, of_moments), attributes)
+            yield f"{what}_{name}", Variable([*axes, moments], _by_case(study, results, of_moments), attributes)
 
 
-def _coordinates_of(one: _Variable, coordinates: Mapping[str, _Variable]) -> dict[str, str]:
+def _coordinates_of(one: Variable, coordinates: Mapping[str, Variable]) -> dict[str, str]:
     """Those beside its dimensions, as the conventions of netCDF (CF) say them."""
-    beside = [
-        name
-        for name, other in coordinates.items()
-        if name not in other.dimensions and {*other.dimensions} <= {*one.dimensions}
-    ]
+    beside = [name for name, other in coordinates.items() if name not in other.axes and {*other.axes} <= {*one.axes}]
     return {"coordinates": " ".join(beside)}
 
 

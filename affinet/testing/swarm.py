@@ -14,49 +14,13 @@ from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.runtimes.run import Runtime, evidence, fly, rehearse
 from affinet.scenario import loading as scenarios
+from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario
-from affinet.verdicts.checking import CheckResult, as_checker
-from affinet.verdicts.evidence import Evidence
+from affinet.verdicts.flown import Broken, FlownRun
 from affinet.verdicts.outcome import RunVerdict
 from netem.processes.user_code import UserCodeError
 
 _KEPT = 4
-
-
-class Broken(AssertionError):
-    """A run, or what was checked of it, did not come out as the test expects."""
-
-
-class FlownRun(Evidence):
-    """A run that was flown: its arrays, and its faults with what they touched."""
-
-    @classmethod
-    def of(cls, evidence: Evidence) -> FlownRun:
-        """The run that left this evidence."""
-        return cls(evidence.plan, evidence.arrays, evidence.outcome)
-
-    def check(self, *checkers: Callable[[Evidence], CheckResult]) -> FlownRun:
-        """The run itself if every checker passes; one that is vacuous proves nothing, and fails.
-
-        Parameters
-        ----------
-        checkers
-            Each a `Checker`, or a function that is to be one under its own name.
-
-        Raises
-        ------
-        Broken
-            When one does not pass: which, why, and the first tick that offends.
-        UserCodeError
-            When one fails itself, or returns no `CheckResult`.
-        TypeError
-            When one is none.
-        """
-        __tracebackhide__ = True
-        findings = [checker(self) for checker in map(as_checker, checkers)]
-        if wrong := [finding for finding in findings if finding.verdict != "pass"]:
-            raise Broken("\n".join(map(str, wrong)))
-        return self
 
 
 def flown(plan: Plan, runtime: Runtime, out: Path) -> FlownRun:
@@ -151,8 +115,8 @@ class SwarmRuns:
         self._rooms: list[Path] = []
         self.failed = False
 
-    def __call__(self, scenario: str | Path, *overrides: str) -> Swarm:
-        """A run of a scenario, shipped or a file, with `key=value` overrides; paths are relative to the test's folder.
+    def __call__(self, scenario: str | Path, *overrides: Given, **settings: Any) -> Swarm:
+        """A run of a scenario, shipped or a file, changed as by `affinet.run`; paths are relative to the test's folder.
 
         Raises
         ------
@@ -161,7 +125,9 @@ class SwarmRuns:
         """
         seed = () if self._seed is None else (f"seed={self._seed}",)
         name = str(self._folder / scenario) if str(scenario).endswith(".toml") else str(scenario)
-        return Swarm(scenarios.load(name, (*seed, *overrides), self._folder), self._launch)
+        return Swarm(
+            scenarios.load(name, (*seed, *overrides, *([settings] if settings else [])), self._folder), self._launch
+        )
 
     def keep(self) -> list[tuple[Plan, Path]]:
         """The last runs, each with a directory that holds all of it; those flown in process are flown again to record them."""

@@ -57,6 +57,11 @@ def holder(module: str, folders: Iterable[Path]) -> Path | None:
     return None
 
 
+def is_running(path: str) -> bool:
+    """Whether "module:Class" is of the script or notebook that runs: no other process has it."""
+    return path.startswith(("__main__:", "__mp_main__:"))
+
+
 def sources(folder: str) -> frozenset[Path]:
     """The files of all modules that were imported from a folder so far."""
     return frozenset(_SHELVES.sources(folder))

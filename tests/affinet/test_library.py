@@ -1,6 +1,8 @@
 """`import affinet`: all that a user's code needs, light, typed and documented; runs flown and read again."""
 
 import ast
+import asyncio
+import importlib
 import inspect
 import json
 import pickle
@@ -16,10 +18,11 @@ import numpy as np
 import pytest
 from flying import PROCESSES, digest_of
 from kept_arrays import rewrite
-from own_code import ESTIMATOR, broken, write
+from own_code import ESTIMATOR, LAW, broken, write
 
 import affinet
 from affinet.cli import commands
+from affinet.scenario import overrides
 from netem.medium.verdict import Verdict
 from world.books.history import ARRAYS, load
 
@@ -63,6 +66,12 @@ def test_the_functions_say_all_of_their_arguments():
         told = inspect.signature(function)
         assert all(one.annotation is not inspect.Parameter.empty for one in told.parameters.values())
         assert told.return_annotation is not inspect.Signature.empty
+
+
+def test_the_short_names_are_keywords_that_help_and_editors_know():
+    known = inspect.signature(affinet.run).parameters
+    short = [name for name in known if name not in ("scenario", "overrides", "runtime", "out", "tables")]
+    assert short == [*overrides.SHORT]
 
 
 def test_what_is_not_there_is_said_as_of_any_module():
@@ -122,10 +131,13 @@ def test_the_command_is_the_module():
 # ---- the docs
 
 
+def python_of(page):
+    return re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)
+
+
 def blocks():
     """Every piece of Python in the docs."""
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    return [text for page in pages for text in re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL)]
+    return [text for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) for text in python_of(page)]
 
 
 def test_users_are_told_to_import_from_affinet_alone():
@@ -134,12 +146,23 @@ def test_users_are_told_to_import_from_affinet_alone():
     assert [found for text in [*blocks(), ESTIMATOR] for found in rooms.findall(text)] == []
 
 
-def test_the_programs_of_the_docs_run(tmp_path, monkeypatch):
+def test_the_program_of_the_readme_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    programs = [text for text in blocks() if "affinet.run(" in text and "def test_" not in text]
-    assert len(programs) == 2
-    for program in programs:
-        exec(program, {})
+    (program,) = (text for text in python_of(ROOT / "README.md") if "affinet.run(" in text)
+    exec(program, {})
+
+
+_PROGRAM = re.compile(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
+
+
+def test_the_programs_of_the_page_run_one_after_the_other_and_print_what_stands_there(tmp_path):
+    programs, printed = zip(*_PROGRAM.findall((ROOT / "docs" / "library.md").read_text()), strict=True)
+    (tmp_path / "page.py").write_text("\nprint('---')\n".join(programs))
+    done = subprocess.run([sys.executable, "page.py"], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    digest = re.compile("[0-9a-f]{64}")  # other processors have other bits
+    assert digest.sub("", done.stdout).split("---\n") == [digest.sub("", text) for text in printed]
+    assert sum(map(bool, printed)) >= 5
 
 
 # ---- runs
@@ -151,6 +174,76 @@ def test_a_run_in_process_leaves_nothing_and_has_the_bits_of_the_command(tmp_pat
     assert (run.outcome.verdict, run.outcome.digest) == ("pass", digest_of("corridor", *SHORT))
     assert affinet.run(affinet.scenario.load("corridor", SHORT)).outcome.digest == run.outcome.digest
     assert list(tmp_path.iterdir()) == []
+
+
+def test_overrides_are_texts_tables_and_keywords():
+    flown = affinet.run("corridor", {"network": {"availability": 0.5}}, "seed=2", estimator="rkf", dt=0.05, duration=1)
+    as_texts = (*SHORT, "network.availability=0.5", "seed=2", "agents.estimator=rkf")
+    assert flown.outcome.digest == digest_of("corridor", *as_texts)
+    again = affinet.run(
+        affinet.scenario.load("corridor", [*SHORT, {"network.availability": 0.5}], seed=2, estimator="rkf")
+    )
+    assert again.outcome.digest == flown.outcome.digest
+
+
+PLACES = {
+    "in process": {},
+    "kept": {"out": "run"},
+    "processes": {"runtime": "processes"},
+}
+
+
+@PROCESSES
+@pytest.mark.parametrize("place", PLACES)
+def test_an_estimator_and_a_law_that_are_objects_of_a_module_fly_anywhere(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    names = {"estimator": write(tmp_path, ESTIMATOR), "law": write(tmp_path, LAW)}
+    objects = {key: importlib.import_module(name).Own() for key, name in names.items()}
+    flown = affinet.run("corridor", *SHORT, **objects, **PLACES[place])
+    by_name = affinet.run("corridor", *SHORT, **{key: f"{name}:Own" for key, name in names.items()})
+    assert flown.outcome.digest == by_name.outcome.digest
+    assert flown.outcome.flown["estimator"] == f"{names['estimator']}:Own"
+
+
+SCRIPT = """
+import affinet
+{estimator}
+short = {{"duration": 1, "dt": 0.05}}
+flown = affinet.run("corridor", estimator=Own(), **short, out="run")
+assert affinet.load("run").outcome.digest == flown.outcome.digest
+print(flown.outcome.digest)
+try:
+    affinet.run("corridor", estimator=Own(), **short, runtime="processes")
+except affinet.PlanError as error:
+    print(error)
+"""
+
+
+def test_an_object_of_a_script_flies_in_its_process_alone(tmp_path, monkeypatch):
+    (tmp_path / "elsewhere").mkdir()
+    script = tmp_path / "elsewhere" / "script.py"
+    script.write_text(SCRIPT.format(estimator=ESTIMATOR))
+    (tmp_path / "__main__.py").write_text("1 / 0\n")  # a file of that name is another module
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path, check=True)
+    digest, refusal = done.stdout.splitlines()
+    name = write(tmp_path, ESTIMATOR)
+    monkeypatch.chdir(tmp_path)
+    assert digest == affinet.run("corridor", *SHORT, estimator=f"{name}:Own").outcome.digest
+    assert refusal.startswith(
+        "processes: __main__:Own is of the script or notebook that runs, which no other process has: "
+    )
+    with pytest.raises(affinet.ScenarioError, match=r"only the script or notebook that made it has it$"):
+        affinet.load(tmp_path / "run")
+
+
+@PROCESSES
+@pytest.mark.parametrize("runtime", ["inprocess", "processes"])
+def test_a_run_flies_within_a_running_event_loop(runtime):
+    async def cell():
+        return affinet.run("corridor", *SHORT, runtime=runtime).outcome.digest
+
+    assert asyncio.run(cell()) == digest_of("corridor", *SHORT)
 
 
 WAITING = [
@@ -185,9 +278,10 @@ def test_a_run_over_processes_needs_no_directory(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_overrides_of_what_is_read_already_are_refused():
-    with pytest.raises(affinet.ScenarioError, match=r"^seed=3: give overrides where the scenario is read"):
-        affinet.run(affinet.scenario.load("corridor"), "seed=3")
+@pytest.mark.parametrize(("given", "settings", "said"), [(["seed=3"], {}, "seed=3"), ([], {"seed": 3}, "seed")])
+def test_overrides_of_what_is_read_already_are_refused(given, settings, said):
+    with pytest.raises(affinet.ScenarioError, match=f"^{said}: give overrides where the scenario is read"):
+        affinet.run(READ, *given, **settings)
 
 
 @PROCESSES
@@ -436,12 +530,11 @@ def test_a_run_can_be_pickled_compared_and_shown(scenario):
     assert len({flown, again, flown}) == 2
     assert flown.plan != again.plan
     assert affinet.realised(flown) != affinet.realised(again)
-    digest, ticks = flown.outcome.digest, flown.ticks
-    assert (
-        repr(flown)
-        == repr(again)
-        == f"<FlownRun: {scenario}.toml, {flown.outcome.verdict}, {digest[:12]}, {ticks} ticks>"
-    )
+    digest = flown.outcome.digest
+    assert repr(flown) == repr(again)
+    assert repr(flown).startswith(f"<FlownRun: {scenario}.toml, {flown.outcome.verdict}\n")
+    assert f" {flown.ticks} ticks of " in repr(flown)
+    assert repr(flown).endswith(f"digest: {digest}>")
     assert affinet.run(again.plan.scenario).outcome.digest == digest
     assert (affinet.realised(again).heard == affinet.realised(flown).heard).all()
     assert again.check(affinet.bounded(1e9)) is again

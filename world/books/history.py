@@ -20,6 +20,7 @@ from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
 from netem.medium.verdict import Verdict, VerdictCodes
 from world.books import growing
+from world.books.described import BY_TICK
 from world.physics.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
@@ -30,23 +31,7 @@ ARRAYS = "arrays"  # in a run directory: a folder, with a file for each array
 _SPAN = 512  # ticks that are looked at together, of arrays that may be larger than the memory
 
 # Of each array by tick the kind of its numbers, and how many axes it has.
-_BY_TICK = {
-    "position": ("f", 3),
-    "measured": ("f", 3),
-    "input": ("f", 3),
-    "estimate": ("f", 4),
-    "known": ("b", 3),
-    "covariance": ("f", 4),
-    "psi": ("f", 2),
-    "feasible": ("i", 2),
-    "verdicts": ("u", 3),
-    "newest": ("i", 3),
-    "copies": ("i", 1),
-    "late": ("i", 1),
-    "dropped": ("i", 2),
-    "target": ("f", 3),
-    "error": ("f", 1),
-}
+_BY_TICK = {name: (one.kind, len(one.axes)) for name, one in BY_TICK.items()}
 TAKEN = frozenset(_BY_TICK)  # names that no report can have
 UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
 _MARK = 3  # column of `Entry.odd`

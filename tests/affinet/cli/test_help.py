@@ -41,9 +41,7 @@ def test_an_example_does_what_it_says(example, kept, tmp_path, monkeypatch, capf
     assert capfd.readouterr().out
 
 
-@pytest.mark.parametrize(
-    "example", [*ALL, *NEXT], ids=lambda e: e.line
-)
+@pytest.mark.parametrize("example", [*ALL, *NEXT], ids=lambda e: e.line)
 def test_an_example_can_be_typed(example):
     assert options.parser().parse_args(typed(example)).command == example.line.split()[1]
 

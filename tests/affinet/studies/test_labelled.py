@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from importlib.util import find_spec
 from types import SimpleNamespace
 
 import h5netcdf
@@ -22,7 +21,6 @@ from affinet.studies.study import Axis, Result
 from analysis.metrics.indicator import Bounds
 
 pytestmark = PROCESSES
-WITH_XARRAY = pytest.mark.skipif(find_spec("xarray") is None, reason="`make test-xarray` has an environment with it")
 
 SMALL = """
 title = "Small"
@@ -322,7 +320,6 @@ def test_who_flies_imports_nothing_of_it():
 # ---- xarray
 
 
-@WITH_XARRAY
 def test_xarray_opens_it_by_its_labels(small):
     import xarray
 
@@ -339,7 +336,6 @@ def test_xarray_opens_it_by_its_labels(small):
         assert results.time.dtype == np.float64
 
 
-@WITH_XARRAY
 def test_xarray_finds_the_times_of_each_case(tmp_path):
     import xarray
 
