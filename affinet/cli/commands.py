@@ -49,6 +49,7 @@ from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.rerun_command import NoViewer
 from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import files, loading
+from affinet.scenario.overrides import SHORT
 from affinet.scenario.sections import Scenario, ScenarioError
 from affinet.scenario.words import among, one_line
 from affinet.studies import fit
@@ -145,12 +146,7 @@ def _refused(error: RuntimeError) -> str | None:
 
 
 def _overrides(parsed: argparse.Namespace) -> list[str]:
-    given = {
-        "agents.estimator": parsed.estimator,
-        "network.availability": parsed.availability,
-        "seed": parsed.seed,
-        "time.duration": parsed.duration,
-    }
+    given = {key: getattr(parsed, word, None) for word, key in SHORT.items()}
     return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
 
 

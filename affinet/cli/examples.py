@@ -77,7 +77,7 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet watch runs/kept --serve", "in a browser", alone=False),
     ),
     "render": (
-        Example("affinet render runs/kept --at 0.3 --out swarm.png", "a moment, for a paper or a page"),
+        Example("affinet render runs/kept --at 9.8 --out swarm.png", "a moment, for a paper or a page", "--at 0.3"),
         Example("affinet render runs/kept --speed 4 --out swarm.gif", "a film", "--fps 1"),
     ),
     "export": (

@@ -12,6 +12,7 @@ from rich import progress as bar
 
 from affinet.cli.progress import Bar
 from affinet.scenario.sections import ScenarioError
+from affinet.scenario.words import one_line
 from affinet.verdicts import measures, reading
 from affinet.verdicts.evidence import Evidence
 from analysis.models.arrays import Array
@@ -47,7 +48,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def render(parsed: argparse.Namespace) -> None:
-    """Draw it.
+    """Draw it, and say where.
 
     Raises
     ------
@@ -63,14 +64,20 @@ def render(parsed: argparse.Namespace) -> None:
     with about(parsed.out):
         if parsed.out.suffix in _STILL:
             swarm.still(flights, _within("--at", last if parsed.at is None else parsed.at, last), parsed.out)
-            return
-        moments = _moments(parsed, last)
-        try:
-            with Bar(str(parsed.out), len(moments), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
-                for number in swarm.film(flights, moments, parsed.fps, parsed.out):
-                    shown.see(number + 1, f"{number + 1}/{len(moments)} frames")
-        except swarm.NoFilm as error:
-            raise ScenarioError(str(error)) from error
+        else:
+            _film(flights, _moments(parsed, last), parsed.fps, parsed.out)
+    print(one_line(str(parsed.out)))  # noqa: T201
+
+
+def _film(flights: Sequence[Flight], moments: Array, frames_per_s: int, out: Path) -> None:
+    from analysis.figures import swarm
+
+    try:
+        with Bar(str(out), len(moments), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
+            for number in swarm.film(flights, moments, frames_per_s, out):
+                shown.see(number + 1, f"{number + 1}/{len(moments)} frames")
+    except swarm.NoFilm as error:
+        raise ScenarioError(str(error)) from error
 
 
 def _moments(parsed: argparse.Namespace, last: float) -> Array:

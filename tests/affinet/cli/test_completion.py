@@ -37,7 +37,7 @@ def script(shell, capsys):
         (("study", "paper-003"), {"paper-003"}),
         (("replay", ""), {"runs/one", "runs/two"}),
         (("list", "est"), {"estimators"}),
-        (("run", "--se"), {"--set", "--seed", "--seeds"}),
+        (("run", "--se"), {"--set", "--seed", "--seeds", "--serve"}),
         (("new", "p"), {"project"}),
     ],
 )
