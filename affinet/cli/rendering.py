@@ -13,12 +13,9 @@ from rich import progress as bar
 from affinet.cli.progress import Bar
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
-from affinet.verdicts import measures, reading
-from affinet.verdicts.evidence import Evidence
+from affinet.verdicts import pictured, reading
 from analysis.models.arrays import Array
-from netem.medium.verdict import Verdict
 from netem.processes.system_errors import about
-from world.recording import palette
 
 if TYPE_CHECKING:
     from analysis.figures.swarm import Flight
@@ -59,7 +56,9 @@ def render(parsed: argparse.Namespace) -> None:
     """
     from analysis.figures import swarm  # matplotlib takes a while to import
 
-    flights = [_flight(reading.evidence(directory), directory) for directory in parsed.directories]
+    flights = [
+        pictured.flight(reading.evidence(directory), directory.absolute().name) for directory in parsed.directories
+    ]
     last = max(float(flight.seconds[-1]) for flight in flights)
     with about(parsed.out):
         if parsed.out.suffix in _STILL:
@@ -98,37 +97,6 @@ def _within(option: str, seconds: float, last: float) -> float:
     if not 0.0 <= seconds <= last:
         raise ScenarioError(f"{option} {seconds:g}: give a moment from 0 to {last:g} s")
     return seconds
-
-
-def _flight(evidence: Evidence, directory: Path) -> Flight:
-    from analysis.figures.swarm import Flight
-
-    world, scenery = evidence.plan.world, evidence.plan.scenery
-    quantity, values = measures.over_time(evidence.plan, evidence.timeline, evidence.arrays)
-    return Flight(
-        title=directory.absolute().name,
-        seconds=evidence.seconds,
-        position=evidence.position,
-        target=evidence.arrays["target"],
-        leaders=world.formation.is_leader,
-        edges=np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1,
-        heard=np.stack([world.links.src, world.links.dst], axis=1) - 1,
-        verdicts=evidence.arrays["verdicts"][:, 0],
-        colours=_colours(),
-        error=values,
-        quantity=quantity,
-        walls=[np.array(wall) for wall in scenery.walls],
-        zones=[(np.array(zone.centre), zone.radius) for zone in scenery.zones],
-    )
-
-
-def _colours() -> Sequence[tuple[str, tuple[float, float, float]]]:
-    codes = [palette.OF_VERDICT[verdict] for verdict in Verdict]
-    names = ["" if verdict is Verdict.SILENT else verdict.label for verdict in Verdict]
-    return [
-        (name, ((code >> 24) / 255.0, (code >> 16 & 255) / 255.0, (code >> 8 & 255) / 255.0))
-        for name, code in zip(names, codes, strict=True)
-    ]
 
 
 def _picture(text: str) -> Path:

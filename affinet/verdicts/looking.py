@@ -22,11 +22,11 @@ def show(run: Evidence) -> None:
     Raises
     ------
     RuntimeError
-        Outside of one: with the command that opens its recording.
+        Outside of one: with the command that shows its recording.
     """
     recording = _recording(run)
     if (display := _display()) is None:
-        way = f"rerun {recording[0]}" if recording else "fly it with out=DIR, and open DIR/run.rrd with rerun"
+        way = f"affinet watch {run.outcome.out}" if recording else "fly it with out=DIR, and `affinet watch DIR`"
         raise RuntimeError(f"there is no notebook to show it in: {way}")
     if not recording:
         _picture(run, display, "it left no recording: for one to look at in Rerun's viewer fly it with out=DIR")

@@ -1,35 +1,58 @@
-"""A picture of a run: where its agents flew, and its tracking error."""
+"""A run as pictures draw it: what stands in the scene, in the colours of recordings, and what matters of it over time."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from affinet.verdicts import told
+from affinet.verdicts import measures, told
 from affinet.verdicts.evidence import Evidence
+from netem.medium.verdict import Verdict
+from world.recording import palette
 
-_LEADER, _FOLLOWER = "#d4a017", "#3b76c4"
+if TYPE_CHECKING:
+    from analysis.figures.swarm import Flight
+
+
+def flight(run: Evidence, title: str) -> Flight:
+    """What is drawn of a run, under a title."""
+    from analysis.figures.swarm import Flight  # matplotlib takes a while to import
+
+    world, scenery = run.plan.world, run.plan.scenery
+    quantity, values = measures.over_time(run.plan, run.timeline, run.arrays)
+    return Flight(
+        title=title,
+        seconds=run.seconds,
+        position=run.position,
+        target=run.arrays["target"],
+        leaders=world.formation.is_leader,
+        edges=np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1,
+        heard=np.stack([world.links.src, world.links.dst], axis=1) - 1,
+        verdicts=run.arrays["verdicts"][:, 0],
+        colours=_colours(),
+        error=values,
+        quantity=quantity,
+        walls=[np.array(wall) for wall in scenery.walls],
+        zones=[(np.array(zone.centre), zone.radius) for zone in scenery.zones],
+    )
 
 
 def png(run: Evidence) -> bytes:
-    """The picture, as a file holds it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes a while to import
-    from matplotlib.figure import Figure
+    """How it ended, as a file holds it."""
+    from analysis.figures import swarm
 
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    paths, error = figure.subplots(1, 2)
-    paths.set_title(told.title(run), parse_math=False)
-    paths.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    for number, leads in enumerate(run.plan.world.formation.is_leader.tolist()):
-        x, y = run.position[:, number, :2].T
-        colour = _LEADER if leads else _FOLLOWER
-        paths.plot(x, y, color=colour, linewidth=1.0)
-        paths.plot(x[-1:], y[-1:], "o", color=colour, markersize=5.0)
-    error.set(xlabel="time (s)", ylabel="tracking error (m²)")
-    error.plot(run.seconds, np.where(run.error > 0.0, run.error, np.nan), color="#555555", linewidth=1.0)
-    error.set_yscale("log")
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=100)
+    swarm.still([flight(run, told.title(run))], float(run.seconds[-1]), file)
     return file.getvalue()
+
+
+def _colours() -> Sequence[tuple[str, tuple[float, float, float]]]:
+    codes = [palette.OF_VERDICT[verdict] for verdict in Verdict]
+    names = ["" if verdict is Verdict.SILENT else verdict.label for verdict in Verdict]
+    return [
+        (name, ((code >> 24) / 255.0, (code >> 16 & 255) / 255.0, (code >> 8 & 255) / 255.0))
+        for name, code in zip(names, codes, strict=True)
+    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -172,12 +172,12 @@ class _Panel:
             getattr(self._axes, f"set_{axis}lim")(centre - reach, centre + reach)
 
 
-def still(flights: Sequence[Flight], seconds: float, path: Path) -> None:
-    """One moment, as an image or a page, by the ending of the file's name."""
+def still(flights: Sequence[Flight], seconds: float, file: Path | IO[bytes]) -> None:
+    """One moment, as an image or a page, by the ending of the file's name; PNG where it has none."""
     picture = Picture(flights)
     picture.show(seconds)
     with mpl.rc_context(_STYLE):
-        picture.figure.savefig(path, dpi=160)
+        picture.figure.savefig(file, dpi=160)
 
 
 def film(flights: Sequence[Flight], moments: Array, frames_per_s: int, path: Path) -> Iterator[int]:

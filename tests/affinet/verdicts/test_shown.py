@@ -168,7 +168,7 @@ def test_the_recording_of_another_run_in_its_place_is_not_shown(run, kept, shown
 def test_outside_of_a_notebook_it_says_what_opens_the_recording(run, kept, monkeypatch):
     monkeypatch.delitem(sys.modules, "IPython", raising=False)
     with pytest.raises(
-        RuntimeError, match=rf"^there is no notebook to show it in: rerun {re.escape(str(kept_file(kept)))}$"
+        RuntimeError, match=rf"^there is no notebook to show it in: affinet watch {re.escape(kept.outcome.out)}$"
     ):
         kept.show()
     with pytest.raises(RuntimeError, match=r"^there is no notebook to show it in: fly it with out=DIR"):
