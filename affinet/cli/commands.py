@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from affinet.cli import (
+    comparing,
     completing,
     doctoring,
     exporting,
@@ -230,6 +231,11 @@ def _render(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _compare(parsed: argparse.Namespace) -> int:
+    comparing.compare(parsed)
+    return PASS
+
+
 def _check_determinism(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
@@ -412,6 +418,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "replay": _replay,
     "watch": _watch,
     "render": _render,
+    "compare": _compare,
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,

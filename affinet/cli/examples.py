@@ -80,6 +80,10 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet render runs/kept --at 9.8 --out swarm.png", "a moment, for a paper or a page", "--at 0.3"),
         Example("affinet render runs/kept --speed 4 --out swarm.gif", "a film", "--fps 1"),
     ),
+    "compare": (
+        Example("affinet compare runs/kept runs/kept", "settings, figures, and the first tick in which they part"),
+        Example("affinet compare runs/kept runs/kept --out errors.png", "and their curves over each other"),
+    ),
     "export": (
         Example("affinet export runs/kept --to parquet", "a folder of tables, runs/kept-parquet"),
         Example("affinet export runs/kept --to mcap --out kept.mcap", "for Foxglove and PlotJuggler"),

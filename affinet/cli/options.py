@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from affinet.cli import (
+    comparing,
     completing,
     doctoring,
     exporting,
@@ -60,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
     _add_coordinators(commands)
     _add_seats(commands)
     _add_conformance(commands)
-    for module in (watching, rendering, exporting, listing, schemas, scaffolding, doctoring, completing):
+    for module in (watching, rendering, comparing, exporting, listing, schemas, scaffolding, doctoring, completing):
         module.add(commands)
     helping.end_with_examples(whole)
     return whole

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +16,7 @@ from affinet.runtimes.interruption import ended_by_signals
 from affinet.runtimes.rerun_command import NoViewer
 from affinet.runtimes.viewers import WebViewer, open_viewer, show
 from affinet.scenario import loading
+from affinet.scenario.names import apart
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
 from netem.core.parts import parts
@@ -91,7 +91,7 @@ def _files(directories: Sequence[Path]) -> Iterator[list[Path]]:
     from world.recording.beside import RecordedRun, beside  # Rerun takes a second to import
 
     runs = []
-    for name, directory in zip(_names(directories), directories, strict=True):
+    for name, directory in zip(apart(directories), directories, strict=True):
         flown = loading.resolved(directory)
         nominal = formation_of(flown).nominal
         reach, flat = float(np.ptp(nominal, axis=0).max()), nominal.shape[-1] == 2
@@ -107,17 +107,6 @@ def _recording(directory: Path) -> list[Path]:
     if not (files := parts(directory / RECORDING)):
         raise ScenarioError(f"{directory}: no {RECORDING} in it: it was flown with record.enabled=false, or cut short")
     return files
-
-
-def _names(directories: Sequence[Path]) -> list[str]:
-    """The last part of each path; with a number where that is the same."""
-    names = [directory.absolute().name for directory in directories]
-    counts, seen = Counter(names), Counter[str]()
-    shown = []
-    for name in names:
-        seen[name] += 1
-        shown.append(name if counts[name] == 1 else f"{name} ({seen[name]})")
-    return shown
 
 
 def _tell(text: str) -> None:

@@ -66,7 +66,8 @@ class Difference:
 
 def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequence[str]) -> Difference | None:
     """The first difference of two runs over the same links and channels; None when every bit is the same."""
-    names = (*_MADE, *sorted((one.keys() | other.keys()) - {*_MADE, "input"}), "input")
+    made = one.keys() | other.keys()
+    names = [*(name for name in _MADE if name in made), *sorted(made - {*_MADE, "input"}), "input"]
     for name in names:
         forms = [history.form(arrays.get(name)) for arrays in (one, other)]
         if forms[0] != forms[1]:  # their values cannot be held against each other

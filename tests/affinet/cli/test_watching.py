@@ -23,6 +23,7 @@ from affinet.cli.commands import main
 from affinet.runtimes import viewers
 from affinet.runtimes.run import fly
 from affinet.runtimes.viewers import WebViewer
+from affinet.scenario.names import apart
 from netem.core.parts import parts
 
 SHORT = ("time.dt=0.05", "time.duration=0.5")
@@ -164,6 +165,7 @@ def test_a_page_is_served_on_loopback_alone_for_as_long_as_the_block_lasts(runs)
 
 SERVES = """import sys
 from affinet.runtimes.viewers import WebViewer
+from affinet.scenario.names import apart
 with WebViewer() as web:
     print(web.page, flush=True)
     sys.stdin.read()"""
@@ -201,4 +203,4 @@ def test_a_run_is_served_while_it_flies_and_on_until_a_signal_and_keeps_its_stat
     [(["a/x", "b/y"], ["x", "y"]), (["a/x", "b/x", "y"], ["x (1)", "x (2)", "y"])],
 )
 def test_each_run_has_a_name_of_its_own(directories, names):
-    assert watching._names([Path(one) for one in directories]) == names
+    assert apart([Path(one) for one in directories]) == names

@@ -1,0 +1,76 @@
+"""Runs beside each other: the settings in which they differ, their figures, and where each parts from the first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from affinet.scenario.words import shown
+from affinet.verdicts import compare
+from affinet.verdicts.evidence import Evidence
+from world.books import history
+from world.books.history import Arrays
+
+Row = tuple[str, tuple[str, ...]]
+_UNSAID = "-"
+
+
+def settings(runs: Sequence[Evidence]) -> list[Row]:
+    """The keys of scenarios in which runs differ, and what each says there."""
+    said = [dict(_leaves(run.plan.scenario.model_dump(mode="json"))) for run in runs]
+    keys = dict.fromkeys(key for one in said for key in one)
+    rows = [(key, tuple(shown(one[key]) if one.get(key) is not None else _UNSAID for one in said)) for key in keys]
+    return [(key, values) for key, values in rows if len(set(values)) > 1]
+
+
+def figures(runs: Sequence[Evidence]) -> list[Row]:
+    """What came of each."""
+    each = [dict(_figures(run)) for run in runs]
+    names = dict.fromkeys(name for one in each for name in one)
+    return [(name, tuple(one.get(name, _UNSAID) for one in each)) for name in names]
+
+
+def parting(first: Evidence, other: Evidence) -> str:
+    """Where a run parts from the first one, of what both have, in words."""
+    links = first.plan.world.links
+    if links.index != other.plan.world.links.index:
+        return "it is of another formation: there is nothing to hold tick by tick against the first"
+    channels = [name for name in first.plan.channels if name in other.plan.channels]
+    one, another = (_over(run, channels) for run in (first, other))
+    names = [name for name in one if history.form(one[name]) == history.form(another.get(name))]
+    found = compare.first_difference(
+        {name: one[name] for name in names}, {name: another[name] for name in names}, links, channels
+    )
+    return "the same bits as the first" if found is None else str(found)
+
+
+def _over(run: Evidence, channels: Sequence[str]) -> Arrays:
+    """The arrays of a run over some of its channels."""
+    chosen = [run.plan.channels.index(name) for name in channels]
+    return {**run.arrays, **{name: run.arrays[name][:, chosen] for name in ("verdicts", "newest")}}
+
+
+def _figures(run: Evidence) -> Iterator[tuple[str, str]]:
+    done = run.outcome
+    yield "verdict", done.says
+    yield "ticks", str(run.ticks)
+    errors = done.errors or {"tracking error (m2)": done.tracking_error}
+    for name, of in errors.items():
+        called = name if name.endswith(")") else f"{name.replace('_', ' ')} (m)"
+        for what, value in of.items():
+            yield f"{called}, {what}", _UNSAID if value is None else f"{value:.4g}"
+    messages = done.messages
+    yield "messages delivered", f"{messages['delivered']} of {messages['offered']}"
+    for reason, number in messages["dropped"].items():
+        yield f"dropped, {reason}", str(number)
+    yield "faults", str(len(done.faults))
+    yield "digest", str(done.digest)[:12]
+
+
+def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        key = f"{before}{name}"
+        if isinstance(value, Mapping) and value:
+            yield from _leaves(value, f"{key}.")
+        else:
+            yield key, value
