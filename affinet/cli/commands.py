@@ -32,6 +32,7 @@ from affinet.cli import (
     many_runs,
     options,
     rendering,
+    reporting,
     scaffolding,
     schemas,
     show,
@@ -236,6 +237,11 @@ def _compare(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _report(parsed: argparse.Namespace) -> int:
+    reporting.report(parsed)
+    return PASS
+
+
 def _check_determinism(parsed: argparse.Namespace) -> int:
     plan = planning.make(_scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
@@ -419,6 +425,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "watch": _watch,
     "render": _render,
     "compare": _compare,
+    "report": _report,
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,

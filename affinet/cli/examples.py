@@ -84,6 +84,10 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet compare runs/kept runs/kept", "settings, figures, and the first tick in which they part"),
         Example("affinet compare runs/kept runs/kept --out errors.png", "and their curves over each other"),
     ),
+    "report": (
+        Example("affinet report runs/kept --out run.html", "a page with a scene, curves, faults, messages, settings"),
+        Example("affinet report studies/bursts-quick", "its claims, figures and cases", alone=False),
+    ),
     "export": (
         Example("affinet export runs/kept --to parquet", "a folder of tables, runs/kept-parquet"),
         Example("affinet export runs/kept --to mcap --out kept.mcap", "for Foxglove and PlotJuggler"),

@@ -15,6 +15,7 @@ from affinet.cli import (
     listing,
     many_runs,
     rendering,
+    reporting,
     scaffolding,
     schemas,
     watching,
@@ -61,7 +62,18 @@ def parser() -> argparse.ArgumentParser:
     _add_coordinators(commands)
     _add_seats(commands)
     _add_conformance(commands)
-    for module in (watching, rendering, comparing, exporting, listing, schemas, scaffolding, doctoring, completing):
+    for module in (
+        watching,
+        rendering,
+        comparing,
+        reporting,
+        exporting,
+        listing,
+        schemas,
+        scaffolding,
+        doctoring,
+        completing,
+    ):
         module.add(commands)
     helping.end_with_examples(whole)
     return whole

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 
+from affinet.cli.commands import main
 from affinet.runtimes.run import fly
 from affinet.runtimes.viewers import WebViewer
 from netem.core.parts import parts
@@ -71,3 +72,25 @@ def test_where_nothing_is_streamed_no_swarm_is_seen(browser):
     with WebViewer() as web:
         found, _ = seen(browser, web.page, 10)
     assert not found
+
+
+@pytest.mark.parametrize(
+    ("size", "scheme"), [({"width": 1200, "height": 900}, "light"), ({"width": 390, "height": 844}, "dark")]
+)
+def test_a_report_is_seen_on_a_desk_and_on_a_telephone(size, scheme, browser, tmp_path):
+    out, wrong = tmp_path / "run", []
+    fly(plan_of("corridor", "time.dt=0.05", "time.duration=4"), "inprocess", out, lambda *_: None)
+    assert main(["report", str(out)]) == 0
+    with browser.new_page(viewport=size, color_scheme=scheme) as tab:
+        tab.on("pageerror", wrong.append)
+        tab.on("request", lambda request: request.url.startswith(("file:", "data:")) or wrong.append(request.url))
+        tab.goto(f"file://{out / 'report.html'}")
+        scene = tab.locator(".scene canvas")
+        last = scene.screenshot()
+        assert share(last, palette.LEADER) > 0.0
+        tab.locator(".scene input").fill("0")
+        assert scene.screenshot() != last
+        assert tab.locator(".scene output").input_value() == "0.00 s"
+        assert tab.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        tab.screenshot(path=tmp_path / "report.png", full_page=True)
+    assert wrong == []
