@@ -82,7 +82,7 @@ def test_a_report_is_seen_on_a_desk_and_on_a_telephone(size, scheme, browser, tm
     fly(plan_of("corridor", "time.dt=0.05", "time.duration=4"), "inprocess", out, lambda *_: None)
     assert main(["report", str(out)]) == 0
     with browser.new_page(viewport=size, color_scheme=scheme) as tab:
-        tab.on("pageerror", wrong.append)
+        tab.on("pageerror", lambda error: wrong.append(error))
         tab.on("request", lambda request: request.url.startswith(("file:", "data:")) or wrong.append(request.url))
         tab.goto(f"file://{out / 'report.html'}")
         scene = tab.locator(".scene canvas")
@@ -90,7 +90,7 @@ def test_a_report_is_seen_on_a_desk_and_on_a_telephone(size, scheme, browser, tm
         assert share(last, palette.LEADER) > 0.0
         tab.locator(".scene input").fill("0")
         assert scene.screenshot() != last
-        assert tab.locator(".scene output").input_value() == "0.00 s"
+        assert tab.locator(".scene output").inner_text() == "0.00 s"
         assert tab.evaluate("document.documentElement.scrollWidth") <= size["width"]
         tab.screenshot(path=tmp_path / "report.png", full_page=True)
     assert wrong == []
