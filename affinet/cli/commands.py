@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import errno
 import json
-import operator
 import sys
 import tempfile
 import traceback
@@ -17,7 +16,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict
 from datetime import timedelta
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -27,6 +25,7 @@ from affinet.cli import (
     doctoring,
     exporting,
     helping,
+    hunting,
     listing,
     machines,
     many_runs,
@@ -39,6 +38,7 @@ from affinet.cli import (
     terminal,
     watching,
 )
+from affinet.cli.given import overrides, scenario
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan, PlanError
 from affinet.planning.programs import refuse_in_process
@@ -49,11 +49,10 @@ from affinet.runtimes.machines import hosts
 from affinet.runtimes.machines.place import Refused
 from affinet.runtimes.machines.spread import Spread
 from affinet.runtimes.rerun_command import NoViewer
-from affinet.runtimes.run import Runtime, evidence, fly
+from affinet.runtimes.run import Runtime, fly
 from affinet.scenario import files, loading
-from affinet.scenario.overrides import SHORT
-from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.scenario.words import among, one_line
+from affinet.scenario.sections import ScenarioError
+from affinet.scenario.words import one_line
 from affinet.studies import fit
 from affinet.verdicts import compare
 from affinet.verdicts.outcome import claim, refuse_taken
@@ -66,8 +65,6 @@ from netem.wire.session import CENTRE, CONTROL, COORDINATOR, DRIVER, HUB, WORLD,
 from world.books import history
 
 if TYPE_CHECKING:
-    from affinet.testing.hunt import Counterexample
-    from affinet.verdicts.checking import Checker
     from affinet.verdicts.outcome import Outcome
 
 PASS, FAIL, BAD_INPUT, USER_CODE, INTERRUPTED = 0, 1, 2, 3, 130
@@ -95,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(helping.guide(parser), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
     try:
-        status = _COMMANDS[parsed.command](parsed)
+        status = _COMMANDS[parsed.command](parsed) or PASS
     except (ScenarioError, PlanError, NoViewer, NotFlying, NotTrusted, Refused, history.Damaged) as error:
         print(one_line(str(error)), file=sys.stderr)  # noqa: T201
         return BAD_INPUT
@@ -147,18 +144,9 @@ def _refused(error: RuntimeError) -> str | None:
     return None
 
 
-def _overrides(parsed: argparse.Namespace) -> list[str]:
-    given = {key: getattr(parsed, word, None) for word, key in SHORT.items()}
-    return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
-
-
-def _scenario(parsed: argparse.Namespace, more: Sequence[str] = ()) -> Scenario:
-    return loading.load(parsed.scenario, [*_overrides(parsed), *more], files.working_directory())
-
-
 def _check(parsed: argparse.Namespace) -> int:
     try:
-        findings: Sequence[Finding] = planning.make(_scenario(parsed)).findings
+        findings: Sequence[Finding] = planning.make(scenario(parsed)).findings
     except PlanError as error:
         findings = error.findings
         print(one_line(f"{parsed.scenario}: cannot fly: {error}"), file=sys.stderr)  # noqa: T201
@@ -173,13 +161,13 @@ def _check(parsed: argparse.Namespace) -> int:
 
 def _run(parsed: argparse.Namespace) -> int:
     if many_runs.are_asked_for(parsed):
-        return PASS if many_runs.fly(parsed, lambda more: _scenario(parsed, more)) else FAIL
-    plan = planning.make(_scenario(parsed))
+        return PASS if many_runs.fly(parsed, lambda more: scenario(parsed, more)) else FAIL
+    plan = planning.make(scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed)
 
 
 def _world(parsed: argparse.Namespace) -> int:
-    plan = planning.make(_scenario(parsed))
+    plan = planning.make(scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed, machines.typed(plan, parsed))
 
 
@@ -187,18 +175,18 @@ def _hosts(parsed: argparse.Namespace) -> int:
     read = hosts.load(parsed.file)
     folder = parsed.file.absolute().parent
     parsed.scenario = parsed.scenario or read.scenario_from(folder)
-    plan = planning.make(_scenario(parsed))
+    plan = planning.make(scenario(parsed))
     return _fly(plan, Path(parsed.scenario).stem, parsed, machines.started(plan, read, folder))
 
 
 def _replay(parsed: argparse.Namespace) -> int:
-    overrides = _overrides(parsed)
+    changes = overrides(parsed)
     from netem.medium.journal import JournalError  # pyarrow takes a while to import
 
-    plan = planning.again(parsed.directory, overrides, verdicts=parsed.verdicts, folder=files.working_directory())
+    plan = planning.again(parsed.directory, changes, verdicts=parsed.verdicts, folder=files.working_directory())
     flown = parsed.directory / history.ARRAYS
     by_the_clock = "real" in (plan.scenario.time.mode, loading.resolved(parsed.directory).time.mode)
-    before = history.load(flown) if flown.exists() and (by_the_clock or not overrides) else None
+    before = history.load(flown) if flown.exists() and (by_the_clock or not changes) else None
     for finding in plan.findings:
         if finding.check == "inputs":
             print(one_line(f"note: {finding.says}"), file=sys.stderr)  # noqa: T201
@@ -210,7 +198,7 @@ def _replay(parsed: argparse.Namespace) -> int:
     if by_the_clock and before is not None and again.exists():  # what comes of a clock comes once
         print(compare.distance(before, history.load(again)), file=sys.stderr)  # noqa: T201
         return status
-    if overrides:
+    if changes:
         return status  # it was to be another run
     if before is None or not again.exists():
         gone = flown if before is None else again
@@ -222,28 +210,8 @@ def _replay(parsed: argparse.Namespace) -> int:
     return status if difference is None else FAIL
 
 
-def _watch(parsed: argparse.Namespace) -> int:
-    watching.watch(parsed.directories, serve=parsed.serve)
-    return PASS
-
-
-def _render(parsed: argparse.Namespace) -> int:
-    rendering.render(parsed)
-    return PASS
-
-
-def _compare(parsed: argparse.Namespace) -> int:
-    comparing.compare(parsed)
-    return PASS
-
-
-def _report(parsed: argparse.Namespace) -> int:
-    reporting.report(parsed)
-    return PASS
-
-
 def _check_determinism(parsed: argparse.Namespace) -> int:
-    plan = planning.make(_scenario(parsed))
+    plan = planning.make(scenario(parsed))
     runs: list[Runtime] = ["inprocess", "inprocess", "processes"]
     with tempfile.TemporaryDirectory(prefix="affinet-") as folder:
         flown = []
@@ -284,53 +252,6 @@ def _fit(parsed: argparse.Namespace) -> int:
     model = fit.inputs(parsed.directory, parsed.order)
     print(json.dumps(asdict(model)) if parsed.json else "\n".join(fit.overrides(model)))  # noqa: T201
     return PASS
-
-
-def _hunt(parsed: argparse.Namespace) -> int:
-    from affinet.testing import hunt, strategies  # hypothesis takes a while to import
-    from affinet.verdicts import invariants
-
-    given = _scenario(parsed)
-    invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
-    verbs = parsed.verbs or list(strategies.VERBS)
-    if strangers := sorted(set(verbs) - set(strategies.VERBS)):
-        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
-    if parsed.out and not parsed.out.parent.is_dir():
-        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
-    folder = parsed.out.absolute().parent if parsed.out else files.working_directory()
-    for name, lies_in in given.own_modules.items():
-        if folder != lies_in:
-            raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
-    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
-    with directories.unless_empty(file), show.HuntProgress(parsed.budget) as chase:
-        counterexample, coverage = hunt.hunt(
-            given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
-        )
-        if counterexample is not None:
-            with about(file):
-                file.write_text(loading.to_toml(counterexample.scenario), encoding="utf-8")
-    show.hunted(counterexample, coverage)
-    status = PASS if counterexample is None else _confirm(counterexample, invariant, file)
-    if parsed.json:
-        found = (
-            None
-            if counterexample is None
-            else {"scenario": str(file), "finding": str(counterexample.finding), "digest": counterexample.digest}
-        )
-        print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
-    return status
-
-
-def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> int:
-    plan = planning.make(loading.load(str(file)))
-    out = directories.for_run(file.stem)
-    with show.Progress(plan, file.stem, out) as watch:
-        flown = fly(plan, "processes", out, watch.see)
-    same = "the same bits" if flown.digest == counterexample.digest else "OTHER BITS"
-    landed = evidence(plan, flown)
-    found = invariant(landed) if landed else "; ".join(flown.reasons)
-    print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
-    return FAIL
 
 
 def _fly(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
@@ -383,20 +304,14 @@ def _keys(parsed: argparse.Namespace) -> int:
     return PASS
 
 
+def _hunt(parsed: argparse.Namespace) -> int:
+    return PASS if hunting.hunt_and_report(parsed) else FAIL
+
+
 def _conformance(parsed: argparse.Namespace) -> int:
     from affinet.cli import conforming  # large swarms and what designs them take a while to import
 
     return PASS if conforming.judge_and_report(parsed) else FAIL
-
-
-def _list(parsed: argparse.Namespace) -> int:
-    listing.print_list(parsed)
-    return PASS
-
-
-def _new(parsed: argparse.Namespace) -> int:
-    scaffolding.write(parsed)
-    return PASS
 
 
 def _doctor(parsed: argparse.Namespace) -> int:
@@ -408,24 +323,15 @@ def _completion(parsed: argparse.Namespace) -> int:
     return PASS
 
 
-def _schema(parsed: argparse.Namespace) -> int:
-    schemas.print_schema(parsed)
-    return PASS
-
-
-def _export(parsed: argparse.Namespace) -> int:
-    exporting.write(parsed)
-    return PASS
-
-
-_COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
+# Of each its exit status, where it is not always 0.
+_COMMANDS: Mapping[str, Callable[[argparse.Namespace], int | None]] = {
     "run": _run,
     "check": _check,
     "replay": _replay,
-    "watch": _watch,
-    "render": _render,
-    "compare": _compare,
-    "report": _report,
+    "watch": watching.watch,
+    "render": rendering.render,
+    "compare": comparing.compare,
+    "report": reporting.report,
     "check-determinism": _check_determinism,
     "hunt": _hunt,
     "study": _study,
@@ -437,10 +343,10 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "world": _world,
     **dict.fromkeys(("agent", "host", "netem"), machines.hold),
     "conformance": _conformance,
-    "list": _list,
-    "schema": _schema,
-    "new": _new,
+    "list": listing.print_list,
+    "schema": schemas.print_schema,
+    "new": scaffolding.write,
     "doctor": _doctor,
     "completion": _completion,
-    "export": _export,
+    "export": exporting.write,
 }

@@ -40,7 +40,7 @@ def add_live(command: argparse.ArgumentParser) -> None:
     )
 
 
-def watch(directories: Sequence[Path], *, serve: bool) -> None:
+def watch(parsed: argparse.Namespace) -> None:
     """Show what was flown until the viewer is closed, or the page no longer wanted.
 
     Raises
@@ -50,8 +50,8 @@ def watch(directories: Sequence[Path], *, serve: bool) -> None:
     NoViewer
         When nothing can be shown.
     """
-    with _files(directories) as files:
-        if not serve:
+    with _files(parsed.directories) as files:
+        if not parsed.serve:
             with ended_by_signals():
                 show(files)
             return
