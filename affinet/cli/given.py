@@ -12,7 +12,7 @@ from affinet.scenario.sections import Scenario
 
 def overrides(parsed: argparse.Namespace) -> list[str]:
     """What it changes."""
-    given = {key: getattr(parsed, word, None) for word, key in SHORT.items()}
+    given = {key: getattr(parsed, word) for word, key in SHORT.items()}
     return [*parsed.set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
 
 

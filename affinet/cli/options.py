@@ -84,11 +84,13 @@ def _add_overrides(command: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", help="override any key, like time.dt=0.02"
     )
     command.add_argument("--estimator", metavar="NAME", help="agents.estimator")
+    command.add_argument("--law", metavar="NAME", help="agents.law")
     command.add_argument(
         "--availability", metavar="P", help="network.availability, the probability that a message gets through"
     )
     command.add_argument("--seed", metavar="N", help="seed")
     command.add_argument("--duration", metavar="S", help="time.duration, in simulated seconds")
+    command.add_argument("--dt", metavar="S", help="time.dt, the length of a tick, in simulated seconds")
     command.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 
 

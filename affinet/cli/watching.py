@@ -52,8 +52,13 @@ def watch(parsed: argparse.Namespace) -> None:
     """
     with _files(parsed.directories) as files:
         if not parsed.serve:
-            with ended_by_signals():
-                show(files)
+            try:
+                with ended_by_signals():
+                    show(files)
+            except NoViewer as error:
+                raise NoViewer(
+                    f"{error}; --serve shows it in a browser, `affinet render` and `report` need neither"
+                ) from error
             return
         with WebViewer(files) as web:
             _until_asked(web, f"{web.page}\nserved until Ctrl-C")
@@ -105,7 +110,8 @@ def _files(directories: Sequence[Path]) -> Iterator[list[Path]]:
 def _recording(directory: Path) -> list[Path]:
     loading.resolved(directory)
     if not (files := parts(directory / RECORDING)):
-        raise ScenarioError(f"{directory}: no {RECORDING} in it: it was flown with record.enabled=false, or cut short")
+        why = "it was flown with record.enabled=false, or cut short; `affinet render` and `report` need none"
+        raise ScenarioError(f"{directory}: no {RECORDING} in it: {why}")
     return files
 
 

@@ -142,7 +142,7 @@ def make(kind: str, name: str, folder: Path) -> tuple[list[Path], list[str]]:
 
 def _words(name: str, kind: str) -> dict[str, str]:
     if not _NAME.fullmatch(name):
-        raise ScenarioError(f"{name!r} is no name for a {kind}: give small letters, figures and dashes, like my-{kind}")
+        raise ScenarioError(f"{name!r} is no name: give small letters, figures and dashes, like my-{kind}")
     written = name.replace("-", "_")
     return {"name": name, "module": written, "Class": "".join(part.capitalize() for part in written.split("_"))}
 

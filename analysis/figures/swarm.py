@@ -181,7 +181,18 @@ def still(flights: Sequence[Flight], seconds: float, file: Path | IO[bytes]) -> 
 
 
 def film(flights: Sequence[Flight], moments: Array, frames_per_s: int, path: Path) -> Iterator[int]:
-    """Many moments, shape (F,), as .mp4 or .gif; yields the number of each frame once it is drawn.
+    """Many moments as .mp4 or .gif; yields the number of each frame once it is drawn.
+
+    Parameters
+    ----------
+    flights
+        What is drawn.
+    moments
+        In seconds, shape (F,).
+    frames_per_s
+        How many are shown in a second.
+    path
+        The file.
 
     Raises
     ------

@@ -108,7 +108,10 @@ def test_no_temporary_file_is_left(runs, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("made", "line"),
-    [(False, "nowhere"), (True, "no run.rrd in it: it was flown with record.enabled=false, or cut short")],
+    [
+        (False, "nowhere"),
+        (True, "no run.rrd in it: it was flown with record.enabled=false, or cut short; `affinet render`"),
+    ],
 )
 def test_what_cannot_be_watched_is_refused(made, line, tmp_path, capsys):
     out = tmp_path / "nowhere"
