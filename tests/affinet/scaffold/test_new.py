@@ -158,9 +158,9 @@ def test_a_schema_that_is_there_stays(folder):
         (
             "scenario",
             "My Maze",
-            "'My Maze' is no name for a scenario: give small letters, figures and dashes, like my-scenario",
+            "'My Maze' is no name: give small letters, figures and dashes, like my-scenario",
         ),
-        ("scenario", "../maze", "'../maze' is no name for a scenario: "),
+        ("scenario", "../maze", "'../maze' is no name: "),
         ("estimator", "numpy", "numpy is a module already: choose another name, like my-numpy"),
         ("law", "lambda", "lambda is a word of Python: choose another name, like my-lambda"),
         ("project", "json", "json is a module already: choose another name, like my-json"),
