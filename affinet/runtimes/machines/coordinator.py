@@ -267,12 +267,15 @@ class Coordinator:
         return Admitted(gone_after_s=self._gone_after_s, kernels=joining.plain_kernels(kernels.prepared()))
 
     def _admits(self, name: str, data: bytes) -> str | None:
-        """Give a seat to who asks for it; or why not."""
+        """Give a seat to who asks for it, or take it back from who has it; or why not."""
+        seat = self.seats[name]
+        if data == joining.GIVEN_BACK and seat.process is None:
+            seat.vacate()
+            return None
         try:
             asks: Any = joining.unpack(Joining, data)
         except WireError as error:
             return f"{error}; {_OTHER_AFFINET}"
-        seat = self.seats[name]
         if seat.joined is not None and seat.joined != asks:
             return f"{seat.where} has joined already: end its command first, and the run with it"
         if (difference := self._identity.difference(asks.identity)) is not None:

@@ -18,6 +18,7 @@ from netem.wire.wrong import WireError
 T = TypeVar("T")
 
 TABLE = ".arrows"  # how the names of tables end
+GIVEN_BACK = b""  # in place of `Joining`: the machine leaves the seat to another, before the run begins
 
 
 class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -22,8 +22,8 @@ from affinet.runtimes.child import RunFailed
 from affinet.runtimes.forked import NURSERY, Nursery, end_by
 from affinet.runtimes.machines import joining
 from affinet.runtimes.machines.identity import Identity, own
-from affinet.runtimes.machines.joining import Down, Failed, Joining, Leave, Say, Shut, Signal, Start
-from affinet.runtimes.machines.place import Place, of_folder, own_name
+from affinet.runtimes.machines.joining import Admitted, Down, Failed, Joining, Leave, Say, Shut, Signal, Start
+from affinet.runtimes.machines.place import Place, Refused, of_folder, own_name
 from affinet.runtimes.machines.seat import SILENT_S
 from affinet.runtimes.private import private_folder
 from netem.processes.supervised import BEAT_S
@@ -129,30 +129,38 @@ class Machine:
         os.close(self._wake)
 
     def join(self, wanted: Wanted) -> None:
-        """Take the seats, and make ready to fork."""
-        keys = str(Path(wanted.keys).absolute())
+        """Take the seats, all or none, and make ready to fork."""
         kernels: dict[str, list[list[int]]] = {}
-        for name in wanted.names:
-            place = self._stack.enter_context(Place(Login(wanted.connect, name, keys=keys), self._take))
-            self._places.append(place)
-            admitted = place.join(
-                Joining(
-                    seat=name,
-                    machine=own_name(),
-                    folder=str(self._folder),
-                    keys=keys,
-                    identity=wanted.identity or own(),
-                    scenario=wanted.scenario,
-                    listens=wanted.listen,
-                    clock=place.clock(),
-                )
-            )
-            for joined in self._places:  # to join takes a while where there are many
-                joined.beat()
-            kernels |= admitted.kernels
+        try:
+            for name in wanted.names:
+                admitted = self._take_seat(name, wanted)
+                for joined in self._places:  # to join takes a while where there are many
+                    joined.beat()
+                kernels |= admitted.kernels
+        except Refused:
+            for joined in self._places:
+                joined.give_back()
+            raise
         address = endpoints.over_machines(wanted.connect)
         threading.Thread(target=self._watch, args=(address, admitted.gone_after_s), daemon=True).start()
         self._start_nursery(kernels)
+
+    def _take_seat(self, name: str, wanted: Wanted) -> Admitted:
+        keys = str(Path(wanted.keys).absolute())
+        place = self._stack.enter_context(Place(Login(wanted.connect, name, keys=keys), self._take))
+        asks = Joining(
+            seat=name,
+            machine=own_name(),
+            folder=str(self._folder),
+            keys=keys,
+            identity=wanted.identity or own(),
+            scenario=wanted.scenario,
+            listens=wanted.listen,
+            clock=place.clock(),
+        )
+        admitted = place.join(asks)
+        self._places.append(place)
+        return admitted
 
     def run(self) -> None:
         """Start, relay and end processes as the coordinator says, until the run is over."""

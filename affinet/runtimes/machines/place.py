@@ -113,6 +113,11 @@ class Place:
             raise Refused(f"another affinet coordinates: {error}; install the same on both") from error
         return admitted
 
+    def give_back(self) -> None:
+        """Leave the seat to another machine, before the run begins."""
+        with suppress(Refused):  # the coordinator is gone, or finds out that we are
+            self._ask(seats.join(self.name), joining.GIVEN_BACK)
+
     def tell(self, message: Up) -> None:
         """Tell the coordinator."""
         self._up.say(joining.pack(message))

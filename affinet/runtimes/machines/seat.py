@@ -72,6 +72,11 @@ class Seat:
         """Tell its machine."""
         self.voice.say(joining.pack(message))
 
+    def vacate(self) -> None:
+        """It can be taken again."""
+        self.joined, self.was_closed = None, False
+        self.silent_s = self.gone_s = 0.0
+
     def lives(self, data: bytes) -> None:
         """Its machine says so."""
         self._heard.set()

@@ -10,6 +10,7 @@ from affinet.runtimes.child import RunFailed
 from affinet.runtimes.machines import identity, joining
 from affinet.runtimes.machines.coordinator import Coordinator
 from affinet.runtimes.machines.joining import Joining
+from affinet.runtimes.machines.machine import Machine, Wanted
 from affinet.runtimes.machines.place import Place, Refused, of_folder
 from affinet.runtimes.machines.remote import RemoteProcess
 from netem.wire import seats
@@ -192,3 +193,30 @@ def test_a_folder_gives_the_files_that_are_asked_for_and_none_beside_it(tmp_path
     assert of_folder(tmp_path / "there", joining.Part(name="journal.arrows", start=8)) == b"arrows"
     with pytest.raises(FileNotFoundError):
         of_folder(tmp_path / "there", joining.Part(name="../secret", start=0))
+
+
+def test_a_command_that_is_refused_one_seat_leaves_the_others_to_who_types_it_right(
+    coordinator, place, keys, tmp_path, monkeypatch
+):
+    """Before it kept them, and the run was given up as if a link were cut."""
+    monkeypatch.setattr("affinet.runtimes.machines.machine.signal.signal", lambda *_: None)  # this process goes on
+    wanted = {"connect": coordinator._login.endpoint, "keys": keys}
+    with place("agent-2") as taken:
+        taken.join(asks("agent-2"))
+        with pytest.raises(Refused, match="agent 2 on the second has joined already"), Machine(tmp_path) as mistyped:
+            mistyped.join(Wanted(("agent-1", "agent-2"), **wanted))
+        assert coordinator.awaited == [HUB, "agent-1"]
+        coordinator.heed()
+        with place("agent-1") as right:
+            right.join(asks("agent-1"))
+            assert coordinator.awaited == [HUB]
+
+
+def test_a_seat_whose_process_runs_is_not_given_back(coordinator, place, tmp_path):
+    with place("agent-1") as at, (tmp_path / "log").open("wb") as log:
+        at.join(asks("agent-1"))
+        process = coordinator.start("agent-1", "agent 1", log)
+        at.give_back()
+        assert "agent-1" not in coordinator.awaited
+        process.stdin.close()
+        process.stdout.close()
