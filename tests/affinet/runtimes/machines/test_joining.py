@@ -200,16 +200,14 @@ def test_a_command_that_is_refused_one_seat_leaves_the_others_to_who_types_it_ri
 ):
     """Before it kept them, and the run was given up as if a link were cut."""
     monkeypatch.setattr("affinet.runtimes.machines.machine.signal.signal", lambda *_: None)  # this process goes on
-    wanted = {"connect": coordinator._login.endpoint, "keys": keys}
-    with place("agent-2") as taken:
-        taken.join(asks("agent-2"))
-        with pytest.raises(Refused, match="agent 2 on the second has joined already"), Machine(tmp_path) as mistyped:
-            mistyped.join(Wanted(("agent-1", "agent-2"), **wanted))
-        assert coordinator.awaited == [HUB, "agent-1"]
-        coordinator.heed()
-        with place("agent-1") as right:
-            right.join(asks("agent-1"))
-            assert coordinator.awaited == [HUB]
+    wanted = Wanted(("agent-1", HUB), coordinator._login.endpoint, keys)
+    with pytest.raises(Refused, match="the medium has to listen"), Machine(tmp_path) as mistyped:
+        mistyped.join(wanted)
+    assert "agent-1" in coordinator.awaited
+    coordinator.heed()
+    with place("agent-1") as right:
+        right.join(asks("agent-1"))
+        assert "agent-1" not in coordinator.awaited
 
 
 def test_a_seat_whose_process_runs_is_not_given_back(coordinator, place, tmp_path):
