@@ -216,17 +216,18 @@ def _columns(path: Path, known: Sequence[str]) -> dict[str, Array]:
     )
     try:
         table = csv.read_csv(path, convert_options=options)
+        names = table.column_names  # which may not be UTF-8
     except (pa.ArrowInvalid, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: no CSV file of numbers: {' '.join(str(error).split())}") from error
-    if strange := [name for name in table.column_names if name not in known]:
+    if strange := [name for name in names if name not in known]:
         raise ValueError(f"{path}: no column {strange[0]!r} in such a log; {among(strange[0], known)}")
-    if twice := [name for name in known if table.column_names.count(name) > 1]:
+    if twice := [name for name in known if names.count(name) > 1]:
         raise ValueError(f"{path}: it has more than one column {twice[0]!r}")
-    if missing := [name for name in _WHO[:2] if name not in table.column_names]:
+    if missing := [name for name in _WHO[:2] if name not in names]:
         raise ValueError(f"{path}: it has no column {missing[0]!r}")
     nothing = np.full(len(table), np.nan)
     columns: dict[str, Any] = dict.fromkeys(known, nothing)
-    for name in table.column_names:
+    for name in names:
         columns[name] = table[name].fill_null(np.nan).to_numpy()
     for name, column in columns.items():
         if (beyond := np.abs(column) > (_LATEST if name == "time" else LARGEST)).any():

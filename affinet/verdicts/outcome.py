@@ -25,6 +25,7 @@ from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.medium import JOURNAL
 from netem.medium.verdict import Verdict
 from netem.processes import system_errors
+from netem.processes.whole import whole
 from world.books import history
 from world.books.history import Arrays, by_span, digest
 
@@ -109,8 +110,8 @@ class Outcome:
             When it cannot be written.
         """
         path = Path(self.out) / SUMMARY
-        with system_errors.about(path):
-            path.write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
+        with system_errors.about(path), whole(path) as unfinished:  # of a full disk no empty one is left
+            unfinished.write_text(json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n")
 
 
 def judge(

@@ -18,7 +18,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from netem.processes.system_errors import about
 from netem.processes.whole import whole
-from netem.wire.certificates import AUTHORITY, NotTrusted, read_certificate, read_key
+from netem.wire.certificates import AUTHORITY, NotTrusted, read_certificate, read_key, refuse_open
 from netem.wire.session import COORDINATOR, HUB, LOOPBACK
 
 _ALLOWED_SKEW = timedelta(hours=1)  # clocks of other machines
@@ -102,6 +102,7 @@ def _authority(
             f"or remove {path if path.exists() else key_path} to begin anew"
         )
     if path.exists():
+        refuse_open(key_path)
         authority = read_certificate(path)
         if authority.not_valid_after_utc < ends:
             raise NotTrusted(

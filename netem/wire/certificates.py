@@ -72,7 +72,7 @@ class Certificates:
             When one is missing or no certificate, or others may read the key, or they do not belong together, or the time of
             one is over.
         """
-        _refuse_open(self.key)
+        refuse_open(self.key)
         authority, own = read_certificate(self.authority), read_certificate(self.certificate)
         for path, certificate in ((self.authority, authority), (self.certificate, own)):
             _refuse_out_of_time(path, certificate)
@@ -132,7 +132,14 @@ def common_name(certificate: Certificate) -> str:
     return str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
 
 
-def _refuse_open(key: Path) -> None:
+def refuse_open(key: Path) -> None:
+    """Refuse a key that is not there, or that others may read.
+
+    Raises
+    ------
+    NotTrusted
+        Which, and what to do.
+    """
     try:
         mode = stat.S_IMODE(key.stat().st_mode)
     except FileNotFoundError as error:

@@ -319,6 +319,14 @@ def test_what_is_no_log_of_this_flight_is_refused(
         making.make(loading.load("corridor", [*SHORT, *recorded(log)]))
 
 
+def test_a_log_that_is_not_utf8_is_refused_by_its_name(rows: list[Row], tmp_path: Path) -> None:
+    """Before: what was wrong with a byte, of no file."""
+    log = logs.written(tmp_path / "log.csv", rows)
+    log.write_bytes(log.read_bytes().replace(b"time", b"h\xf6he", 1))
+    with pytest.raises(ScenarioError, match=r"recorded\.flight: .*log\.csv: no CSV file of numbers"):
+        making.make(loading.load("corridor", [*SHORT, *recorded(log)]))
+
+
 @pytest.mark.parametrize(
     ("overrides", "says"),
     [

@@ -47,3 +47,13 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path, capsys):
     (tmp_path / "file").touch()
     assert main(["keys", str(tmp_path / "file" / "keys")]) == 2
     assert str(tmp_path / "file" / "keys") in capsys.readouterr().err
+
+
+def test_an_authority_whose_key_others_may_read_makes_no_certificates(tmp_path, capsys):
+    folder = tmp_path / "keys"
+    assert main(["keys", str(folder), "--agents", "2"]) == 0
+    before = (folder / "agent-1.pem").read_bytes()
+    (folder / "authority.key").chmod(0o644)
+    assert main(["keys", str(folder), "--agents", "2"]) == 2
+    assert "authority.key: others may read it (mode 644)" in capsys.readouterr().err
+    assert (folder / "agent-1.pem").read_bytes() == before

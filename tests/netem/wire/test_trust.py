@@ -165,6 +165,7 @@ def expired(folder, certified):
     for name in ("authority.pem", "authority.key"):
         folder.mkdir(mode=0o700, exist_ok=True)
         (folder / name).write_bytes(Path(certified.login(HUB).keys, name).read_bytes())
+        (folder / name).chmod(0o600)
     authority.make(folder, ["agent-1"], [], timedelta(seconds=-1))
 
 
