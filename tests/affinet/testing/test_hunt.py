@@ -7,7 +7,7 @@ from flying import PROCESSES, digest_of
 from hypothesis import HealthCheck, given, settings
 from scripted import timeline
 
-from affinet.cli import commands
+from affinet.cli import commands, hunting
 from affinet.scenario import loading
 from affinet.scenario.sections import ScenarioError
 from affinet.testing import hunt, strategies
@@ -55,7 +55,7 @@ def test_a_hunt_shrinks_writes_and_confirms_the_smallest_fault(den, capsys):
 def test_the_smallest_is_named_after_its_scenario_where_no_file_is_named(den, monkeypatch):
     smallest = hunt.Counterexample(CORRIDOR, CheckResult("bounded(5)", "fail", 3, "x"), "digest")
     monkeypatch.setattr(hunt, "hunt", lambda *_, **__: (smallest, hunt.Coverage()))
-    monkeypatch.setattr(commands, "_confirm", lambda *_: 1)
+    monkeypatch.setattr(hunting, "_confirm", lambda *_: None)
     assert commands.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
     assert said(loading.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
 
