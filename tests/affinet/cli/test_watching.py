@@ -15,6 +15,7 @@ from urllib.parse import parse_qs, urlsplit
 import psutil
 import pytest
 from flying import plan_of
+from recorded import chunks_of, column, rows
 from rerun import escape_entity_path_part
 from rerun.chunk import RrdReader
 
@@ -57,15 +58,9 @@ def viewer(tmp_path, monkeypatch):
     return install
 
 
-def rows(file):
-    """How many rows there are of each entity, and what does not change."""
-    changing, static = Counter(), {}
-    for chunk in RrdReader(str(file)).stream().to_chunks():
-        if chunk.is_static:
-            static[str(chunk.entity_path)] = chunk.to_record_batch()
-        elif not str(chunk.entity_path).startswith("/__"):
-            changing[str(chunk.entity_path)] += chunk.num_rows
-    return changing, static
+def changing(file):
+    """How many rows there are of each entity that changes, of all that is no property."""
+    return Counter({path: number for path, number in rows(file)[0].items() if not path.startswith("/__")})
 
 
 def test_one_run_is_shown_as_it_was_recorded(runs, viewer):
@@ -80,19 +75,15 @@ def test_several_runs_are_one_recording_with_a_part_for_each(runs, tmp_path, mon
     kept = tmp_path / "together.rrd"
     monkeypatch.setattr(watching, "show", lambda files: kept.write_bytes(files[0].read_bytes()))
     assert main(["watch", str(runs / "a" / "night run"), str(runs / "b" / "night run"), str(runs / "places")]) == 0
-    found, static = rows(kept)
     names = {"night run (1)": "a/night run", "night run (2)": "b/night run", "places": "places"}
     expected = Counter()
     for name, out in names.items():
-        for path, number in rows(runs / out / "run.rrd")[0].items():
+        for path, number in changing(runs / out / "run.rrd").items():
             expected[f"/{escape_entity_path_part(name)}{path}"] = number
-    assert found == expected
-    named = {
-        path: batch.column("SeriesLines:names").to_pylist()[0]
-        for path, batch in static.items()
-        if path.endswith("/metrics/tracking_error")
-    }
-    assert sorted(named.values()) == [["night run (1)"], ["night run (2)"]]
+    assert changing(kept) == expected
+    paths = [f"/{escape_entity_path_part(name)}/metrics/tracking_error" for name in names]
+    named = [column(chunks_of(kept), path, "SeriesLines:names", static=True)[-1:] for path in paths]
+    assert named == [[["night run (1)"]], [["night run (2)"]], []]
     assert RrdReader(str(kept)).blueprints()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from flying import plan_of
-from rerun.chunk import RrdReader
+from recorded import chunks_of, column
 
 from affinet.runtimes.run import fly
 from netem.core.parts import parts
@@ -24,18 +24,12 @@ LATE = "network={availability=0.7, delay_ticks=3, zones=[{centre=[0.0, 0.0], rad
 def recorded(out, *overrides, name="corridor"):
     fly(plan_of(name, *overrides), "inprocess", out, lambda *_: None)
     (file,) = parts(out / "run.rrd")
-    return RrdReader(str(file)).stream().to_chunks(), load(out / ARRAYS)
+    return chunks_of(file), load(out / ARRAYS)
 
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("layers") / "run", "time.duration=1.6", FAULTS, LATE)
-
-
-def column(chunks, path, name, *, static=False):
-    found = [chunk.to_record_batch() for chunk in chunks if str(chunk.entity_path) == path]
-    batches = [batch for batch, chunk in zip(found, _of(chunks, path), strict=True) if chunk.is_static == static]
-    return [value for batch in batches if name in batch.schema.names for value in batch.column(name).to_pylist()]
 
 
 def _of(chunks, path):

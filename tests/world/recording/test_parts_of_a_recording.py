@@ -5,7 +5,7 @@ from collections import Counter
 
 import pytest
 from flying import plan_of
-from rerun.chunk import RrdReader
+from recorded import rows
 
 from affinet.runtimes.run import fly
 from netem.core.parts import parts
@@ -20,14 +20,6 @@ def flown(out, name):
     plan = plan_of(name, "time.dt=0.02", "time.duration=8", "record.every=1", FAULT)
     assert fly(plan, "inprocess", out, lambda *_: None).verdict != "fail"
     return parts(out / "run.rrd")
-
-
-def rows(file):
-    """How many rows there are of each entity, those that do not change apart."""
-    changing, static = Counter(), Counter()
-    for chunk in RrdReader(str(file)).stream().to_chunks():
-        (static if chunk.is_static else changing)[str(chunk.entity_path)] += chunk.num_rows
-    return changing, static
 
 
 @pytest.mark.parametrize("name", ["corridor", "localization", "target"])

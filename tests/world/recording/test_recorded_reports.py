@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 from pursuits import COARSE, NAME
-from rerun.chunk import RrdReader
+from recorded import chunks_of, column
 from scripted import timeline
 
 from affinet.runtimes.run import fly
@@ -18,12 +18,7 @@ from world.recording.target import _over_agents
 
 @cache
 def recorded(out):
-    return RrdReader(str(out / "run.rrd")).stream().to_chunks()
-
-
-def column(chunks, path, name):
-    found = [chunk.to_record_batch() for chunk in chunks if str(chunk.entity_path) == path and not chunk.is_static]
-    return [value for batch in found if name in batch.schema.names for value in batch.column(name).to_pylist()]
+    return chunks_of(out / "run.rrd")
 
 
 @pytest.fixture(scope="module")

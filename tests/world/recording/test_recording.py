@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flying import plan_of
+from recorded import column
 from rerun.chunk import RrdReader
 from scipy.stats import chi2
 
@@ -28,11 +29,6 @@ def flown(tmp_path_factory):
 @pytest.fixture(scope="module")
 def chunks(flown):
     return RrdReader(str(flown / "run.rrd")).stream().to_chunks()
-
-
-def column(chunks, path, name):
-    found = [chunk.to_record_batch() for chunk in chunks if str(chunk.entity_path) == path and not chunk.is_static]
-    return [value for batch in found if name in batch.schema.names for value in batch.column(name).to_pylist()]
 
 
 def test_it_holds_the_swarm_the_graphs_the_target_and_the_metrics(chunks):
