@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from affinet.studies.sweeping import Setting
 
 _VERDICTS = ("pass", "vacuous", "fail")
-_OF_ONE_RUN = ("out", "view", "runtime")
+_OF_ONE_RUN = ("out", "view", "serve", "runtime")
 
 
 def add_options(run: argparse.ArgumentParser) -> None:

@@ -136,6 +136,7 @@ def test_what_matters_of_others_is_in_place_of_the_tracking_error(scenario, quan
         (("--seeds", "1-2", "--seed", "3"), "--seed and --seeds: give the one or the other"),
         (("--seeds", "1-2", "--out", "x"), "--out is of one run, and --seeds, --sweep and --check fly many"),
         (("--seeds", "1-2", "--runtime", "processes"), "--runtime is of one run"),
+        (("--seeds", "1-2", "--serve"), "--serve is of one run"),
         (("--check", "bounded"), "invariant 'bounded': bounded is written with what it wants"),
     ],
 )
