@@ -20,8 +20,7 @@ from affinet.scenario.names import apart
 from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
 from netem.core.parts import parts
-
-RECORDING = "run.rrd"
+from world.recording.file import RECORDING
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

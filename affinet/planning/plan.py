@@ -20,6 +20,8 @@ from agents.timer import Timer
 from agents.wants import Wants
 from analysis.models.arrays import Mask
 from analysis.models.finding import Finding
+from analysis.models.information import reported
+from netem.core.channels import PLACE
 from netem.core.pace import Pace
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
@@ -108,11 +110,15 @@ class Plan:
     def books(self, viewer: str | None) -> RecordOptions:
         """How a run of it is written down, and streamed to a viewer that listens at this URL."""
         record = self.scenario.record
+        settings = f"```toml\n{to_toml(self.scenario)}```\n"
+        return RecordOptions(record.every, self.batch, self.window, record.enabled, viewer, settings, self.scenery)
+
+    @property
+    def batch(self) -> int:
+        """Ticks that are written down at once."""
         # Who is killed has lost a batch, and in real time what a thread was still to write, or another machine to give.
         seconds = _BATCH_S if self.pace is None else _BATCH_IN_REAL_TIME_S * min(1.0, self.pace.factor)
-        batch = min(_MOST_OF_A_BATCH, max(1, int(seconds / self.world.dt)))
-        settings = f"```toml\n{to_toml(self.scenario)}```\n"
-        return RecordOptions(record.every, batch, self.window, record.enabled, viewer, settings, self.scenery)
+        return min(_MOST_OF_A_BATCH, max(1, int(seconds / self.world.dt)))
 
     @property
     def scenery(self) -> Scenery:
@@ -150,6 +156,16 @@ class Plan:
     def positioned(self) -> Mask:
         """Which agents are told where they are, shape (N,): leaders, and all where estimator or law want it."""
         return (self.world.formation.is_leader | self.wants.position) & self.knows_positions
+
+    @property
+    def localizes(self) -> bool:
+        """Whether agents find out where they are."""
+        return PLACE in self.reports
+
+    @property
+    def pursues(self) -> bool:
+        """Whether agents find a target, and fly after it."""
+        return self.world.pursuit is not None and reported(self.reports)
 
     @property
     def may_have_gaps(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from affinet.scenario import values
 from affinet.scenario.keys import UNIT
 
 _KINDS: Mapping[Any, str] = {float: "number", int: "whole number", bool: "true or false", str: "text"}
@@ -98,16 +99,10 @@ def kind_of(hint: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A default as a file says it."""
-    match value:
-        case BaseModel():
-            return value.model_dump(mode="json", exclude_none=True)
-        case Enum():
-            return value.value
-        case list() | tuple():
-            return [plain(one) for one in value]
-        case Mapping():
-            return {str(name): plain(one) for name, one in value.items()}
-        case None | bool() | int() | float() | str():
-            return value
-    return repr(value)
+    """A default as a file says it; of what none can say, how Python writes it."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_none=True)
+    try:
+        return values.plain(value)
+    except TypeError:
+        return repr(value)

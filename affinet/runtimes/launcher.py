@@ -326,7 +326,7 @@ class Launcher:
             hosts=self._hosts,
             trust=self._trust,
             journal=str(self._folder(HUB, self._out) / JOURNAL),
-            batch=self._plan.books(self._viewer).batch,
+            batch=self._plan.batch,
             gaps=self._plan.may_have_gaps,
             pace=self._plan.pace,
             clock_s=self._clock_s(WORLD),

@@ -32,7 +32,7 @@ from netem.wire import keys
 from world.books import history
 from world.books.archive import Archive
 from world.books.history import History, Moments
-from world.recording.file import wrong_with
+from world.recording.file import RECORDING, wrong_with
 
 Runtime = Literal["processes", "inprocess"]
 Watch = Callable[[int, float], None]
@@ -114,7 +114,7 @@ def rehearse(plan: Plan) -> Evidence:
         raise PlanError([fits])
     swarm, flown = InProcessSwarm(plan), History(plan.world, channels, plan.reports)
     started = time.perf_counter()
-    swarm.fly(flown.extend, plan.books(None).batch)
+    swarm.fly(flown.extend, plan.batch)
     wall_s, arrays = time.perf_counter() - started, flown.arrays()
     accounts = outcome.accounts_of(arrays, swarm.in_flight)
     done = outcome.judge(
@@ -151,7 +151,7 @@ def _over_processes(
     launcher = Launcher(plan, out, watch=watch, viewer=viewer, interruption=interruption, spread=spread)
     flight = launcher.flight
     launcher.fly()
-    path, recording, book = out / history.ARRAYS, parts(out / "run.rrd"), out / JOURNAL
+    path, recording, book = out / history.ARRAYS, parts(out / RECORDING), out / JOURNAL
     failure, timeline, accounts = flight.failure, plan.timeline, None
     try:
         if book.exists():
@@ -167,7 +167,7 @@ def _over_processes(
         except (NotMended, NoViewer, OSError) as error:
             failure += f"; {said(error) if isinstance(error, OSError) else error}"
     if not failure and plan.scenario.record.enabled:
-        failure = wrong_with(recording[-1] if recording else out / "run.rrd")
+        failure = wrong_with(recording[-1] if recording else out / RECORDING)
     return outcome.judge(
         plan,
         timeline,

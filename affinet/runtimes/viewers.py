@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from urllib.parse import quote
 
 from affinet.runtimes.rerun_command import NoViewer, command, last_line
+from netem.processes.parent import signal_at_its_end
 
 _START_S = 10.0
 _LOOPBACK = "127.0.0.1"
-_GRACE_S = 2.0
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)  # found before a fork, in which it is used
+_LOOKED_AFTER_S, _GRACE_S = 0.02, 2.0
 
 
 def open_viewer() -> str:
@@ -110,7 +108,7 @@ class _Viewer:
             stdout=subprocess.DEVNULL,
             stderr=self._said,
             start_new_session=True,
-            preexec_fn=None if outlives else _end_with_parent,
+            preexec_fn=None if outlives else partial(signal_at_its_end, signal.SIGTERM),
         )
 
     def await_listening(self, ports: Sequence[int]) -> None:
@@ -118,10 +116,11 @@ class _Viewer:
         deadline = time.monotonic() + _START_S
         wrong = None
         while wrong is None and not all(map(_listens, ports)):
-            if self._process.poll() is not None:
+            try:
+                self._process.wait(_LOOKED_AFTER_S)
                 wrong = f"ended at once: {self._last_line()}"
-            elif time.monotonic() > deadline:
-                wrong = f"did not listen within {_START_S:g} s"
+            except subprocess.TimeoutExpired:
+                wrong = f"did not listen within {_START_S:g} s" if time.monotonic() > deadline else None
         if wrong:
             self.end()
             raise NoViewer(f"the Rerun viewer {wrong}")
@@ -148,11 +147,6 @@ class _Viewer:
     def _last_line(self) -> str:
         self._said.seek(0)
         return last_line(self._said.read())
-
-
-def _end_with_parent() -> None:
-    if sys.platform == "linux":
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _named(files: Sequence[Path]) -> list[str]:

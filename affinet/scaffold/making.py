@@ -50,6 +50,17 @@ class Scaffold:
     module: bool = False
 
 
+def _algorithm(key: str, word: str) -> Scaffold:
+    """A module of one, which has this key in scenarios; its class stands for a word in the template."""
+    return Scaffold(
+        {"$module.py": f"{key}.py", "$module.toml": "scenario.toml", "test_$module.py": "test_flown.py"},
+        _SHIPPED | {key: "$module:$Class", word: "$Class"},
+        (schema.SCENARIO_FILE,),
+        ("pytest test_$module.py", "affinet run $module.toml"),
+        module=True,
+    )
+
+
 KINDS: Mapping[str, Scaffold] = {
     "scenario": Scaffold(
         {"$module.toml": "scenario.toml"},
@@ -57,20 +68,8 @@ KINDS: Mapping[str, Scaffold] = {
         (schema.SCENARIO_FILE,),
         ("affinet check $module.toml", "affinet run $module.toml --runtime inprocess"),
     ),
-    "estimator": Scaffold(
-        {"$module.py": "estimator.py", "$module.toml": "scenario.toml", "test_$module.py": "test_flown.py"},
-        _SHIPPED | {"estimator": "$module:$Class", "Filter": "$Class"},
-        (schema.SCENARIO_FILE,),
-        ("pytest test_$module.py", "affinet run $module.toml"),
-        module=True,
-    ),
-    "law": Scaffold(
-        {"$module.py": "law.py", "$module.toml": "scenario.toml", "test_$module.py": "test_flown.py"},
-        _SHIPPED | {"law": "$module:$Class", "Law": "$Class"},
-        (schema.SCENARIO_FILE,),
-        ("pytest test_$module.py", "affinet run $module.toml"),
-        module=True,
-    ),
+    "estimator": _algorithm("estimator", "Filter"),
+    "law": _algorithm("law", "Law"),
     "study": Scaffold(
         {"$module.toml": "study.toml"},
         {"scenario": "corridor"},

@@ -12,7 +12,6 @@ from affinet.scenario.words import among
 from affinet.studies.batch import REPORT
 from affinet.studies.labelled import is_name, is_number, taken
 from analysis.claims.checks import Span
-from analysis.models.information import reported
 from analysis.models.reports import NIS
 from netem.core import channels
 from netem.faults import lie
@@ -250,7 +249,7 @@ def _quantity(key: str, quantity: str, planned: Sequence[Planned]) -> Iterator[W
                 f"{quantity!r} is of agents that find out where they are; nobody does in the case {named(case.labels)}",
             )
             return
-        if quantity in _PURSUED and (plan.world.pursuit is None or not reported(plan.reports)):
+        if quantity in _PURSUED and not plan.pursues:
             yield key, f"{quantity!r} is of agents that pursue a target; nobody does in the case {named(case.labels)}"
             return
 

@@ -28,8 +28,6 @@ from affinet.verdicts.evidence import Evidence
 from analysis.claims import intervals
 from analysis.claims.intervals import Interval
 from analysis.models.arrays import Array
-from analysis.models.information import reported
-from netem.core.channels import PLACE
 
 CONFIDENCE = 0.95
 _WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
@@ -175,9 +173,9 @@ def _executor(cases: Sequence[tuple[Case, Plan]], runs: int) -> Executor:
 
 def _quantity(plan: Plan) -> str:
     """What matters of agents that find out where they are, pursue a target, or keep a formation."""
-    if PLACE in plan.reports:
+    if plan.localizes:
         return "localization"
-    return "agreed" if plan.world.pursuit is not None and reported(plan.reports) else "error"
+    return "agreed" if plan.pursues else "error"
 
 
 def _of_runs(result: study.Result) -> Setting:

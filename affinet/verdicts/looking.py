@@ -11,8 +11,8 @@ from typing import Any
 from affinet.verdicts import outcome, pictured
 from affinet.verdicts.evidence import Evidence
 from netem.core.parts import parts
+from world.recording.file import RECORDING
 
-_RECORDING = "run.rrd"
 _HIGH = 560  # pixels
 
 
@@ -66,4 +66,4 @@ def _recording(run: Evidence) -> list[Path]:
     except (OSError, ValueError):
         return []
     is_its_own = isinstance(said, dict) and said.get("digest") == run.outcome.digest
-    return parts(out / _RECORDING) if is_its_own else []
+    return parts(out / RECORDING) if is_its_own else []

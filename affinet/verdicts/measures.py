@@ -8,7 +8,6 @@ from affinet.planning.plan import Plan
 from analysis.metrics import localization
 from analysis.metrics.errors import root_mean_square
 from analysis.models.arrays import Array
-from analysis.models.information import reported
 from netem.core import channels
 from netem.faults.timeline import Timeline
 from world.books.history import Arrays, by_span
@@ -37,10 +36,10 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
     """
     with np.errstate(over="ignore", invalid="ignore"):
         by_edge = _edge_errors(plan.world, arrays) if plan.may_have_gaps else {}
-        if channels.PLACE in plan.reports:
+        if plan.localizes:
             off = _off_places(plan, timeline, arrays)
             return by_edge | {"localization_error": figures(off[~np.isnan(off)])}
-        if _pursues(plan):
+        if plan.pursues:
             missed = _off_target(plan, arrays)
             return by_edge | {"goal_distance": figures(np.sqrt(arrays["error"])), "target_error": figures(missed)}
     return by_edge
@@ -49,15 +48,11 @@ def errors(plan: Plan, timeline: Timeline, arrays: Arrays) -> dict[str, Figures]
 def over_time(plan: Plan, timeline: Timeline, arrays: Arrays) -> tuple[str, Array]:
     """What matters of a run in each tick, shape (T,), with its name and unit."""
     with np.errstate(over="ignore", invalid="ignore"):
-        if channels.PLACE in plan.reports:
+        if plan.localizes:
             return "localization error (m)", _off_places(plan, timeline, arrays)
-        if _pursues(plan):
+        if plan.pursues:
             return "target error (m)", _off_target(plan, arrays)
     return "tracking error (m²)", arrays["error"]
-
-
-def _pursues(plan: Plan) -> bool:
-    return plan.world.pursuit is not None and reported(plan.reports)
 
 
 def _off_places(plan: Plan, timeline: Timeline, arrays: Arrays) -> Array:

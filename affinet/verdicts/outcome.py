@@ -28,9 +28,10 @@ from netem.processes import system_errors
 from netem.processes.whole import whole
 from world.books import history
 from world.books.history import Arrays, by_span, digest
+from world.recording.file import RECORDING
 
 SUMMARY = "summary.json"
-_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.ARRAYS, JOURNAL, "graph.arrows", "timing.arrows", "run.rrd")
+_LEFT_BY_A_RUN = (loading.FILE, SUMMARY, history.ARRAYS, JOURNAL, "graph.arrows", "timing.arrows", RECORDING)
 
 RunVerdict = Literal["pass", "fail", "vacuous"]
 

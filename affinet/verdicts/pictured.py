@@ -29,7 +29,7 @@ def flight(run: Evidence, title: str) -> Flight:
         position=run.position,
         target=run.arrays["target"],
         leaders=world.formation.is_leader,
-        edges=np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1,
+        edges=world.formation.ends,
         heard=np.stack([world.links.src, world.links.dst], axis=1) - 1,
         verdicts=run.arrays["verdicts"][:, 0],
         colours=_colours(),
@@ -49,10 +49,6 @@ def png(run: Evidence) -> bytes:
     return file.getvalue()
 
 
-def _colours() -> Sequence[tuple[str, tuple[float, float, float]]]:
-    codes = [palette.OF_VERDICT[verdict] for verdict in Verdict]
+def _colours() -> Sequence[tuple[str, str]]:
     names = ["" if verdict is Verdict.SILENT else verdict.label for verdict in Verdict]
-    return [
-        (name, ((code >> 24) / 255.0, (code >> 16 & 255) / 255.0, (code >> 8 & 255) / 255.0))
-        for name, code in zip(names, codes, strict=True)
-    ]
+    return [(name, palette.css(palette.OF_VERDICT[verdict])) for name, verdict in zip(names, Verdict, strict=True)]

@@ -9,7 +9,6 @@ import numpy as np
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
 from affinet.verdicts.evidence import Evidence
 from analysis.models.arrays import Array
-from analysis.models.information import reported
 
 
 def found(within: float, by: float = 0.0) -> Checker:
@@ -57,7 +56,7 @@ def _all_within(
     times(name, by=by)
 
     def check(evidence: Evidence) -> CheckResult:
-        if evidence.plan.world.pursuit is None or not reported(evidence.plan.reports):
+        if not evidence.plan.pursues:
             return CheckResult(name, "vacuous", None, "nobody pursued a target")
         span = span_of(evidence, by, None)
         steered = evidence.arrays["reference"][:, :, 0]

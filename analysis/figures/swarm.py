@@ -52,7 +52,7 @@ class Flight:
     verdicts
         What became of what, as rows of `colours`, shape (T, L).
     colours
-        Of each verdict, and its name, as RGB.
+        Of each verdict its name and colour; of one without a name nothing is said.
     error
         The quantity below, shape (T,), and what it is called.
     quantity
@@ -69,7 +69,7 @@ class Flight:
     edges: Integers
     heard: Integers
     verdicts: NDArray[np.uint8]
-    colours: Sequence[tuple[str, tuple[float, float, float]]]
+    colours: Sequence[tuple[str, str]]
     error: Array
     quantity: str
     walls: Sequence[Array]

@@ -15,7 +15,8 @@ from netem.core import arrow
 from netem.medium import deliveries, journal
 from netem.medium.medium import JOURNAL
 from world.books import history, timing
-from world.recording.logbook import GRAPH, GRAPH_SCHEMA, RECORDING
+from world.recording.file import RECORDING
+from world.recording.logbook import GRAPH, GRAPH_SCHEMA
 
 ARRAYS = "arrays"
 BOOK, DRAWN, SEEN = "journal", "graph", "recording"

@@ -73,6 +73,7 @@ STRONGEST_FIRST = (
     Verdict.UNSAID,
 )
 REASONS = tuple(kind for kind in Verdict if kind >= Verdict.DEAD)
+COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)  # of what was offered
 BY_THE_AIR = (Verdict.CLOSED, Verdict.RANGE, Verdict.JAMMED, Verdict.LISTED, Verdict.LOST, Verdict.OVERFLOW)
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.

@@ -10,13 +10,11 @@ nobody: that is for the launcher, who hears everybody (docs/decisions/0002).
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import queue
 import signal
 import struct
-import sys
 import threading
 import time
 from collections import Counter
@@ -28,6 +26,7 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 import msgpack
 
 from netem.core.plain import from_plain, to_plain
+from netem.processes.parent import signal_at_its_end
 from netem.processes.system_errors import said
 from netem.processes.user_code import UserCodeError
 
@@ -35,7 +34,6 @@ T = TypeVar("T")
 
 _LENGTH = struct.Struct("<I")
 _STDIN, _STDOUT, _STDERR = 0, 1, 2
-_PR_SET_PDEATHSIG = 1
 _LAST_RESORT_S = 2.0
 _LAST_WORDS = {"done", "failed", "user-code"}
 
@@ -191,8 +189,7 @@ class Supervisor:
 
 def go_on_without_a_launcher() -> None:
     """Have the system wake this process when the one that started it ends: stopped, it could not see its lifeline close."""
-    if sys.platform == "linux":  # elsewhere nothing wakes it
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
+    signal_at_its_end(signal.SIGCONT)
 
 
 def _leave(signum: int, _frame: FrameType | None) -> NoReturn:

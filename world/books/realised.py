@@ -74,7 +74,7 @@ class GraphWatch:
     def __init__(self, formation: Formation, links: Links, dt: float, window: int) -> None:
         self._formation, self._links = formation, links
         self._dt, self._window = dt, window
-        self._edges = np.array(formation.edges, dtype=np.int64).reshape(-1, 2)
+        self._edges = formation.ends + 1
         self._before: NDArray[np.int32] | None = None
 
     def follow(self, first: int, newest: NDArray[np.int32], timeline: Timeline, every: int = 1) -> Realised:

@@ -46,8 +46,8 @@ def compose(formation: Formation) -> Array:
     if spectrum.slowest(L[followers][:, followers], top)[0] < _SINGULAR * top:
         least = formation.dimension + 1
         raise NotRigid(f"its cliques do not hold together: the sum of their stresses has a nullity above {least}")
-    ends = np.array(formation.edges, dtype=np.int64).reshape(-1, 2) - 1
-    weights: Array = -np.asarray(L[ends[:, 0], ends[:, 1]]).ravel() / _rounded_up(top)
+    i, j = formation.ends.T
+    weights: Array = -np.asarray(L[i, j]).ravel() / _rounded_up(top)
     return weights
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from analysis.models.arrays import Array, Mask
+from analysis.models.arrays import Array, Integers, Mask
 
 Edges = tuple[tuple[int, int], ...]
 
@@ -51,6 +51,11 @@ class Formation:
     def is_leader(self) -> Mask:
         """Shape (N,)."""
         return np.isin(np.arange(1, self.agents + 1), self.leaders)
+
+    @cached_property
+    def ends(self) -> Integers:
+        """The two agents of each edge, as rows of arrays, from 0, shape (M, 2)."""
+        return np.array(self.edges, dtype=np.int64).reshape(-1, 2) - 1
 
 
 def _edges(text: str) -> Edges:

@@ -48,7 +48,7 @@ def own(formation: Formation, weights: Array) -> Array:
     weights
         What i gives j and what j gives i over each edge i-j, shape (M, 2).
     """
-    i, j = np.array(formation.edges, dtype=np.int64).reshape(-1, 2).T - 1
+    i, j = formation.ends.T
     L = np.zeros((formation.agents, formation.agents))
     L[i, j], L[j, i] = -weights.T
     L[np.diag_indices(formation.agents)] = -L.sum(axis=1)

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from world.recording import palette
+from world.recording.graphs import NARROW, WIDE
 from world.recording.layout import Curves, scene
 from world.recording.stage import TIMELINE
 
@@ -26,7 +27,6 @@ _COMPARED: Mapping[str, tuple[str, Sequence[str]]] = {
     "graph/connectivity": ("connectivity", ("sensing", "comms")),
     "graph/age": ("age of information (s)", ("sensing", "comms")),
 }
-_WIDE, _NARROW = 4.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def _copy(stream: rr.RecordingStream, run: RecordedRun) -> Iterator[str]:
 def _series(name: str, entity: str, number: int) -> rr.SeriesLines:
     _, series = _COMPARED[entity]
     names = [f"{name}, {one}" for one in series] or [name]
-    widths = [_WIDE, _NARROW] if series else [_NARROW]
+    widths = [WIDE, NARROW] if series else [NARROW]
     colours = np.array([palette.of_agents(number + 1)[-1]] * len(names), dtype=np.uint32)
     return rr.SeriesLines(names=names, colors=colours, widths=widths)
 

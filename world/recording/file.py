@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 from netem.processes import system_errors
 
+RECORDING = "run.rrd"  # in a run directory
 # A whole file ends with where its footer begins, how long that is, a checksum, this word, and that there is one footer.
 _ENDING = struct.Struct("<QQI8sI")
 _BEGINNING = 2**18  # bytes: the blueprint, and what does not change

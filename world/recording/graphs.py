@@ -8,7 +8,7 @@ import rerun as rr
 from world.recording import palette
 from world.recording.stage import Stage, Stretch
 
-_WIDE, _NARROW = 4.0, 1.5  # where both have the same values the wide one can be seen behind the narrow one
+WIDE, NARROW = 4.0, 1.5  # where both have the same values the wide one can be seen behind the narrow one
 
 
 class GraphCurves:
@@ -30,7 +30,7 @@ class GraphCurves:
         both = {
             "names": ["sensing", "comms"],
             "colors": np.array([palette.SENSING, palette.COMMS], dtype=np.uint32),
-            "widths": [_WIDE, _NARROW],
+            "widths": [WIDE, NARROW],
         }
         for path in ("graph/connectivity", "graph/joint_connectivity", "graph/age"):
             self._stage.still(path, rr.SeriesLines(**both))

@@ -7,13 +7,13 @@ import rerun as rr
 
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core.links import Links
-from netem.medium.verdict import REASONS, Verdict
+from netem.medium.verdict import COUNTED, Verdict
+from world.books.counted import per_tick
 from world.physics.world import World
 from world.recording import palette
 from world.recording.stage import Colours, Stage, Stretch, spatial
 
 _PALETTE = np.array([palette.OF_VERDICT[verdict] for verdict in Verdict], dtype=np.uint32)
-_COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 MOST_IN_A_MATRIX = 60  # agents, whose matrix is drawn
 _OLD_S = 1.0  # an age that is drawn as the oldest
 _FRESH, _STALE, _NEVER = np.array([61, 220, 132.0]), np.array([176, 42, 48.0]), np.array([70, 70, 82])
@@ -33,8 +33,7 @@ class Graph:
     """
 
     def __init__(self, stage: Stage, world: World) -> None:
-        self._stage, self._links = stage, world.links
-        self._edges = np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1
+        self._stage, self._links, self._ends = stage, world.links, world.formation.ends
 
     def begin(self) -> None:
         """Log what does not change, in a part of the recording that has nothing yet."""
@@ -50,7 +49,7 @@ class Graph:
         halves = np.stack([(receiver + sender) / 2, receiver], axis=-2)
         colours = _PALETTE[stretch.moments.verdicts[stretch.kept, 0]]
         self._stage.segments("swarm/graph/functional", stretch.time, halves, colours)
-        self._stage.segments("swarm/graph/nominal", stretch.time, position[:, self._edges])
+        self._stage.segments("swarm/graph/nominal", stretch.time, position[:, self._ends])
 
 
 class MessageCurves:
@@ -75,16 +74,12 @@ class MessageCurves:
 
     def log(self, stretch: Stretch) -> None:
         """Log consecutive ticks."""
-        verdicts = stretch.moments.verdicts
-        starts = np.arange(0, len(verdicts), self._every)
-        lengths = np.diff(np.append(starts, len(verdicts)))
-        for verdict in _COUNTED:
-            counts = (verdicts == verdict).sum(axis=(1, 2))
-            if verdict in self._told or counts.any():
-                if verdict not in self._told:
-                    self._told.add(verdict)
-                    self._name(verdict)
-                means = np.add.reduceat(counts, starts) / lengths
+        for verdict in COUNTED:
+            means = per_tick(stretch.moments.verdicts, verdict, self._every)
+            if verdict not in self._told and means.any():
+                self._told.add(verdict)
+                self._name(verdict)
+            if verdict in self._told:
                 self._stage.scalars(f"messages/{verdict.label}", stretch.time, means[:, None])
 
     def _name(self, verdict: Verdict) -> None:

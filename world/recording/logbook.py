@@ -20,11 +20,12 @@ from world.books.spans import Spans
 from world.books.timing import TimingWriter
 from world.brief import RecordOptions
 from world.physics.world import World
+from world.recording.file import RECORDING
 
 if TYPE_CHECKING:
     from world.recording.recorder import Recorder
 
-RECORDING, GRAPH = "run.rrd", "graph.arrows"
+GRAPH = "graph.arrows"
 GRAPH_SCHEMA = pa.schema(
     [
         ("tick", pa.int32()),

@@ -36,6 +36,11 @@ _OF_AGENTS = (
 MOST_APART = len(_OF_AGENTS)
 
 
+def css(colour: int) -> str:
+    """A colour as pages and pictures say it, without how much shows through."""
+    return f"#{colour >> 8:06x}"
+
+
 def of_agents(number: int) -> list[int]:
     """A colour for each of so many agents, which differ up to `MOST_APART` of them."""
     return [_OF_AGENTS[agent % MOST_APART] for agent in range(number)]

@@ -33,7 +33,6 @@ class Swarm:
         self._stage, self._formation = stage, world.formation
         order = world.body.build().order
         self._per_input = whole_power(_AHEAD_S, order) / math.factorial(order)
-        self._edges = np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1
         self._metres = _round_length(stage.reach / 4.0)
 
     def begin(self) -> None:
@@ -54,7 +53,7 @@ class Swarm:
     def log(self, stretch: Stretch) -> None:
         """Log consecutive ticks."""
         self._log_bodies(stretch)
-        self._stage.segments("swarm/target", stretch.time, spatial(stretch.target)[:, self._edges])
+        self._stage.segments("swarm/target", stretch.time, spatial(stretch.target)[:, self._formation.ends])
         flown = stretch.moments.input[stretch.kept]
         self._stage.arrows("swarm/input", stretch.time, stretch.position, self._per_input * flown)
         self._stage.segments("swarm/scale", stretch.time, self._bar(stretch.target))

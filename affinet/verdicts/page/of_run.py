@@ -12,10 +12,10 @@ from affinet.scenario.loading import to_toml
 from affinet.verdicts import measures, told
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.page import html, scene
-from netem.medium.verdict import REASONS, Verdict
+from netem.medium.verdict import COUNTED, Verdict
+from world.books.counted import per_tick
 from world.recording import palette
 
-_COUNTED = (Verdict.DELIVERED, Verdict.DELAYED, *REASONS)
 _MOST_IN_A_MATRIX = 40
 _BIN = 0.01  # of a run, over which messages are counted for a curve
 
@@ -43,9 +43,9 @@ def page(run: Evidence, directory: Path) -> str:
 
 
 def _scene(run: Evidence) -> str:
-    occurs = [verdict for verdict in _COUNTED if (run.arrays["verdicts"][:, 0] == verdict).any()]
-    named = [("leader", scene.css(palette.LEADER)), ("follower", scene.css(palette.FOLLOWER))]
-    named += [(verdict.label, scene.css(palette.OF_VERDICT[verdict])) for verdict in occurs]
+    occurs = [verdict for verdict in COUNTED if (run.arrays["verdicts"][:, 0] == verdict).any()]
+    named = [("leader", palette.css(palette.LEADER)), ("follower", palette.css(palette.FOLLOWER))]
+    named += [(verdict.label, palette.css(palette.OF_VERDICT[verdict])) for verdict in occurs]
     last = len(scene.shown(run)) - 1
     return (
         '<div class="scene"><canvas></canvas><div class="controls"><button type="button">play</button>'
@@ -58,20 +58,12 @@ def _curves(run: Evidence) -> str:
     quantity, values = measures.over_time(run.plan, run.timeline, run.arrays)
     moments = scene.shown(run)
     over = html.curves(
-        quantity, run.seconds[moments], [("", scene.css(palette.FOLLOWER), values[moments])], logarithmic=True
+        quantity, run.seconds[moments], [("", palette.css(palette.FOLLOWER), values[moments])], logarithmic=True
     )
-    verdicts = run.arrays["verdicts"]
     width = max(1, round(_BIN * run.ticks))
-    starts = np.arange(0, run.ticks, width)
-    lengths = np.diff(np.append(starts, run.ticks))
-    counted = []
-    for verdict in _COUNTED:
-        each = (verdicts == verdict).sum(axis=(1, 2))
-        if each.any():
-            counted.append(
-                (verdict.label, scene.css(palette.OF_VERDICT[verdict]), np.add.reduceat(each, starts) / lengths)
-            )
-    return html.section("Over time", over, html.curves("messages per tick, by verdict", run.seconds[starts], counted))
+    means = {verdict: per_tick(run.arrays["verdicts"], verdict, width) for verdict in COUNTED}
+    named = [(one.label, palette.css(palette.OF_VERDICT[one]), each) for one, each in means.items() if each.any()]
+    return html.section("Over time", over, html.curves("messages per tick, by verdict", run.seconds[::width], named))
 
 
 def _faults(run: Evidence) -> str:

@@ -30,17 +30,19 @@ def of_run(run: Evidence) -> dict[str, Any]:
         "position": _packed(position, np.float32),
         "target": _packed(target, np.float32),
         "verdicts": _packed(run.arrays["verdicts"][moments, 0], np.uint8),
-        "colours": [None if verdict is Verdict.SILENT else css(palette.OF_VERDICT[verdict]) for verdict in Verdict],
+        "colours": [
+            None if verdict is Verdict.SILENT else palette.css(palette.OF_VERDICT[verdict]) for verdict in Verdict
+        ],
         "leaders": world.formation.is_leader.tolist(),
-        "edges": (np.array(world.formation.edges, dtype=np.int64).reshape(-1, 2) - 1).tolist(),
+        "edges": world.formation.ends.tolist(),
         "heard": (np.stack([world.links.src, world.links.dst], axis=1) - 1).tolist(),
         "walls": [_seen(np.array(wall)).round(3).tolist() for wall in scenery.walls],
         "zones": [[*_seen(np.array(zone.centre)).tolist(), zone.radius] for zone in scenery.zones],
         "extent": np.nanmax(np.ptp(target, axis=1), axis=0).tolist(),
         "trail": round(_TRAIL_S / step),
         "speed": max(1.0, float(seconds[-1]) / _SHOWN_IN_S),
-        "gold": css(palette.LEADER),
-        "blue": css(palette.FOLLOWER),
+        "gold": palette.css(palette.LEADER),
+        "blue": palette.css(palette.FOLLOWER),
     }
 
 
@@ -49,11 +51,6 @@ def shown(run: Evidence) -> Integers:
     number = min(run.ticks, _MOST_MOMENTS)
     chosen: Integers = np.linspace(0, run.ticks - 1, number).round().astype(np.int64)
     return chosen
-
-
-def css(colour: int) -> str:
-    """A colour as a page says it."""
-    return f"#{colour >> 8:06x}"
 
 
 def _seen(places: Array) -> Array:

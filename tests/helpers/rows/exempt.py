@@ -106,7 +106,9 @@ EXEMPT = {
         world.books.localized.FirstMeasurements.edges world.books.realised.Realised.stabilised
         world.books.realised.GraphWatch.follow world.books.realised.realise world.recording.stage.Stage.points
         world.recording.stage.Stage.scalars world.recording.stage.Stage.arrows world.recording.stage.Stage.segments
-        world.recording.curves.EachAgent.log analysis.figures.swarm.film analysis.claims.checks.flat
+        world.recording.curves.EachAgent.log world.books.counted.per_tick world.formation.nominal.Formation.ends
+        analysis.figures.swarm.film
+        analysis.claims.checks.flat
         analysis.claims.checks.approaches
         analysis.claims.checks.lower analysis.claims.checks.ratio analysis.claims.checks.stays_below
         analysis.claims.checks.leaves analysis.claims.checks.exponential analysis.claims.checks.never_above
