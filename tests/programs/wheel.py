@@ -78,16 +78,25 @@ def refuse_strangers(wheel: Path) -> None:
 
 
 def built(folder: Path) -> Path:
-    """The wheel, as it is built from the repository; from the sdist it has to be the same."""
+    """The wheel, as it is built from the repository; from the sdist, and by pip, it has to be the same."""
     _run([uv(), "build", "--quiet", "--wheel", "--out-dir", folder / "repository", ROOT])
     _run([uv(), "build", "--quiet", "--out-dir", folder / "sdist", ROOT])
-    (wheel,), (other,) = (sorted((folder / name).glob("*.whl")) for name in ("repository", "sdist"))
-    one, two = (
-        {name: archive.read(name) for name in archive.namelist()} for archive in map(zipfile.ZipFile, (wheel, other))
-    )
-    if differ := sorted(name for name in one.keys() | two.keys() if one.get(name) != two.get(name)):
-        raise Failed(f"built from the sdist the wheel has other files: {', '.join(differ)}")
+    # pip gives the builder other hooks than uv does: once it could not import what it asked for.
+    _run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", folder / "pip", ROOT])
+    wheel, *others = (next((folder / name).glob("*.whl")) for name in ("repository", "sdist", "pip"))
+    files = contents(wheel)
+    for other in others:
+        if differ := sorted(name for name, _ in files.items() ^ contents(other).items()):
+            raise Failed(
+                f"built by way of {other.parent.name} the wheel has other files: {', '.join(dict.fromkeys(differ))}"
+            )
     return wheel
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    """The files of a wheel."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def installed(wheel: Path, folder: Path) -> Path:
