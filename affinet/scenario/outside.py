@@ -26,5 +26,7 @@ class ExternalSection(Section):
     """The command line of the driver, which says what is measured on the robots and has them fly what agents command."""
 
     driver: Annotated[str, AfterValidator(_command)] = key(
-        ..., "command line of the driver that says what is measured, and has the robots fly what agents command"
+        ...,
+        "command line of the driver that says what is measured on the robots, and has them fly what agents "
+        "command; it starts in the working directory of `affinet`",
     )

@@ -71,12 +71,16 @@ class FormationSection(Section):
     what j gives i.
     """
 
-    preset: str | None = key(None, "a formation by name, in place of nodes, edges and leaders")
+    preset: str | None = key(
+        None, "a formation by name, in place of nodes, edges and leaders: " + ", ".join(swarms.NAMES)
+    )
     nodes: Matrix | None = key(None, "nominal positions, two coordinates each, or three", "m")
     edges: list[Edge] | None = key(None, 'undirected, like "1-2"; wanted with nodes')
     leaders: list[int] | None = key(None, "agents that fly the manoeuvre; wanted with nodes, a preset has its own")
     weights: list[Finite] | Matrix | None = key(
-        None, "in place of the stress that is solved for, by edge: a number each, or [what i gives j, what j gives i]"
+        None,
+        "in place of the stress that is solved for, in the order of the edges i-j: a number each, or two "
+        "each, [what i gives j, what j gives i], never mixed",
     )
     scale: Positive = key(1.0, "factor on the nominal positions")
     start: Literal["targets", "origin"] = key(
@@ -106,7 +110,10 @@ class Keyframe(Section):
     theta: Matrix = key(..., "the map: targets are theta p_i + offset")
     offset: list[Finite] = key(..., "what is added", "m")
     angle: Finite | None = key(
-        None, "by how much theta p_i is turned, counterclockwise; in every keyframe, or in none", "rad"
+        None,
+        "by how much theta p_i is turned, counterclockwise, in space about the third axis; in every "
+        "keyframe, or in none. Entries of theta go straight: half a turn by them passes through a point",
+        "rad",
     )
 
 
@@ -183,16 +190,31 @@ class SensingSection(Section):
     It makes `samples` of them in a tick, and reports their mean.
     """
 
-    samples: Steps = key(1, "measurements of an edge in a tick, of which the sensor reports the mean")
+    samples: Steps = key(
+        1, "measurements of an edge in a tick, of which the sensor reports the mean: its covariance is R / samples"
+    )
     sigma: NotNegative | None = key(None, "standard deviation of a relative measurement, per axis", "m")
     covariance: Matrix | None = key(None, "or its covariance", "m2")
     sigma_range: Positive | None = key(None, "or the standard deviation of a range, with sigma_bearing", "m")
-    sigma_bearing: Bearing | None = key(None, "and of a bearing, in three dimensions of azimuth and elevation", "rad")
+    sigma_bearing: Bearing | None = key(
+        None,
+        "and of a bearing, in three dimensions of azimuth and elevation. The covariance of a measurement is "
+        "then exact ((4.3)-(4.4) of paper 004) and its own; for estimators that fit no map",
+        "rad",
+    )
     sigma_along: ShareOfDistance | None = key(
-        None, "or the standard deviation along the line of sight, as a share of the distance, with sigma_across"
+        None,
+        "or the standard deviation along the line of sight, as a share of the distance, with sigma_across "
+        "(section VII of paper 003)",
     )
     sigma_across: ShareOfDistance | None = key(None, "and across it, as a share of the distance")
-    sigma_direction: Bearing | None = key(None, "or that of a direction, of a sensor that says no distance", "rad")
+    sigma_direction: Bearing | None = key(
+        None,
+        "or that of a direction, in three dimensions to either side, of a sensor that says no distance: a "
+        "unit vector. For `edge-kf`, which begins at the nominal distance and finds the true one where "
+        "neighbours fly across the line of sight",
+        "rad",
+    )
 
     @model_validator(mode="after")
     def _whole(self) -> SensingSection:
@@ -237,12 +259,21 @@ class DynamicsSection(Section):
 
     model: BodyName = key(
         "single-integrator",
-        "how often bodies integrate their input to a position; a unicycle rolls along its heading, steered by velocities",
+        "how often bodies integrate their input (velocities, accelerations, jerks, snaps) to a position; "
+        "the latter two fly after a target, without leaders. unicycle: wheels that roll along a heading, in "
+        "two dimensions, steered by velocities",
     )
-    ahead: Positive | None = key(None, "of a unicycle: how far ahead of its wheels it is steered", "m")
+    ahead: Positive | None = key(
+        None,
+        "of a unicycle, which needs it: how far ahead of its wheels it is steered. It rolls as fast as its "
+        "heading has of the input, and turns at what is left of it by this length",
+        "m",
+    )
     disturbance: NotNegative | None = key(None, "standard deviation of the displacement per tick, per axis", "m")
     covariance: Matrix | None = key(None, "or its covariance", "m2")
-    kernel: KernelSection | None = key(None, "correlation of the displacements of agents, by their distance")
+    kernel: KernelSection | None = key(
+        None, "correlation Q_A of the displacements of agents by their distance, Q = Q_A x Q_D"
+    )
     persistence: Below1 = key(0.0, "correlation of a displacement with that of the tick before")
 
     @model_validator(mode="after")
@@ -283,17 +314,26 @@ class AgentsSection(Section):
     estimator: str = key(..., 'by name, or "module:Class" (`affinet list estimators`)')
     law: str = key(..., 'by name, or "module:Class" (`affinet list laws`)')
     leaders: Literal["pilot", "distances"] = key(
-        "pilot", "pilot: they fly the manoeuvre; distances: they keep their nominal distances from each other"
+        "pilot",
+        "pilot: they fly the manoeuvre; distances: they keep their nominal distances from each other, "
+        "anywhere, and must all see each other",
     )
     leader_gain: NotNegative = key(1.0, "pull of a leader toward its target; toward distances in 1/(s m2)", "1/s")
     limit: Positive | None = key(
         None, "the longest input, longer ones are shortened; m/s2 of double integrators", "m/s"
     )
-    per_process: Annotated[int, Field(ge=1, le=1000)] = key(1, "how many agents a process carries, as one batch")
-    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = key(
-        dict, "command lines of programs that fly some agents in place of ours, by their numbers"
+    per_process: Annotated[int, Field(ge=1, le=1000)] = key(
+        1, "how many agents a process carries, as one batch; the bits are the same"
     )
-    parameters: dict[str, dict[str, Any]] = key(dict, "a table for each estimator or law, by name")
+    programs: Annotated[dict[str, str], AfterValidator(of_agents)] = key(
+        dict,
+        "command lines of programs that fly some agents in place of ours, over processes, by their numbers: "
+        '{ "3" = "python my_agent.py" }; they start in the working directory of `affinet`',
+    )
+    parameters: dict[str, dict[str, Any]] = key(
+        dict,
+        "a table for each estimator or law, by name, like [agents.parameters.ga-rkf]; those not in use are checked too",
+    )
 
 
 class LinkSetting(Section):
@@ -345,11 +385,12 @@ class TrustSection(Section):
 
     wrong_messages: Literal["fail", "drop"] = key(
         "fail",
-        "a wrong message ends the run (fail), or is dropped and counted while the right one is waited for (drop)",
+        "fail: a wrong message ends the run, and the agent is named; drop: it is dropped and counted, and "
+        "the right one is waited for as long as `time.patience` lets it",
     )
     largest_message: Annotated[int, Field(ge=1 << 10, le=1 << 22)] = key(1 << 20, "what an agent may say at once", "B")
     messages_per_tick: Annotated[int, Field(ge=10, le=1_000_000)] = key(
-        100, "how many messages of an agent are looked at in a tick"
+        100, "how many messages of an agent are looked at in a tick; of more nothing is read"
     )
 
 

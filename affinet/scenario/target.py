@@ -55,8 +55,8 @@ class TargetSection(Section):
         None, "or the methods by turns, with numbers from 1, like [1, 2, 2]"
     )
     methods: list[Steps] | None = key(None, "or a method for each agent, with numbers from 1")
-    misses: Probability = key(0.0, "share of detections that find nothing")
-    false_positives: Probability = key(0.0, "share of detections that find something else")
+    misses: Probability = key(0.0, "share of all detections that find nothing")
+    false_positives: Probability = key(0.0, "share of all detections that find something else, missed or not")
     clutter: NotNegative = key(5.0, "how far about the target that lies, standard deviation per axis", "m")
 
     @model_validator(mode="after")
