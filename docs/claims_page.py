@@ -1,6 +1,6 @@
-"""docs/claims.md: what becomes of every numbered claim of the five papers, from `claims.toml` and what studies left.
+"""docs/claims.md and docs/claims/: what becomes of every numbered claim of the five papers, from `claims.toml` and studies.
 
-python docs/claims_page.py                      write the page
+python docs/claims_page.py                      write the pages
 python docs/claims_page.py NAME=DIRECTORY ...   take in full studies first, their verdicts and figures
 """
 
@@ -8,109 +8,94 @@ from __future__ import annotations
 
 import shutil
 import sys
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
 from textwrap import fill
-from typing import NamedTuple
 
-from pydantic import Field, model_validator
+from paper_claims import DOCS, OUTCOMES, PAPERS, Found, PaperClaim, outcome, paper_claims, verdicts
 
-from affinet.studies import judging, record
+from affinet.studies import record
 from affinet.studies import study as studies
 from affinet.studies.batch import REPORT
-from affinet.studies.record import CaseMean, JudgedClaim, Kept, StudyRecord
-from affinet.studies.study import Claim, Study
-from analysis.claims.intervals import Decision, all_of
+from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
+from affinet.studies.study import Study
+from analysis.claims.intervals import Decision
 
-DOCS = Path(__file__).parent
-PAGE = DOCS / "claims.md"
 PICTURES = DOCS / "pictures"
 _SIGNED = {"fall"}  # quantities that may be negative
 _MANY = 4  # cases that come out alike are counted
 _NOT_FLOWN = "not flown in full yet"
-NOT_ALL_FLOWN, NOT_JUDGED = "not all flown in full yet", "not judged"
-OUTCOMES = (*Decision, NOT_ALL_FLOWN, NOT_JUDGED)
+OWN = "own"  # of the page of studies that are no paper's
 RESULTS = DOCS.parent / "affinet" / "shipped" / "results"
-PAPERS = {
-    "000": "Robust affine formation control of multiagent systems",
-    "001": "Distributed Kalman filters for relative formation control",
-    "002": "Perception-latency aware distributed target tracking",
-    "003": "Distributed relative localization using the multi-dimensional weighted centroid",
-    "004": "Edge state Kalman filtering",
-}
 
 
-class PaperClaim(Kept):
-    """What a paper says somewhere, and what judges it: claims of a study, tests, or neither, for a reason."""
-
-    paper: str
-    where: str
-    says: str
-    study: str | None = None
-    claims: list[str] = Field(default_factory=list)
-    tests: list[str] = Field(default_factory=list)
-    why: str | None = None
-
-    @model_validator(mode="after")
-    def _judged(self) -> PaperClaim:
-        if self.paper not in PAPERS:
-            raise ValueError(f"{self.where}: no paper {self.paper!r}")
-        if bool(self.study) != bool(self.claims):
-            raise ValueError(f"{self.where}: a study and the claims of it go together")
-        if not (self.claims or self.tests or self.why):
-            raise ValueError(f"{self.where}: name the claims of a study, tests, or why it is not judged")
-        return self
-
-
-def paper_claims() -> list[PaperClaim]:
-    """All of `claims.toml`."""
-    text = (DOCS / "claims.toml").read_text(encoding="utf-8")
-    return [PaperClaim.model_validate(one) for one in tomllib.loads(text)["claims"]]
-
-
-def page() -> str:
-    """The page, from what is there."""
+def pages() -> dict[str, str]:
+    """Every page by its file in docs/, from what is there."""
     rows = paper_claims()
     named = {name: studies.load(name) for name in studies.shipped()}
-    lines = [
+    made = {
+        "claims.md": _overview(rows, named),
+        **{f"claims/{paper}.md": _of_paper(paper, rows, named) for paper in PAPERS},
+        f"claims/{OWN}.md": ["# Studies of our own", *_means(OWN, rows, named)],
+    }
+    return {file: "\n".join(lines) + "\n" for file, lines in made.items()}
+
+
+def _overview(rows: Sequence[PaperClaim], named: dict[str, Study]) -> Sequence[str]:
+    """What is judged and how, and how much came out."""
+    return [
         "# What becomes of the papers' claims",
         "",
-        "`python docs/claims_page.py` writes this page from `docs/claims.toml` and from the `claims.json` of full",
-        "studies, which are in `affinet/shipped/results/`. Whoever wants a verdict again flies the study that is beside",
-        "it: as many runs of the same draws, and the same bits. Intervals are of 99 % confidence; a claim holds where",
-        "all of its interval is inside what is asked, and is undecided where only a part is",
+        "`python docs/claims_page.py` writes this page, and one for each paper, from `docs/claims.toml` and from the",
+        "`claims.json` of full studies, which are in `affinet/shipped/results/`. Whoever wants a verdict again flies the",
+        "study that is beside it: as many runs of the same draws, and the same bits. Intervals are of 99 % confidence; a",
+        "claim holds where all of its interval is inside what is asked, and is undecided where only a part is",
         "([decision 22](decisions/0022-claims-hold-fail-or-are-undecided.md)). What is proved in a paper and computed",
         "exactly is judged by tests, against the formulas, other implementations, or the definition.",
         "",
         *_tally(rows, named),
+        "",
+        *(f"- [Paper {paper}](claims/{paper}.md): {title}" for paper, title in PAPERS.items()),
+        f"- [Studies of our own](claims/{OWN}.md)",
     ]
-    for paper, title in PAPERS.items():
-        lines += [
-            "",
-            f"## Paper {paper}: {title}",
-            "",
-            "| where | what it says | what was found | by |",
-            "|---|---|---|---|",
-        ]
-        lines += [_row(one, named) for one in rows if one.paper == paper]
-    lines += [
+
+
+def _of_paper(paper: str, rows: Sequence[PaperClaim], named: dict[str, Study]) -> Sequence[str]:
+    """The claims of a paper, and the means of its studies."""
+    return [
+        f"# Claims of paper {paper}",
+        "",
+        f"{PAPERS[paper]}.",
+        "[What is judged, and how](../claims.md); [what it means](../papers/index.md).",
+        "",
+        "| where | what it says | what was found | by |",
+        "|---|---|---|---|",
+        *(_row(one, named) for one in rows if one.paper == paper),
         "",
         "## Means of all cases",
-        "",
-        "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own,",
-        "which are with them. Verdicts on claims that no paper makes are beneath the means. An `estimation_error` is the",
-        "norm of the errors of all edges together; a `covariance_trace` is summed over all edges",
-        "([quantities](studies.md#a-study-of-your-own)).",
+        *_means(paper, rows, named),
     ]
+
+
+def _means(group: str, rows: Sequence[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
+    """Of the studies of a paper, or of our own."""
+    yield ""
+    yield "Over the runs of each case, and all of their time, with their intervals. Claims look at spans of their own, which"
+    yield "are with them. Verdicts on claims that no paper makes are beneath the means. An `estimation_error` is the norm of"
+    yield "the errors of all edges together; a `covariance_trace` is summed over all edges"
+    yield "([quantities](../studies.md#a-study-of-your-own))."
     of_papers = _asked_by_papers(rows, named)
     for name in named:
-        if full := record.full_study(name):
-            lines += ["", f"### {name}", "", *_whence(name, full), "", *_cases(full), *_scattered(full)]
-            lines += _own([claim for claim in full.claims if (name, claim.asked) not in of_papers])
-    return "\n".join(lines) + "\n"
+        if group_of(name) == group and (full := record.full_study(name)):
+            yield from ("", f"### {name}", "", *_whence(name, full), "", *_cases(full), *_scattered(full))
+            yield from _own([claim for claim in full.claims if (name, claim.asked) not in of_papers])
+
+
+def group_of(study: str) -> str:
+    """The paper whose claims a study is named for, or our own."""
+    return next((paper for paper in PAPERS if study.startswith(f"paper-{paper}")), OWN)
 
 
 def _asked_by_papers(rows: Iterable[PaperClaim], named: dict[str, Study]) -> set[tuple[str, str]]:
@@ -131,53 +116,6 @@ def _own(judged: Sequence[JudgedClaim]) -> Iterator[str]:
         yield "|---|---|"
     for claim in judged:
         yield f"| {claim.says} | {_said('', claim)} |"
-
-
-class Found(NamedTuple):
-    """What became of a claim of a study in one case: which claim, which case, and what was judged, if it was flown."""
-
-    says: str
-    case: str
-    judged: JudgedClaim | None
-
-
-def verdicts(one: PaperClaim, study: Study) -> Iterator[Found]:
-    """Every verdict on its claims, for each label.
-
-    Raises
-    ------
-    KeyError
-        When the study makes no such claim.
-    """
-    full = record.full_study(one.study or "")
-    found = {} if full is None else {claim.asked: claim for claim in full.claims}
-    for says in one.claims:
-        matching = [claim for claim in study.claims if claim.says == says]
-        if not matching:
-            raise KeyError(f"{one.study} makes no claim {says!r}")
-        for spelled in (spelled for claim in matching for spelled in judging.spelled_out(study, claim)):
-            labels, _, level = spelled.says.rpartition(says)
-            case = f"{labels.removesuffix(': ')}{level}".strip()
-            when = ", ".join(filter(None, (case, _window(spelled))))
-            yield Found(says, when, found.get(record.asked(study, spelled)))
-
-
-def _window(claim: Claim) -> str:
-    """When it is judged."""
-    if claim.until is not None:
-        return f"{claim.since:g} to {claim.until:g} s"
-    return f"from {claim.since:g} s on" if claim.since else ""
-
-
-def outcome(one: PaperClaim, study: Study | None) -> str:
-    """What became of a claim of a paper in all of its cases, and all that judges it; one of `OUTCOMES`."""
-    judged = [] if study is None else [found.judged for found in verdicts(one, study)]
-    if not (judged or one.tests):
-        return NOT_JUDGED
-    decided = all_of(each.decision for each in judged if each is not None) if any(judged) else Decision.HOLDS
-    if decided != Decision.DOES_NOT_HOLD and None in judged:
-        return NOT_ALL_FLOWN
-    return decided
 
 
 def _tally(rows: Sequence[PaperClaim], named: dict[str, Study]) -> Iterator[str]:
@@ -223,7 +161,7 @@ def _row(one: PaperClaim, named: dict[str, Study]) -> str:
     if one.study:
         for says, all_found in groupby(verdicts(one, named[one.study]), key=attrgetter("says")):
             said += _summed_up(says if len(one.claims) > 1 else "", list(all_found))
-        by.append(f"`affinet study {one.study}`" + _more(one.study))
+        by.append(f"`affinet study {one.study}`" + _more(one.study, one.paper))
     if one.tests:
         said.append("holds, by tests")
         by += [f"`{test.partition('::')[2]}`" for test in one.tests]
@@ -260,11 +198,12 @@ def _said(where: str, judged: JudgedClaim | None) -> str:
     return f"{where}{decision}: {judged.found}"
 
 
-def _more(study: str) -> str:
-    """Where the means of its cases are, and its picture, as far as it was flown."""
-    links = [f"[means](#{study})"] if record.full_study(study) else []
+def _more(study: str, paper: str) -> str:
+    """Where the means of its cases are, and its picture, as far as it was flown; from the page of a paper."""
+    page = "" if group_of(study) == paper else f"{group_of(study)}.md"
+    links = [f"[means]({page}#{study})"] if record.full_study(study) else []
     file = PICTURES / f"{study}.png"
-    links += [f"[picture](pictures/{file.name})"] if file.exists() else []
+    links += [f"[picture](../pictures/{file.name})"] if file.exists() else []
     return f" ({', '.join(links)})" if links else ""
 
 
@@ -272,7 +211,7 @@ def _whence(name: str, full: StudyRecord) -> Iterator[str]:
     yield fill(f"{full.title} ({full.source}).", 120)
     yield ""
     yield f"{full.runs} runs of each case, intervals of {100 * full.confidence:.0f} %, from"
-    yield f"[{name}.json](../affinet/shipped/results/{name}.json);"
+    yield f"[{name}.json](../../affinet/shipped/results/{name}.json);"
     yield f"`affinet study {name}` flies it again."
 
 
@@ -330,4 +269,6 @@ if __name__ == "__main__":
     for given in sys.argv[1:]:
         study_name, _, folder = given.partition("=")
         take(study_name, Path(folder))
-    PAGE.write_text(page(), encoding="utf-8")
+    for file, text in pages().items():
+        (DOCS / file).parent.mkdir(exist_ok=True)
+        (DOCS / file).write_text(text, encoding="utf-8")

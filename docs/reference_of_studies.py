@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from claims_page import DOCS
+from claims_page import DOCS, group_of
 from marked import Lines, code, filled, parameters, table, titled
 
 from affinet.reference import catalogue
@@ -78,4 +78,4 @@ def _links(name: str) -> Lines:
     if (DOCS / "pictures" / f"{name}.png").exists():
         yield f"Its [figure](../pictures/{name}.png)."
     if record.full_study(name):
-        yield f"Its [means and verdicts](../claims.md#{name})."
+        yield f"Its [means and verdicts](../claims/{group_of(name)}.md#{name})."

@@ -7,6 +7,7 @@ from functools import cache
 import claims_page
 import pytest
 from held_records import NOT_TOLD, faults, verdicts, wrong_verdict
+from paper_claims import paper_claims
 from read_verdicts import Runs, read
 
 from affinet.studies import record, study
@@ -253,7 +254,7 @@ def test_what_no_check_says_of_such_runs_is_not_read(check, found):
 def test_a_claim_of_a_paper_is_listed_once():
     """Six of Table 1 are judged of two targets, as nobody knows which the paper has."""
     studies = defaultdict(list)
-    for one in claims_page.paper_claims():
+    for one in paper_claims():
         studies[one.paper, one.where, one.says].append(one.study)
     twice = {key: judging for key, judging in studies.items() if len(judging) > 1}
     assert {key[:2] for key in twice} == {("002", "Table 1")}
@@ -265,7 +266,7 @@ LISTED = {"000": 28, "001": 6, "002": 88, "003": 9, "004": 26}
 
 
 def test_no_claim_of_a_paper_is_lost():
-    assert Counter(one.paper for one in claims_page.paper_claims()) == LISTED
+    assert Counter(one.paper for one in paper_claims()) == LISTED
 
 
 def test_what_a_study_of_a_paper_claims_is_the_papers():
