@@ -5,7 +5,7 @@ BIN := .venv/bin
 FLIES := .venv/.flies
 READY := .venv/.ready
 
-.PHONY: demo help test test-room test-all test-pythons test-wheel test-browser coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel test-browser docs docs-serve coverage lint types imports picture bench clean
 
 demo: $(FLIES) ## bursts of losses with GA-RKF, which holds the formation, beside a filter alone; then over processes
 	@echo "The first flight on a machine compiles its kernels, which takes half a minute; later ones begin at once."
@@ -33,6 +33,12 @@ test-wheel: $(READY) ## the wheel beside openai-agents, from a project whose mod
 test-browser: $(READY) ## the web viewer in headless Chromium, in an environment of its own
 	UV_PROJECT_ENVIRONMENT=.venv-browser $(UV) sync --locked --quiet --no-dev --group browser
 	.venv-browser/bin/pytest -n0 tests/affinet/cli/test_in_a_browser.py
+
+docs: $(READY) ## the site of docs/, into site/: open site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
+docs-serve: $(READY) ## the site in a browser, built again whenever a page is written
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs serve
 
 coverage: $(READY) ## which lines the tests in this process run, by room, into docs/coverage.md
 	$(BIN)/coverage erase
@@ -74,4 +80,4 @@ $(FLIES): pyproject.toml uv.lock
 	touch $@
 
 clean: ## without environments and runs
-	rm -rf .venv .venv-3.* runs
+	rm -rf .venv .venv-3.* runs site

@@ -44,8 +44,6 @@ def run(
 ) -> FlownRun:
     """Fly a scenario.
 
-    >>> run = affinet.run("corridor", estimator="rkf", availability=0.5, network={"delay_ticks": 1})
-
     Whatever is not given stays as the scenario says it. Of two that give the same key the later holds, and keywords come last.
 
     Parameters
@@ -88,6 +86,10 @@ def run(
         When there is no such runtime, or `out` is no path.
     TypeError
         When one of these is something else than is asked for.
+
+    Examples
+    --------
+    >>> run = affinet.run("corridor", estimator="rkf", availability=0.5, network={"delay_ticks": 1})
     """
     flying = runtime_of(runtime)
     place = None if out is None else _path("out", out)

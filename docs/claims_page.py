@@ -157,7 +157,8 @@ def _table(head: Sequence[str], rows: Iterable[tuple[str, Sequence[int]]]) -> It
 
 
 def _row(one: PaperClaim, named: dict[str, Study]) -> str:
-    said, by = [], []
+    said: list[str] = []
+    by: list[str] = []
     if one.study:
         for says, all_found in groupby(verdicts(one, named[one.study]), key=attrgetter("says")):
             said += _summed_up(says if len(one.claims) > 1 else "", list(all_found))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from claims_page import DOCS, group_of
+from claims_page import PICTURES, group_of
 from marked import Lines, code, filled, parameters, table, titled
+from pydantic import BaseModel
 
 from affinet.reference import catalogue
 from affinet.reference.docstrings import first_line
@@ -13,7 +14,7 @@ from affinet.reference.entries import of_model
 from affinet.studies import judging, quantities, record, study
 from affinet.studies.study import Axis, Bound, Claim, Size, Study
 
-_TABLES = {"claims": Claim, "axes": Axis, "bound": Bound, "full, quick": Size}
+_TABLES: Mapping[str, type[BaseModel]] = {"claims": Claim, "axes": Axis, "bound": Bound, "full, quick": Size}
 _STANDS_FOR = {"mean": "mean", "root_mean_square": "root mean square", "maximum": "largest"}
 
 
@@ -75,7 +76,7 @@ def _decided(read: Study, claim: Claim, verdicts: dict[str, str]) -> str:
 
 def _links(name: str) -> Lines:
     yield f"`affinet study {name}` flies it."
-    if (DOCS / "pictures" / f"{name}.png").exists():
+    if (PICTURES / f"{name}.png").exists():
         yield f"Its [figure](../pictures/{name}.png)."
     if record.full_study(name):
         yield f"Its [means and verdicts](../claims/{group_of(name)}.md#{name})."

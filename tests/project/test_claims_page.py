@@ -119,7 +119,7 @@ def test_claims_are_counted_once_and_verdicts_once():
     assert sum(int(line[1]) for line in of_verdicts) == len(asked)
 
 
-@pytest.mark.parametrize("paper, name", sorted({(one.paper, one.study) for one in ROWS if one.study}))
+@pytest.mark.parametrize(("paper", "name"), sorted({(one.paper, one.study) for one in ROWS if one.study}))
 def test_the_pages_say_how_to_fly_a_study_again_and_which_file_its_figures_are_from(paper, name):
     claimed, group = PAGES[f"claims/{paper}.md"], claims_page.group_of(name)
     assert f"`affinet study {name}`" in claimed
