@@ -129,7 +129,7 @@ def test_the_tests_in_the_docs_pass(tmp_path):
 
 def test_what_docs_have_one_make_can_be_made():
     targets = set(re.findall(r"^([a-z-]+):", (DOCS.parent / "Makefile").read_text(), flags=re.MULTILINE))
-    pages = [DOCS.parent / "README.md", DOCS.parent / "CONTRIBUTING.md", *DOCS.glob("**/*.md")]
+    pages = [DOCS.parent / "README.md", DOCS.parent / "CONTRIBUTING.md", *DOCS.glob("*.md")]
     asked = {word for page in pages for word in re.findall(r"(?:`|^    )make ([a-z-]+)", page.read_text(), flags=re.M)}
     assert "test-wheel" in asked
     assert asked - targets == set()
