@@ -213,10 +213,11 @@ def overheard(star):
     target = ("127.0.0.1", int(star.endpoint.rpartition(":")[2]))
 
     def carry(source, sink):
-        while data := source.recv(65536):
-            kept.append(data)
-            sink.sendall(data)
-        sink.shutdown(socket.SHUT_WR)
+        with suppress(OSError):  # either end may leave first
+            while data := source.recv(65536):
+                kept.append(data)
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
 
     def accept():
         ours, _ = listening.accept()
