@@ -32,6 +32,7 @@ FOLDER = Path(__file__).parent / "notebooks"
 LONGEST_S = 300.0  # of a cell; one that takes longer hangs
 _PNG = "image/png"
 _DIGEST = re.compile("[0-9a-f]{12,64}")  # other processors have other bits
+_ALIKE = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "COLUMNS": "80"}  # whoever executes them
 _DRAWN = 0.01  # of a picture that is not blank, at least
 
 
@@ -85,7 +86,7 @@ def executed(notebook: NotebookNode, longest_s: float = LONGEST_S) -> NotebookNo
             record_timing=False,
             resources={"metadata": {"path": str(work)}},
         )
-        client.execute(cleanup_kc=True, env=os.environ | {"IPYTHONDIR": str(kernel)})
+        client.execute(cleanup_kc=True, env=os.environ | _ALIKE | {"IPYTHONDIR": str(kernel)})
     fresh.metadata = nbformat.from_dict(
         {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
     )
@@ -93,10 +94,11 @@ def executed(notebook: NotebookNode, longest_s: float = LONGEST_S) -> NotebookNo
 
 
 def differences(stored: NotebookNode, fresh: NotebookNode) -> list[str]:
-    """In what the outputs of an execution are others than those stored: of pictures only that there is one that shows something."""
+    """What is other in the outputs of an execution than in those stored; of a picture, whether there is one, and not blank."""
     said = []
     for number, (one, other) in enumerate(zip_longest(_code(stored), _code(fresh))):
-        for before, now in zip_longest(*(list(_told(cell)) for cell in (one, other)), fillvalue="nothing"):
+        outputs = ([] if cell is None else list(told(cell)) for cell in (one, other))
+        for before, now in zip_longest(*outputs, fillvalue="nothing"):
             if before != now:
                 said.append(f"cell {number + 1} has\n{now}\nwhere this is stored:\n{before}")
     return said
@@ -106,8 +108,8 @@ def _code(notebook: NotebookNode) -> list[NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-def _told(cell: NotebookNode) -> Iterator[str]:
-    """What can be compared of the outputs of a cell."""
+def told(cell: NotebookNode) -> Iterator[str]:
+    """What can be compared of the outputs of a cell: texts, and of a picture whether it shows something."""
     for output in cell.outputs:
         if "text" in output:
             yield f"{output.name}: {_plain(output.text)}"

@@ -147,7 +147,8 @@ def recovers(level: float, within: float) -> Checker:
             end = min([evidence.ticks, *following])
             if deadline >= end:
                 left = (end - fault.end) * evidence.dt
-                why += f"; '{fault.describe()}' had {left:g} s until another began or the run ended, and needs more than {within:g}"
+                had = f"{left:g} s until another began or the run ended"
+                why += f"; '{fault.describe()}' had {had}, and needs more than {within:g}"
                 continue
             if not _lifted(above[:end], faults, fault):
                 if above[fault.start : end].any():
