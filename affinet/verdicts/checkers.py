@@ -138,7 +138,7 @@ def recovers(level: float, within: float) -> Checker:
     def check(evidence: Evidence) -> CheckResult:
         faults = [bite.fault for bite in evidence.bites if bite.touched]
         above: Mask = ~(evidence.error < level)
-        lifted, why = 0, f"no fault that ended had lifted the error above {level:g} m²"
+        lifted, why = 0, f"no fault that had its time had lifted the error above {level:g} m²"
         for fault in sorted(faults, key=lambda fault: fault.end or evidence.ticks):
             if fault.end is None or _others_hold(faults, fault, fault.end):
                 continue
@@ -146,6 +146,9 @@ def recovers(level: float, within: float) -> Checker:
             following = [other.start for other in faults if other is not fault and other.start >= fault.end]
             end = min([evidence.ticks, *following])
             if deadline >= end:
+                left = (end - fault.end) * evidence.dt
+                had = f"{left:g} s until another began or the run ended"
+                why += f"; '{fault.describe()}' had {had}, and needs more than {within:g}"
                 continue
             if not _lifted(above[:end], faults, fault):
                 if above[fault.start : end].any():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.models.arrays import Mask
 from netem.core.links import Links
+from netem.medium.verdict import Verdict
 from world.books import history
 from world.books.history import Arrays
 
@@ -86,7 +87,7 @@ def first_difference(one: Arrays, other: Arrays, links: Links, channels: Sequenc
     here, there = one[name][tick : tick + 1], other[name][tick : tick + 1]
     place = tuple(np.argwhere(_unlike(here, there))[0].tolist())
     return Difference(
-        tick, name, _where(name, place[1:], links, channels), repr(here[place].item()), repr(there[place].item())
+        tick, name, _where(name, place[1:], links, channels), _said(name, here[place]), _said(name, there[place])
     )
 
 
@@ -144,6 +145,10 @@ def _unlike(one: NDArray[Any], other: NDArray[Any]) -> Mask:
         one, other = (history.one_nan(array).view(np.uint64) for array in (one, other))
     unlike: Mask = np.not_equal(one, other)
     return unlike
+
+
+def _said(name: str, value: Any) -> str:
+    return Verdict(value).label if name == "verdicts" else repr(value.item())
 
 
 def _where(name: str, row: tuple[int, ...], links: Links, channels: Sequence[str]) -> str:

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from affinet.verdicts import told
+from affinet.scenario.words import among
+from affinet.verdicts import beside, metrics, told
 from affinet.verdicts.checking import CheckResult, as_checker
 from affinet.verdicts.evidence import Evidence
+from analysis.models.arrays import Array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +51,27 @@ class FlownRun(Evidence):
         if wrong := [finding for finding in findings if finding.verdict != "pass"]:
             raise Broken("\n".join(map(str, wrong)))
         return self
+
+    def metric(self, name: str) -> Array:
+        """A metric of the checker `below`, like "nees", in each tick, shape (T,), in its unit.
+
+        NaN where there is nothing to take it of, infinite where it is no number.
+
+        Raises
+        ------
+        ValueError
+            When there is no such metric.
+        """
+        if name not in metrics.METRICS:
+            raise ValueError(f"no metric {name!r}; {among(name, metrics.METRICS)}")
+        return metrics.of_run(self, name, range(self.ticks))
+
+    def parting(self, other: Evidence) -> str:
+        """Where another run parts from this one, bit by bit and in words: the tick, the array, and of whom.
+
+        Of what both have; runs of estimators that say other things share some channels and arrays.
+        """
+        return beside.parting(self, other)
 
     @property
     def dataset(self) -> xr.Dataset:

@@ -540,6 +540,27 @@ def test_a_run_can_be_pickled_compared_and_shown(scenario):
     assert again.check(affinet.bounded(1e9)) is again
 
 
+def test_a_metric_of_a_run_is_that_of_below_in_each_tick():
+    flown = affinet.run("corridor", *SHORT, estimator="rkf")
+    nees = flown.metric("nees")
+    assert nees.shape == (flown.ticks,)
+    assert not np.isnan(nees).any()
+    flown.check(affinet.below("nees", np.nextafter(np.nanmax(nees), np.inf)))
+    with pytest.raises(affinet.Broken, match=rf"\(tick {np.nanargmax(nees)}\)"):
+        flown.check(affinet.below("nees", np.nanmax(nees)))
+    with pytest.raises(ValueError, match=r"^no metric 'ness'; did you mean 'nees'\?"):
+        flown.metric("ness")
+
+
+def test_a_run_says_where_another_parts_from_it():
+    given = affinet.scenario.load("corridor", SHORT)
+    cut = affinet.scenario.extended(given, [{"verb": "dropout", "links": ["2->4"], "at": 0.4}])
+    one, other = affinet.run(given), affinet.run(cut)
+    said = one.parting(other)
+    assert said == "tick 8: verdicts of sense on 2->4 is delivered in one run and dropout in the other"
+    assert one.parting(affinet.run(given)) == "the same bits as the first"
+
+
 def test_a_run_comes_back_from_another_process():
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         flown = pool.submit(affinet.run, "corridor", *SHORT).result()

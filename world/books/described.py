@@ -13,6 +13,7 @@ from world.physics.world import World
 
 TIME, AGENT, SLOT, LINK, CHANNEL, VERDICT = "time", "agent", "slot", "link", "channel", "verdict"
 AXIS, PAIR, ROW, COLUMN, DERIVATIVE = "axis", "pair", "row", "column", "derivative"
+AGE_OF_NEWS = "age_of_news"
 
 # What stands along each axis.
 AXES: Mapping[str, str] = {
@@ -87,6 +88,13 @@ BY_TICK: Mapping[str, Described] = {
     "dropped": Described((TIME, VERDICT), "1", "messages that were dropped under way", "i"),
     "target": Described((TIME, AGENT, AXIS), "m", "where the agent should be"),
     "error": Described((TIME,), "m2", "tracking error"),
+}
+
+# What no run keeps, as it is made of `newest`.
+DERIVED: Mapping[str, Described] = {
+    AGE_OF_NEWS: Described(
+        (TIME, CHANNEL, LINK), "s", "how old the newest is that has arrived; nothing before any has"
+    ),
 }
 
 # What the estimators of affinet report; behind the ticks and the agents, which all reports begin with.

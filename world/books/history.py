@@ -20,7 +20,7 @@ from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
 from netem.medium.verdict import Verdict, VerdictCodes
 from world.books import growing
-from world.books.described import BY_TICK
+from world.books.described import BY_TICK, DERIVED
 from world.physics.world import Scene, World
 
 Arrays = dict[str, NDArray[Any]]
@@ -32,7 +32,7 @@ _SPAN = 512  # ticks that are looked at together, of arrays that may be larger t
 
 # Of each array by tick the kind of its numbers, and how many axes it has.
 _BY_TICK = {name: (one.kind, len(one.axes)) for name, one in BY_TICK.items()}
-TAKEN = frozenset(_BY_TICK)  # names that no report can have
+TAKEN = frozenset({*BY_TICK, *DERIVED})  # names that no report can have
 UNTOLD = -1  # of `feasible`: the agent is silent, or its estimator fits no map
 _MARK = 3  # column of `Entry.odd`
 

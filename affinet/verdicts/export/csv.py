@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import folder, tables
+from affinet.verdicts.export import derived, folder, tables
 from affinet.verdicts.export.tables import Column
-from world.books.history import by_span
 
 
 def write(run: Evidence, out: Path) -> None:
@@ -28,7 +27,7 @@ def write(run: Evidence, out: Path) -> None:
             for name in tables.NAMES
         }
         first = 0
-        for span in by_span(run.arrays):
+        for span in derived.by_parts(run):
             for name, table in tables.of_span(run, span, first).items():
                 if not first:
                     sinks[name].writerow(heading(of, column) for of, column in table.items())

@@ -8,7 +8,7 @@ import numpy as np
 
 from affinet.scenario.words import among, shown
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import extras, labelled, tables
+from affinet.verdicts.export import derived, extras, labelled, tables
 from affinet.verdicts.export.tables import Column
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def of(run: Evidence) -> xr.Dataset:
         When xarray is not there.
     """
     xarray = extras.needed("xarray", "xarray", "a dataset")
-    variables = dict(labelled.variables(run, run.arrays)) | labelled.closing(run)
+    variables = dict(labelled.variables(run, derived.whole(run))) | labelled.closing(run)
     return xarray.Dataset(
         {name: tuple(one) for name, one in variables.items()},
         {name: tuple(one) for name, one in labelled.coordinates(run).items()},
@@ -46,7 +46,7 @@ def frame(run: Evidence, table: str) -> pd.DataFrame:
     if table not in tables.NAMES:
         raise ValueError(f"table {shown(table)}: {among(table, tables.NAMES)}")
     pandas = extras.needed("pandas", "xarray", "a table")
-    columns = tables.of_span(run, run.arrays, 0)[table]
+    columns = tables.of_span(run, derived.whole(run), 0)[table]
     made = pandas.DataFrame({name: _values(pandas, column) for name, column in columns.items()})
     made.attrs = labelled.about(run) | {"units": {name: column.unit for name, column in columns.items() if column.unit}}
     return made

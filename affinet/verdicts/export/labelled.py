@@ -40,8 +40,8 @@ def about(run: Evidence) -> dict[str, str]:
 
 
 def forms(run: Evidence) -> dict[str, Described]:
-    """What each array of the run is."""
-    return described.of_run(run.plan.world, run.plan.reports)
+    """What each array of the run is, and each that is made of them."""
+    return {**described.of_run(run.plan.world, run.plan.reports), **described.DERIVED}
 
 
 def coordinates(run: Evidence) -> dict[str, Variable]:
@@ -84,7 +84,7 @@ def variables(run: Evidence, span: Arrays) -> Iterator[tuple[str, Variable]]:
     run
         Of which they are.
     span
-        As they are, of all ticks (`run.arrays`) or of some that follow each other.
+        As `affinet.verdicts.export.derived` has them, of all ticks or of some that follow each other.
     """
     for name, form in forms(run).items():
         values = span[name][: len(span["error"])]
@@ -136,10 +136,11 @@ def pairs(dimension: int) -> list[str]:
 
 def lengths(run: Evidence) -> dict[str, int]:
     """How long each axis is."""
+    of = forms(run)
     return {
         axis: run.ticks if axis == TIME else size
-        for name, form in forms(run).items()
-        for axis, size in zip(form.axes, run.arrays[name].shape, strict=True)
+        for name, array in run.arrays.items()
+        for axis, size in zip(of[name].axes, array.shape, strict=True)
     }
 
 

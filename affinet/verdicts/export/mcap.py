@@ -16,13 +16,13 @@ import msgspec
 import numpy as np
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import extras, foxglove, labelled, tables
+from affinet.verdicts.export import derived, extras, foxglove, labelled, tables
 from affinet.verdicts.export.foxglove import Json, Level, Rgba
 from affinet.verdicts.export.tables import Column, Table
 from analysis.models.arrays import Array
 from netem.medium.verdict import Verdict
 from netem.processes.whole import whole
-from world.books.history import Arrays, by_span
+from world.books.history import Arrays
 
 _LEADER, _FOLLOWER = (1.0, 0.75, 0.1, 1.0), (0.25, 0.5, 0.95, 1.0)
 _NOTHING, _HEARD, _LATE, _LOST = (0.5, 0.5, 0.5, 0.3), (0.2, 0.7, 0.3, 0.8), (0.9, 0.8, 0.1, 0.8), (0.95, 0.5, 0.1, 0.8)
@@ -54,7 +54,7 @@ def write(run: Evidence, out: Path) -> None:
         channels = _Channels(writer)
         events, first = _events(run), 0
         channels.add_all(_begun(run))
-        for span in by_span(run.arrays):
+        for span in derived.by_parts(run):
             channels.add_all(_of_span(run, span, first, events))
             first += len(span["error"])
         channels.add_all(_ended(run))

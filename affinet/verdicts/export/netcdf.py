@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import labelled
+from affinet.verdicts.export import derived, labelled
 from affinet.verdicts.export.labelled import Variable
 from netem.processes.whole import whole
-from world.books.history import by_span
 
 _COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
@@ -34,7 +33,7 @@ def write(run: Evidence, out: Path) -> None:
         for name, one in (coordinates | labelled.closing(run)).items():
             create(file, name, one)[...] = one.values
         begun = 0
-        for span in by_span(run.arrays):
+        for span in derived.by_parts(run):
             for name, one in labelled.variables(run, span):
                 held = file.variables[name] if begun else create(file, name, one)
                 held[begun : begun + len(one.values)] = _storable(one.values)

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from affinet.verdicts.evidence import Evidence
-from affinet.verdicts.export import folder, labelled, tables
+from affinet.verdicts.export import derived, folder, labelled, tables
 from affinet.verdicts.export.tables import Column, Table
-from world.books.history import by_span
 
 
 def write(run: Evidence, out: Path) -> None:
@@ -27,7 +26,7 @@ def write(run: Evidence, out: Path) -> None:
     with folder.new(out), ExitStack() as files:
         writers: dict[str, Any] = {}
         first = 0
-        for span in by_span(run.arrays):
+        for span in derived.by_parts(run):
             for name, table in tables.of_span(run, span, first).items():
                 rows = _arrow(table, labelled.about(run))
                 if name not in writers:

@@ -62,7 +62,7 @@ def of_span(run: Evidence, span: Arrays, first: int) -> Mapping[str, Table]:
     run
         Of which they are.
     span
-        Its arrays in these ticks.
+        Its arrays in these ticks, as `affinet.verdicts.export.derived` has them.
     first
         The first of them.
     """

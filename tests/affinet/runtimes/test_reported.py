@@ -13,7 +13,7 @@ def reporting(name):
     return 'agents.estimator="reporting:Reporting"', f'agents.parameters.reporting:Reporting.name="{name}"'
 
 
-@pytest.mark.parametrize("name", ["position", "error", "verdicts", "target", "psi", "known"])
+@pytest.mark.parametrize("name", ["position", "error", "verdicts", "target", "psi", "known", "age_of_news"])
 def test_a_report_with_a_name_that_every_run_has_is_refused(name):
     said = refusal(*reporting(name), name="localization")
     assert f"reports {name}, which every run has already" in said

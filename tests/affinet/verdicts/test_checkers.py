@@ -195,6 +195,8 @@ def test_recovers_does_not_look_at_a_fault_whose_end_is_the_beginning_of_the_nex
     entries = CUT | {"until": 1.5}, CUT | {"at": 1.5, "until": 3.5}
     found = checkers.recovers(1.0, within=1.0)(with_error(under(*entries), lifted(75)))
     assert verdict(found) == ("vacuous", None)
+    short = "'cut 2->4' had {} s until another began or the run ended, and needs more than 1"
+    assert found.says.partition("; ")[2] == "; ".join([short.format(0), short.format(0.5)])
 
 
 def test_recovers_fails_after_the_first_fault_that_is_not_made_good():

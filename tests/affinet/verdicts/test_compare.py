@@ -40,7 +40,10 @@ def test_a_run_is_like_itself(arrays):
         ({"input": ((7, 3, 1), 0.25)}, "tick 7: input of agent 4 is "),
         ({"psi": ((0, 6), np.nan), "position": ((9, 0, 0), 0.0)}, "tick 0: psi of agent 7 is "),
         ({"newest": ((5, 2, 1), 77), "estimate": ((5, 0, 0, 0), 9.0)}, "tick 5: newest of measurement on 3->1 is "),
-        ({"verdicts": ((3, 0, 0), Verdict.DEAD), "newest": ((3, 0, 0), 9)}, "tick 3: verdicts of sense on 2->1 is "),
+        (
+            {"verdicts": ((3, 0, 0), Verdict.DEAD), "newest": ((3, 0, 0), 9)},
+            "tick 3: verdicts of sense on 2->1 is delivered ",
+        ),
         ({"error": (12, 8.0)}, "tick 12: error is "),
         ({"measured": ((4, 1, 1), 9.5)}, "tick 4: measured of 3->1 is "),
         ({"measured": ((4, 6, 0), 9.5), "verdicts": ((4, 0, 0), Verdict.DEAD)}, "tick 4: measured of "),

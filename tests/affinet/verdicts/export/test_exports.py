@@ -3,6 +3,7 @@
 import csv
 import errno
 import json
+import re
 import sys
 
 import numpy as np
@@ -13,8 +14,7 @@ import xarray
 from mcap.reader import make_reader
 
 import affinet
-from affinet.verdicts.export import csv as csv_files
-from affinet.verdicts.export import foxglove, mcap, netcdf, parquet, tables
+from affinet.verdicts.export import derived, foxglove, tables
 from affinet.verdicts.export.extras import NotInstalled
 from affinet.verdicts.export.formats import FORMATS, write
 from netem.medium.verdict import Verdict
@@ -56,8 +56,8 @@ def where(run, link):
 
 def test_a_dataset_has_every_array_with_its_axes_units_and_name(run):
     dataset = run.dataset
-    assert dataset.data_vars.keys() == run.arrays.keys() | {"final_position"}
-    for name, form in described.of_run(run.plan.world, run.plan.reports).items():
+    assert dataset.data_vars.keys() == run.arrays.keys() | {"age_of_news", "final_position"}
+    for name, form in (described.of_run(run.plan.world, run.plan.reports) | described.DERIVED).items():
         assert dataset[name].dims == form.axes
         assert (dataset[name].attrs["units"], dataset[name].attrs["long_name"]) == (form.unit, form.says)
     assert dataset.time.attrs == {"units": "s", "long_name": "time"}
@@ -115,6 +115,19 @@ def test_a_netcdf_file_is_opened_as_the_same_dataset(run, tmp_path):
             assert opened[name].attrs.keys() == one.attrs.keys(), name
 
 
+def test_the_age_of_news_is_how_long_ago_the_newest_was_said_that_came(run):
+    ages, newest = run.dataset.age_of_news, run.arrays["newest"]
+    sensing, said = ages.sel(channel="sense"), ages.sel(channel="input")
+    now = run.dataset.time
+    heard = run.dataset.verdicts.sel(channel="sense") == Verdict.DELIVERED
+    np.testing.assert_array_equal(sensing.values == 0.0, heard.values)
+    np.testing.assert_allclose(said.values[newest[:, list(run.plan.channels).index("input")] >= 0].min(), run.dt)
+    cut = sensing.sel(link="6->4").where((now > 0.55) & (now < 0.95), drop=True)
+    np.testing.assert_allclose(np.diff(cut), run.dt)
+    assert np.isnan(ages).any()
+    np.testing.assert_array_equal(ages, affinet.realised(run).age_s)
+
+
 # ---- tables
 
 
@@ -140,6 +153,10 @@ def test_the_table_of_links_has_what_an_agent_believes_and_hears_of_a_neighbour(
     assert rows.estimate_x[~known].isna().all()
     newest = run.arrays["newest"][:, 2].reshape(-1)
     np.testing.assert_array_equal(rows[f"newest_{run.plan.channels[2]}"], np.where(newest < 0, np.nan, newest))
+    np.testing.assert_array_equal(
+        rows[f"age_of_news_{run.plan.channels[2]}"],
+        run.dataset.age_of_news.sel(channel=run.plan.channels[2]).values.reshape(-1),
+    )
     labels = [Verdict(code).label for code in run.arrays["verdicts"][:, 2].reshape(-1)]
     assert rows[f"verdict_{run.plan.channels[2]}"].tolist() == labels
     assert {"silent", "delayed", "lost", "cut", "dead"} <= {*labels}
@@ -147,9 +164,9 @@ def test_the_table_of_links_has_what_an_agent_believes_and_hears_of_a_neighbour(
 
 def test_every_array_is_in_one_table(run):
     named = {name: {*run.to_pandas(name).columns} for name in tables.NAMES}
-    for name in run.arrays:
-        begins = "verdict_" if name == "verdicts" else name
-        holding = [table for table, columns in named.items() if any(column.startswith(begins) for column in columns)]
+    for name in (*run.arrays, *described.DERIVED):
+        begins = re.compile(rf"{'verdict' if name == 'verdicts' else name}(_|$)")
+        holding = [table for table, columns in named.items() if any(map(begins.match, columns))]
         assert len(holding) == 1, name
 
 
@@ -344,8 +361,7 @@ def test_nothing_is_left_of_what_could_not_be_written_to_its_end(form, run, tmp_
         yield {name: array[:5] for name, array in arrays.items()}
         raise OSError(errno.ENOSPC, "full")
 
-    for module in (csv_files, parquet, netcdf, mcap):
-        monkeypatch.setattr(module, "by_span", break_off)
+    monkeypatch.setattr(derived, "by_span", break_off)
     with pytest.raises(OSError, match="full"):
         write(run, form, tmp_path / "run")
     assert [*tmp_path.iterdir()] == []
