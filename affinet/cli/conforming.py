@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from affinet.cli.progress import Bar
+from affinet.cli.status import FAIL, PASS
 from affinet.conformance.flying import Patience
 from affinet.conformance.suite import CASES, Finding, findings
 from netem.processes.system_errors import about
@@ -20,8 +21,8 @@ from netem.processes.system_errors import about
 _STYLES = {"pass": "green", "fail": "red", "not applicable": "yellow", "not reached": "red"}
 
 
-def judge_and_report(parsed: argparse.Namespace) -> bool:
-    """Run the suite and say what it found; whether nothing speaks against the agent.
+def judge_and_report(parsed: argparse.Namespace) -> int:
+    """Run the suite and say what it found, which fails where something speaks against the agent.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def judge_and_report(parsed: argparse.Namespace) -> bool:
         }
         with about(parsed.out):
             parsed.out.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    return conforms
+    return PASS if conforms else FAIL
 
 
 def _print(found: Sequence[Finding]) -> None:

@@ -6,34 +6,21 @@ import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from affinet.cli.options.beginning import LISTED
 from affinet.cli.show import plain
-from affinet.scenario.sections import ScenarioError
+from affinet.reference import catalogue
+from affinet.reference.catalogue import default_of
+from affinet.reference.entries import Entry
 from affinet.scenario.words import among
+from affinet.scenario.wrong import ScenarioError
 
-if TYPE_CHECKING:
-    from affinet.reference.entries import Entry
-
-KINDS = ("scenarios", "estimators", "laws", "profiles", "impairments", "verbs", "checkers", "studies", "figures")
 _INDENT = 4
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Take `affinet list` in."""
-    listing = commands.add_parser(
-        "list",
-        help="what there is: scenarios, estimators, verbs, ..., with parameters, units and defaults",
-        description="List what there is of a kind, that of installed packages included.",
-    )
-    listing.add_argument("kind", nargs="?", choices=KINDS, metavar="KIND", help=f"one of: {', '.join(KINDS)}")
-    listing.add_argument("name", nargs="?", metavar="NAME", help="this one alone")
-    listing.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def print_list(parsed: argparse.Namespace) -> None:
@@ -44,9 +31,7 @@ def print_list(parsed: argparse.Namespace) -> None:
     ScenarioError
         When there is nothing of this name.
     """
-    from affinet.reference import catalogue  # studies and what reads docstrings take a while to import
-
-    kinds = KINDS if parsed.kind is None else (parsed.kind,)
+    kinds = LISTED if parsed.kind is None else (parsed.kind,)
     found = {kind: list(catalogue.KINDS[kind]()) for kind in kinds}
     if parsed.name is not None:
         found[parsed.kind] = _called(parsed.name, parsed.kind, found[parsed.kind])
@@ -83,8 +68,6 @@ def _print_entries(entries: Sequence[Entry]) -> None:
 
 
 def _parameters(entry: Entry) -> Table:
-    from affinet.reference.catalogue import default_of
-
     table = _table()
     for one in entry.parameters:
         kind = f"[{one.kind}]" if " | " in one.kind else ""

@@ -10,14 +10,15 @@ from typing import Any, NamedTuple
 
 from affinet.planning import limits
 from affinet.scenario.profiles import IMPAIRMENTS
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import among, one_line
+from affinet.scenario.wrong import ScenarioError
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from netem.impairments.own import Loss
 from netem.loading import modules, parameters
 from netem.loading.calling import Calling, NoSuchAlgorithm, load, name_of
-from netem.loading.choice import Choice, offered
+from netem.loading.choice import Choice
+from netem.loading.offers import offered
 from netem.loading.parameters import ParameterError
 from netem.processes.user_code import UserCodeError, definition, text_of
 

@@ -7,8 +7,8 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from affinet.cli import listing
 from affinet.cli.commands import main
+from affinet.cli.options.beginning import LISTED
 from affinet.planning import registry
 from affinet.reference import catalogue
 from affinet.reference.docstrings import first_line, parameters_of, unit_of
@@ -28,7 +28,7 @@ BARE = {
 
 
 def test_the_kinds_are_those_of_the_command():
-    assert tuple(catalogue.KINDS) == listing.KINDS
+    assert tuple(catalogue.KINDS) == LISTED
 
 
 def test_all_of_each_kind_is_there():

@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.stats import chi2
 
 from affinet.cli import commands
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import judging, labelled, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here
