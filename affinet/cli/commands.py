@@ -71,7 +71,7 @@ def command() -> NoReturn:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     parser = options.parser()
-    parsed = parser.parse_args(arguments)
+    parsed = parser.read(arguments)
     if parsed.command is None:
         print(helping.guide(parser), file=sys.stderr)  # noqa: T201
         return BAD_INPUT

@@ -51,7 +51,7 @@ def _add_render(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
         help="of a film: times real time (default: %(default)g)",
     )
     render.add_argument(
-        "--fps", type=int, default=15, choices=range(1, 61), metavar="N", help="frames a second (default: %(default)s)"
+        "--fps", type=values.up_to(60), default=15, metavar="N", help="frames a second (default: %(default)s)"
     )
     render.add_argument(
         "--from", dest="begins", type=float, default=0.0, metavar="S", help="of a film: its first moment"

@@ -7,11 +7,12 @@ from typing import Any
 
 from affinet.cli import helping
 from affinet.cli.options import beginning, flown, machines, many, scenarios
+from affinet.cli.options.parser import Parser
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """Reads a command line; `command` is the word of the command."""
-    whole = argparse.ArgumentParser(prog="affinet", description=helping.PURPOSE, epilog=helping.MORE)
+    whole = Parser(prog="affinet", description=helping.PURPOSE, epilog=helping.MORE)
     whole.add_argument("--version", action=_Version, nargs=0, help="show the version, and exit")
     commands = whole.add_subparsers(dest="command", metavar="COMMAND")
     for module in (scenarios, flown, many, machines, beginning):
