@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from rich import progress as bar
 from rich.console import Console
-from rich.table import Table
 
+from affinet.cli import means
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
 from affinet.scenario.sections import Scenario
@@ -92,19 +92,12 @@ def _finite(value: float) -> float | None:
 def _print(name: str, found: Sequence[Setting], runs: int) -> None:
     says, unit = quantities.said(found[0].quantity)
     of_many = f", {runs} runs of each; {100 * sweeping.CONFIDENCE:g} % interval by Student's t" if runs > 1 else ""
-    console, table = Console(), Table()
+    console = Console()
     console.print(plain(f"{name}: {says}, mean over each run{of_many}"), soft_wrap=True)
-    for key in found[0].labels:
-        table.add_column(plain(key))
-    for heading in (f"mean ({unit})" if unit else "mean", *(["interval"] if runs > 1 else []), "verdicts"):
-        table.add_column(heading)
-    for setting in found:
-        mean = setting.mean
-        between = [f"{mean.low:.4g} to {mean.high:.4g}"] if runs > 1 else []
-        table.add_row(
-            *map(plain, (*setting.labels.values(), f"{mean.found:.4g}", *between, _verdicts(setting.verdicts)))
-        )
-    console.print(table)
+    rows = [
+        means.Row(one.labels, one.mean.found, one.mean.low, one.mean.high, _verdicts(one.verdicts)) for one in found
+    ]
+    means.show(console, rows, unit, intervals=runs > 1)
 
 
 def _verdicts(counted: Mapping[str, int]) -> str:

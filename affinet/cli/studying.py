@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from affinet.cli import show
+from affinet.cli import means, show
 from affinet.cli.status import FAIL, PASS
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
@@ -96,6 +96,7 @@ def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, o
         verdicts = judging.judge(study, results)
         judged = record.recorded(study, results, verdicts, flown=flown, quick=parsed.quick)
         record.write(out, judged)
+        means.of_study(judged, out)
         show.claims(judged, record.full_study(parsed.study), out)
         report.draw(out, study, results)
     except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said

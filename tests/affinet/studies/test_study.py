@@ -100,6 +100,7 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     assert not (out / "consistency.png").exists()  # that goes with curves
     shown = capsys.readouterr().out
     assert "undecided" in shown
+    assert all(f"{case.found:.4g}" in shown for case in judged.cases)
     assert "quick: 2 runs of a coarse form" in shown
 
 
