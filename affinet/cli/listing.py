@@ -14,13 +14,20 @@ from rich.text import Text
 
 from affinet.cli.options.beginning import LISTED
 from affinet.cli.show import plain
+from affinet.planning import registry
 from affinet.reference import catalogue
 from affinet.reference.catalogue import default_of
+from affinet.reference.docstrings import first_line, parameters_of
 from affinet.reference.entries import Entry
+from affinet.scenario import files
+from affinet.scenario.profiles import IMPAIRMENTS
 from affinet.scenario.words import among
 from affinet.scenario.wrong import ScenarioError
+from netem.loading import modules
 
 _INDENT = 4
+# Of which there may be some of one's own, by "module:Class".
+_OWN = {"estimators": registry.ESTIMATORS, "laws": registry.LAWS, "impairments": IMPAIRMENTS}
 
 
 def print_list(parsed: argparse.Namespace) -> None:
@@ -30,11 +37,16 @@ def print_list(parsed: argparse.Namespace) -> None:
     ------
     ScenarioError
         When there is nothing of this name.
+    UserCodeError
+        When a module of one's own fails.
     """
-    kinds = LISTED if parsed.kind is None else (parsed.kind,)
-    found = {kind: list(catalogue.KINDS[kind]()) for kind in kinds}
-    if parsed.name is not None:
-        found[parsed.kind] = _called(parsed.name, parsed.kind, found[parsed.kind])
+    if parsed.name is None:
+        kinds = LISTED if parsed.kind is None else (parsed.kind,)
+        found = {kind: list(catalogue.KINDS[kind]()) for kind in kinds}
+    elif ":" in parsed.name and parsed.kind in _OWN:
+        found = {parsed.kind: [_own(parsed.name, parsed.kind)]}
+    else:
+        found = {parsed.kind: _called(parsed.name, parsed.kind, list(catalogue.KINDS[parsed.kind]()))}
     if parsed.json:
         print(json.dumps({kind: [asdict(entry) for entry in entries] for kind, entries in found.items()}))  # noqa: T201
     elif parsed.kind is None:
@@ -50,6 +62,13 @@ def _called(name: str, kind: str, entries: Sequence[Entry]) -> list[Entry]:
     return chosen
 
 
+def _own(name: str, kind: str) -> Entry:
+    module = name.partition(":")[0]
+    folder = modules.holder(module, [files.working_directory()])
+    algorithm = registry.loaded(_OWN[kind], kind, name, folder)
+    return Entry(name, first_line(algorithm), tuple(parameters_of(algorithm)), module.partition(".")[0])
+
+
 def _print_kinds(found: dict[str, list[Entry]]) -> None:
     table = _table()
     for kind, entries in found.items():
@@ -60,7 +79,7 @@ def _print_kinds(found: dict[str, list[Entry]]) -> None:
 def _print_entries(entries: Sequence[Entry]) -> None:
     console = Console()
     for entry in entries:
-        brought = "" if entry.package == "affinet" else f" ({entry.package})"
+        brought = "" if entry.package == "affinet" or ":" in entry.name else f" ({entry.package})"
         console.print(Text(plain(entry.name + brought).plain, style="bold"))
         console.print(Padding(plain(entry.says), (0, 0, 0, _INDENT)))
         if entry.parameters:

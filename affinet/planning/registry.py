@@ -70,10 +70,24 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mappi
         When its module cannot be imported, or it is not what an algorithm of this group has to be.
     """
     path = _path(group, key, name)
-    algorithm = _load(key, path, own.get(name))
-    _refuse_another_kind(group, algorithm)
+    algorithm = loaded(group, key, path, own.get(name))
     table = key if group == IMPAIRMENTS else f"agents.parameters.{name}"  # parameters stand beside an impairment's name
     return _made(table, name, path, algorithm, given, own.get(name))
+
+
+def loaded(group: str, key: str, path: str, folder: Path | None) -> type:
+    """The class at "module:Class" of a folder, or of an installed package, which is an algorithm of this group.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none.
+    UserCodeError
+        When its module cannot be imported, or it is not what an algorithm of this group has to be.
+    """
+    algorithm = _load(key, path, folder)
+    _refuse_another_kind(group, algorithm)
+    return algorithm
 
 
 def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, Path]) -> None:

@@ -27,7 +27,9 @@ def _add_list(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         description="List what there is of a kind, that of installed packages included.",
     )
     listing.add_argument("kind", nargs="?", choices=LISTED, metavar="KIND", help=f"one of: {', '.join(LISTED)}")
-    listing.add_argument("name", nargs="?", metavar="NAME", help="this one alone")
+    listing.add_argument(
+        "name", nargs="?", metavar="NAME", help="this one; of estimators, laws and impairments also module:Class"
+    )
     listing.add_argument("--json", action="store_true", help="print one JSON object")
 
 
