@@ -12,6 +12,7 @@ from rich.table import Table
 
 from affinet.cli.options.flown import OVERLAID
 from affinet.cli.show import plain
+from affinet.runtimes import directories
 from affinet.scenario.names import apart
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
@@ -35,6 +36,8 @@ def compare(parsed: argparse.Namespace) -> None:
         raise ScenarioError("affinet compare: give two run directories, or more")
     if parsed.out and parsed.out.suffix not in OVERLAID:
         raise ScenarioError(f"--out {parsed.out}: give a name that ends in {', '.join(OVERLAID)}")
+    if parsed.out:
+        directories.refuse_there(parsed.out)
     names = apart(parsed.directories)
     runs = [reading.evidence(directory) for directory in parsed.directories]
     partings = {name: beside.parting(runs[0], run) for name, run in zip(names[1:], runs[1:], strict=True)}
@@ -44,7 +47,7 @@ def compare(parsed: argparse.Namespace) -> None:
     else:
         _print(names, runs, partings)
     if parsed.out:
-        _draw(names, runs, parsed.out)
+        _draw(beside.titles(runs, names), runs, parsed.out)
 
 
 def _print(names: Sequence[str], runs: Sequence[Evidence], partings: dict[str, str]) -> None:

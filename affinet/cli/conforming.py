@@ -16,6 +16,7 @@ from affinet.cli.progress import Bar
 from affinet.cli.status import FAIL, PASS
 from affinet.conformance.flying import Patience
 from affinet.conformance.suite import CASES, Finding, findings
+from affinet.runtimes import directories
 from netem.processes.system_errors import about
 
 _STYLES = {"pass": "green", "fail": "red", "not applicable": "yellow", "not reached": "red"}
@@ -31,6 +32,8 @@ def judge_and_report(parsed: argparse.Namespace) -> int:
     OSError
         When the program cannot be started, or the report not be written.
     """
+    if parsed.out:
+        directories.refuse_there(parsed.out)
     found: list[Finding] = []
     with Bar("conformance", len(CASES), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
         for finding in findings(parsed.program, parsed.estimator, Patience(answer_s=parsed.patience)):

@@ -11,9 +11,11 @@ from rich import progress as bar
 
 from affinet.cli.options.flown import STILL
 from affinet.cli.progress import Bar
+from affinet.runtimes import directories
+from affinet.scenario.names import apart
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
-from affinet.verdicts import pictured, reading
+from affinet.verdicts import beside, pictured, reading
 from analysis.figures import swarm
 from analysis.figures.swarm import Flight
 from analysis.models.arrays import Array
@@ -32,9 +34,10 @@ def render(parsed: argparse.Namespace) -> None:
     OSError
         When the file cannot be written.
     """
-    flights = [
-        pictured.flight(reading.evidence(directory), directory.absolute().name) for directory in parsed.directories
-    ]
+    directories.refuse_there(parsed.out)
+    runs = [reading.evidence(directory) for directory in parsed.directories]
+    titles = beside.titles(runs, apart(parsed.directories))
+    flights = [pictured.flight(run, title) for run, title in zip(runs, titles, strict=True)]
     last = max(float(flight.seconds[-1]) for flight in flights)
     with about(parsed.out):
         if parsed.out.suffix in STILL:

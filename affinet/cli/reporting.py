@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from affinet.cli.options.flown import PAGE
+from affinet.runtimes import directories
 from affinet.scenario.words import one_line
 from affinet.studies import page as of_study
 from affinet.verdicts import reading
@@ -24,6 +25,7 @@ def report(parsed: argparse.Namespace) -> None:
         When the page cannot be written.
     """
     out = parsed.out or parsed.directory / PAGE
+    directories.refuse_there(out)
     page = _page(parsed.directory)
     with about(out):
         out.write_text(page, encoding="utf-8")
