@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from affinet.library import run as run
     from affinet.planning.plan import PlanError as PlanError
     from affinet.scenario.sections import Scenario as Scenario
-    from affinet.scenario.sections import ScenarioError as ScenarioError
+    from affinet.scenario.wrong import ScenarioError as ScenarioError
     from affinet.testing import strategies as strategies
     from affinet.verdicts.checkers import agreement as agreement
     from affinet.verdicts.checkers import always as always
@@ -79,7 +79,8 @@ if TYPE_CHECKING:
 _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "library"): ("journal", "load", "realised", "run"),
     ("affinet", "planning.plan"): ("PlanError",),
-    ("affinet", "scenario.sections"): ("Scenario", "ScenarioError"),
+    ("affinet", "scenario.sections"): ("Scenario",),
+    ("affinet", "scenario.wrong"): ("ScenarioError",),
     ("affinet", "verdicts.checkers"): (
         *(
             "agreement",

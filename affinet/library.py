@@ -13,7 +13,8 @@ from affinet.planning import making
 from affinet.runtimes.run import Runtime, rehearse, runtime_of
 from affinet.scenario import files, loading
 from affinet.scenario.overrides import Given
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import flown
 from affinet.verdicts import reading
 from affinet.verdicts.evidence import Evidence

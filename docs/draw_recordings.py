@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -88,9 +89,10 @@ def film(folder: Path, path: Path) -> None:
     """GA-RKF and RKF in the same bursts of losses."""
     shown = {"GA-RKF": "ga-rkf", "RKF": "rkf"}
     runs = [flown(folder / name, "bursts", f"agents.estimator={estimator}") for name, estimator in shown.items()]
-    command = ["render", *map(str, runs), "--to", "30", "--speed", "5", "--fps", "10", "--out", str(path)]
+    command = ["render", *map(str, runs), "--to", "30", "--speed", "5", "--fps", "10", "--out", str(folder / path.name)]
     if cli.main(command):
         raise RuntimeError("no film was made")
+    shutil.copy(folder / path.name, path)
 
 
 def main() -> None:

@@ -10,28 +10,16 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from affinet.cli.options.flown import OVERLAID
 from affinet.cli.show import plain
+from affinet.runtimes import directories
 from affinet.scenario.names import apart
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import beside, measures, reading
 from affinet.verdicts.beside import Row
 from affinet.verdicts.evidence import Evidence
 from netem.processes.system_errors import about
-
-_PICTURES = (".png", ".pdf", ".svg")
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command `compare`."""
-    compare = commands.add_parser(
-        "compare", help="runs beside each other: settings that differ, figures, and where they part"
-    )
-    compare.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories, two or more")
-    compare.add_argument(
-        "--out", type=Path, metavar="FILE", help=f"their curves over each other, as a picture: {', '.join(_PICTURES)}"
-    )
-    compare.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def compare(parsed: argparse.Namespace) -> None:
@@ -46,8 +34,10 @@ def compare(parsed: argparse.Namespace) -> None:
     """
     if len(parsed.directories) < 2:
         raise ScenarioError("affinet compare: give two run directories, or more")
-    if parsed.out and parsed.out.suffix not in _PICTURES:
-        raise ScenarioError(f"--out {parsed.out}: give a name that ends in {', '.join(_PICTURES)}")
+    if parsed.out and parsed.out.suffix not in OVERLAID:
+        raise ScenarioError(f"--out {parsed.out}: give a name that ends in {', '.join(OVERLAID)}")
+    if parsed.out:
+        directories.refuse_there(parsed.out)
     names = apart(parsed.directories)
     runs = [reading.evidence(directory) for directory in parsed.directories]
     partings = {name: beside.parting(runs[0], run) for name, run in zip(names[1:], runs[1:], strict=True)}
@@ -57,7 +47,7 @@ def compare(parsed: argparse.Namespace) -> None:
     else:
         _print(names, runs, partings)
     if parsed.out:
-        _draw(names, runs, parsed.out)
+        _draw(beside.titles(runs, names), runs, parsed.out)
 
 
 def _print(names: Sequence[str], runs: Sequence[Evidence], partings: dict[str, str]) -> None:

@@ -6,28 +6,23 @@ import argparse
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import shtab
+
+from affinet.cli import options
 from affinet.cli.helping import commands_of
 from affinet.scenario import files
+from netem.loading.offers import offered
 
-SHELLS = ("bash", "zsh", "fish")
 Completed = Mapping[str, Any]  # as shtab has it: a function by shell, and what defines it under "preamble"
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Take `affinet completion` in."""
-    completion = commands.add_parser(
-        "completion",
-        help="print what completes the command line in a shell",
-        description="Print a script that completes commands, options, names of scenarios, estimators and studies, and run "
-        "directories. Print it again when a package is installed that brings names of its own.",
-    )
-    completion.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"one of: {', '.join(SHELLS)}")
+def write(parsed: argparse.Namespace) -> None:
+    """Print it."""
+    print(script(parsed.shell, options.parser()), end="")  # noqa: T201
 
 
 def script(shell: str, whole: argparse.ArgumentParser) -> str:
     """What completes the command line that this parser reads."""
-    import shtab  # needed for nothing else
-
     known = {name: made() for name, made in _KNOWN.items()}
     for parser in commands_of(whole).values():
         for action in parser._actions:
@@ -37,9 +32,7 @@ def script(shell: str, whole: argparse.ArgumentParser) -> str:
 
 
 def _estimators() -> Completed:
-    from affinet.planning import registry
-
-    return _named("estimators", registry.names(registry.ESTIMATORS), "")
+    return _named("estimators", sorted(offered("affinet.estimators")), "")
 
 
 def _named(kind: str, names: Sequence[str], ending: str) -> Completed:

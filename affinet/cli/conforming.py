@@ -13,15 +13,17 @@ from rich.table import Table
 from rich.text import Text
 
 from affinet.cli.progress import Bar
+from affinet.cli.status import FAIL, PASS
 from affinet.conformance.flying import Patience
 from affinet.conformance.suite import CASES, Finding, findings
+from affinet.runtimes import directories
 from netem.processes.system_errors import about
 
 _STYLES = {"pass": "green", "fail": "red", "not applicable": "yellow", "not reached": "red"}
 
 
-def judge_and_report(parsed: argparse.Namespace) -> bool:
-    """Run the suite and say what it found; whether nothing speaks against the agent.
+def judge_and_report(parsed: argparse.Namespace) -> int:
+    """Run the suite and say what it found, which fails where something speaks against the agent.
 
     Raises
     ------
@@ -30,6 +32,8 @@ def judge_and_report(parsed: argparse.Namespace) -> bool:
     OSError
         When the program cannot be started, or the report not be written.
     """
+    if parsed.out:
+        directories.refuse_there(parsed.out)
     found: list[Finding] = []
     with Bar("conformance", len(CASES), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
         for finding in findings(parsed.program, parsed.estimator, Patience(answer_s=parsed.patience)):
@@ -46,7 +50,7 @@ def judge_and_report(parsed: argparse.Namespace) -> bool:
         }
         with about(parsed.out):
             parsed.out.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    return conforms
+    return PASS if conforms else FAIL
 
 
 def _print(found: Sequence[Finding]) -> None:

@@ -8,34 +8,31 @@ import operator
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from affinet.cli import show
 from affinet.cli.given import scenario
+from affinet.cli.status import FAIL, PASS
 from affinet.planning import making as planning
 from affinet.runtimes import directories
 from affinet.runtimes.run import evidence, fly
 from affinet.scenario import files, loading
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import among
+from affinet.scenario.wrong import ScenarioError
+from affinet.testing import hunt, strategies
+from affinet.testing.hunt import Counterexample
+from affinet.verdicts import invariants
+from affinet.verdicts.checking import Checker
 from netem.processes.system_errors import about
 
-if TYPE_CHECKING:
-    from affinet.testing.hunt import Counterexample
-    from affinet.verdicts.checking import Checker
 
-
-def hunt_and_report(parsed: argparse.Namespace) -> bool:
-    """Hunt, and say what was found; whether nothing was.
+def hunt_and_report(parsed: argparse.Namespace) -> int:
+    """Hunt, and say what was found; to find something is to fail.
 
     Raises
     ------
     ScenarioError, PlanError, UserCodeError, OSError
         When the hunt cannot begin, or its smallest fault not be written.
     """
-    from affinet.testing import hunt, strategies  # hypothesis takes a while to import
-    from affinet.verdicts import invariants
-
     given = scenario(parsed)
     invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
     verbs = parsed.verbs or list(strategies.VERBS)
@@ -65,7 +62,7 @@ def hunt_and_report(parsed: argparse.Namespace) -> bool:
             else {"scenario": str(file), "finding": str(counterexample.finding), "digest": counterexample.digest}
         )
         print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
-    return counterexample is None
+    return PASS if counterexample is None else FAIL
 
 
 def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> None:

@@ -6,34 +6,28 @@ import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from affinet.cli.options.beginning import LISTED
 from affinet.cli.show import plain
-from affinet.scenario.sections import ScenarioError
+from affinet.planning import registry
+from affinet.reference import catalogue
+from affinet.reference.catalogue import default_of
+from affinet.reference.docstrings import first_line, parameters_of
+from affinet.reference.entries import Entry
+from affinet.scenario import files
+from affinet.scenario.profiles import IMPAIRMENTS
 from affinet.scenario.words import among
+from affinet.scenario.wrong import ScenarioError
+from netem.loading import modules
 
-if TYPE_CHECKING:
-    from affinet.reference.entries import Entry
-
-KINDS = ("scenarios", "estimators", "laws", "profiles", "impairments", "verbs", "checkers", "studies", "figures")
 _INDENT = 4
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Take `affinet list` in."""
-    listing = commands.add_parser(
-        "list",
-        help="what there is: scenarios, estimators, verbs, ..., with parameters, units and defaults",
-        description="List what there is of a kind, that of installed packages included.",
-    )
-    listing.add_argument("kind", nargs="?", choices=KINDS, metavar="KIND", help=f"one of: {', '.join(KINDS)}")
-    listing.add_argument("name", nargs="?", metavar="NAME", help="this one alone")
-    listing.add_argument("--json", action="store_true", help="print one JSON object")
+# Of which there may be some of one's own, by "module:Class".
+_OWN = {"estimators": registry.ESTIMATORS, "laws": registry.LAWS, "impairments": IMPAIRMENTS}
 
 
 def print_list(parsed: argparse.Namespace) -> None:
@@ -43,13 +37,16 @@ def print_list(parsed: argparse.Namespace) -> None:
     ------
     ScenarioError
         When there is nothing of this name.
+    UserCodeError
+        When a module of one's own fails.
     """
-    from affinet.reference import catalogue  # studies and what reads docstrings take a while to import
-
-    kinds = KINDS if parsed.kind is None else (parsed.kind,)
-    found = {kind: list(catalogue.KINDS[kind]()) for kind in kinds}
-    if parsed.name is not None:
-        found[parsed.kind] = _called(parsed.name, parsed.kind, found[parsed.kind])
+    if parsed.name is None:
+        kinds = LISTED if parsed.kind is None else (parsed.kind,)
+        found = {kind: list(catalogue.KINDS[kind]()) for kind in kinds}
+    elif ":" in parsed.name and parsed.kind in _OWN:
+        found = {parsed.kind: [_own(parsed.name, parsed.kind)]}
+    else:
+        found = {parsed.kind: _called(parsed.name, parsed.kind, list(catalogue.KINDS[parsed.kind]()))}
     if parsed.json:
         print(json.dumps({kind: [asdict(entry) for entry in entries] for kind, entries in found.items()}))  # noqa: T201
     elif parsed.kind is None:
@@ -65,6 +62,13 @@ def _called(name: str, kind: str, entries: Sequence[Entry]) -> list[Entry]:
     return chosen
 
 
+def _own(name: str, kind: str) -> Entry:
+    module = name.partition(":")[0]
+    folder = modules.holder(module, [files.working_directory()])
+    algorithm = registry.loaded(_OWN[kind], kind, name, folder)
+    return Entry(name, first_line(algorithm), tuple(parameters_of(algorithm)), module.partition(".")[0])
+
+
 def _print_kinds(found: dict[str, list[Entry]]) -> None:
     table = _table()
     for kind, entries in found.items():
@@ -75,7 +79,7 @@ def _print_kinds(found: dict[str, list[Entry]]) -> None:
 def _print_entries(entries: Sequence[Entry]) -> None:
     console = Console()
     for entry in entries:
-        brought = "" if entry.package == "affinet" else f" ({entry.package})"
+        brought = "" if entry.package == "affinet" or ":" in entry.name else f" ({entry.package})"
         console.print(Text(plain(entry.name + brought).plain, style="bold"))
         console.print(Padding(plain(entry.says), (0, 0, 0, _INDENT)))
         if entry.parameters:
@@ -83,8 +87,6 @@ def _print_entries(entries: Sequence[Entry]) -> None:
 
 
 def _parameters(entry: Entry) -> Table:
-    from affinet.reference.catalogue import default_of
-
     table = _table()
     for one in entry.parameters:
         kind = f"[{one.kind}]" if " | " in one.kind else ""

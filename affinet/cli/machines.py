@@ -28,7 +28,7 @@ _DONE, _FAILED = 0, 1
 
 def typed(plan: Plan, parsed: argparse.Namespace) -> Callable[[Path], Spread]:
     """All but the world is elsewhere, and its commands are typed there."""
-    endpoints.over_machines(parsed.listen)
+    endpoints.listening(parsed.listen)
     found = seats.by_hand(plan)
     keys, medium = str(Path(parsed.keys).absolute()), hosts.beside(parsed.listen)
     return partial(_spread, plan, found, parsed.listen, medium, keys, parsed.gone_after, ())
@@ -36,6 +36,7 @@ def typed(plan: Plan, parsed: argparse.Namespace) -> Callable[[Path], Spread]:
 
 def started(plan: Plan, read: Hosts, folder: Path) -> Callable[[Path], Spread]:
     """What a file says is elsewhere, and its commands are started from here."""
+    endpoints.listening(read.listen)
     found = seats.spread_over(plan, read)
     commands = [
         Command(machine.name, _words(machine, words, read, folder))
@@ -51,8 +52,9 @@ def hold(parsed: argparse.Namespace) -> int:
     numbers = getattr(parsed, "numbers", None)
     names = [HUB] if numbers is None else [seat_name(parsed.command, number) for number in dict.fromkeys(numbers)]
     listen = getattr(parsed, "listen", None)
-    for endpoint in filter(None, (parsed.connect, listen)):
-        endpoints.over_machines(endpoint)
+    endpoints.over_machines(parsed.connect)
+    if listen is not None:
+        endpoints.listening(listen)
     scenario = None
     if parsed.scenario is not None:
         scenario = digest_of(loading.load(parsed.scenario, parsed.set, files.working_directory()))

@@ -7,43 +7,23 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from rich import progress as bar
 from rich.console import Console
-from rich.table import Table
 
+from affinet.cli import means
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
-from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.scenario.units import MOST
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
-
-if TYPE_CHECKING:
-    from affinet.studies.sweeping import Setting
+from affinet.scenario.wrong import ScenarioError
+from affinet.studies import quantities, sweeping
+from affinet.studies.sweeping import Setting
+from affinet.verdicts import invariants
 
 _VERDICTS = ("pass", "vacuous", "fail")
 _OF_ONE_RUN = ("out", "view", "serve", "runtime")
-
-
-def add_options(run: argparse.ArgumentParser) -> None:
-    """Take in what many runs are told."""
-    many = run.add_argument_group("many runs, in this process, which leave a table and no directory")
-    many.add_argument("--seeds", type=_seeds, metavar="A-B", help="a run with each of these seeds")
-    many.add_argument(
-        "--sweep",
-        action="append",
-        default=[],
-        metavar="KEY=V,V,...",
-        help="runs with each of these values; several combine",
-    )
-    many.add_argument("--check", metavar="CHECKER", help="what else must hold of each run, like 'bounded(5)'")
-
-
-def are_asked_for(parsed: argparse.Namespace) -> bool:
-    """Whether the command line asks for many runs."""
-    return parsed.seeds is not None or bool(parsed.sweep) or parsed.check is not None
 
 
 def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -> bool:
@@ -56,9 +36,6 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     UserCodeError
         When a user's own code does something wrong.
     """
-    from affinet.studies import sweeping  # studies take a while to import
-    from affinet.verdicts import invariants
-
     if parsed.seeds is not None and parsed.seed is not None:
         raise ScenarioError("--seed and --seeds: give the one or the other")
     if given := [name for name in _OF_ONE_RUN if getattr(parsed, name)]:
@@ -86,8 +63,6 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
 
 
 def _plain(found: Sequence[Setting], seeds: range | None) -> dict[str, object]:
-    from affinet.studies import quantities, sweeping
-
     quantity = found[0].quantity
     says, unit = quantities.said(quantity)
     return {
@@ -115,35 +90,15 @@ def _finite(value: float) -> float | None:
 
 
 def _print(name: str, found: Sequence[Setting], runs: int) -> None:
-    from affinet.studies import quantities, sweeping
-
     says, unit = quantities.said(found[0].quantity)
     of_many = f", {runs} runs of each; {100 * sweeping.CONFIDENCE:g} % interval by Student's t" if runs > 1 else ""
-    console, table = Console(), Table()
+    console = Console()
     console.print(plain(f"{name}: {says}, mean over each run{of_many}"), soft_wrap=True)
-    for key in found[0].labels:
-        table.add_column(plain(key))
-    for heading in (f"mean ({unit})" if unit else "mean", *(["interval"] if runs > 1 else []), "verdicts"):
-        table.add_column(heading)
-    for setting in found:
-        mean = setting.mean
-        between = [f"{mean.low:.4g} to {mean.high:.4g}"] if runs > 1 else []
-        table.add_row(
-            *map(plain, (*setting.labels.values(), f"{mean.found:.4g}", *between, _verdicts(setting.verdicts)))
-        )
-    console.print(table)
+    rows = [
+        means.Row(one.labels, one.mean.found, one.mean.low, one.mean.high, _verdicts(one.verdicts)) for one in found
+    ]
+    means.show(console, rows, unit, intervals=runs > 1)
 
 
 def _verdicts(counted: Mapping[str, int]) -> str:
     return ", ".join(f"{counted[verdict]} {verdict}" for verdict in _VERDICTS if counted.get(verdict))
-
-
-def _seeds(text: str) -> range:
-    first, dash, last = text.partition("-")
-    ends = (first, last if dash else first)
-    if not all(end.isascii() and end.isdecimal() for end in ends):
-        raise argparse.ArgumentTypeError(f"{text!r}: write seeds as 1-50, or one as 7")
-    low, high = map(int, ends)
-    if high < low or high - low >= MOST or high >= 2**64:
-        raise argparse.ArgumentTypeError(f"{text!r}: give the smaller seed first, and seeds below 2^64")
-    return range(low, high + 1)

@@ -5,43 +5,23 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from rich import progress as bar
 
+from affinet.cli.options.flown import STILL
 from affinet.cli.progress import Bar
-from affinet.scenario.sections import ScenarioError
+from affinet.runtimes import directories
+from affinet.scenario.names import apart
 from affinet.scenario.words import one_line
-from affinet.verdicts import pictured, reading
+from affinet.scenario.wrong import ScenarioError
+from affinet.verdicts import beside, pictured, reading
+from analysis.figures import swarm
+from analysis.figures.swarm import Flight
 from analysis.models.arrays import Array
 from netem.processes.system_errors import about
 
-if TYPE_CHECKING:
-    from analysis.figures.swarm import Flight
-
-_STILL, _MOVING = (".png", ".pdf", ".svg", ".jpg"), (".mp4", ".gif")
 _MOST_FRAMES = 20_000
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command `render`."""
-    render = commands.add_parser("render", help="a picture or a film of runs, for a paper or a page")
-    render.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories, side by side")
-    render.add_argument(
-        "--out", required=True, type=_picture, metavar="FILE", help=f"ends in {', '.join((*_STILL, *_MOVING))}"
-    )
-    render.add_argument("--at", type=float, metavar="S", help="of a picture: which moment (default: the last)")
-    render.add_argument(
-        "--speed", type=_positive, default=4.0, metavar="X", help="of a film: times real time (default: %(default)g)"
-    )
-    render.add_argument(
-        "--fps", type=int, default=15, choices=range(1, 61), metavar="N", help="frames a second (default: %(default)s)"
-    )
-    render.add_argument(
-        "--from", dest="begins", type=float, default=0.0, metavar="S", help="of a film: its first moment"
-    )
-    render.add_argument("--to", dest="ends", type=float, metavar="S", help="of a film: its last moment")
 
 
 def render(parsed: argparse.Namespace) -> None:
@@ -54,14 +34,13 @@ def render(parsed: argparse.Namespace) -> None:
     OSError
         When the file cannot be written.
     """
-    from analysis.figures import swarm  # matplotlib takes a while to import
-
-    flights = [
-        pictured.flight(reading.evidence(directory), directory.absolute().name) for directory in parsed.directories
-    ]
+    directories.refuse_there(parsed.out)
+    runs = [reading.evidence(directory) for directory in parsed.directories]
+    titles = beside.titles(runs, apart(parsed.directories))
+    flights = [pictured.flight(run, title) for run, title in zip(runs, titles, strict=True)]
     last = max(float(flight.seconds[-1]) for flight in flights)
     with about(parsed.out):
-        if parsed.out.suffix in _STILL:
+        if parsed.out.suffix in STILL:
             swarm.still(flights, _within("--at", last if parsed.at is None else parsed.at, last), parsed.out)
         else:
             _film(flights, _moments(parsed, last), parsed.fps, parsed.out)
@@ -69,8 +48,6 @@ def render(parsed: argparse.Namespace) -> None:
 
 
 def _film(flights: Sequence[Flight], moments: Array, frames_per_s: int, out: Path) -> None:
-    from analysis.figures import swarm
-
     try:
         with Bar(str(out), len(moments), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
             for number in swarm.film(flights, moments, frames_per_s, out):
@@ -97,20 +74,3 @@ def _within(option: str, seconds: float, last: float) -> float:
     if not 0.0 <= seconds <= last:
         raise ScenarioError(f"{option} {seconds:g}: give a moment from 0 to {last:g} s")
     return seconds
-
-
-def _picture(text: str) -> Path:
-    path = Path(text)
-    if path.suffix not in (*_STILL, *_MOVING):
-        raise argparse.ArgumentTypeError(f"{text!r}: give a name that ends in {', '.join((*_STILL, *_MOVING))}")
-    return path
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-3 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r}: give a number from 0.001 to 1e6")
-    return value

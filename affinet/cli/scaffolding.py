@@ -6,20 +6,8 @@ import argparse
 from pathlib import Path
 
 from affinet.runtimes import directories
+from affinet.scaffold import making
 from affinet.scenario import files
-
-KINDS = ("scenario", "estimator", "law", "study", "test", "project")
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Take `affinet new` in."""
-    new = commands.add_parser(
-        "new",
-        help="write a scenario, an estimator, a law, a study, a test or a project to begin with",
-        description="Write a small, commented thing that works at once, into the working directory. Nothing is overwritten.",
-    )
-    new.add_argument("kind", choices=KINDS, metavar="KIND", help=f"one of: {', '.join(KINDS)}")
-    new.add_argument("name", metavar="NAME", help="small letters, figures and dashes, like my-filter")
 
 
 def write(parsed: argparse.Namespace) -> None:
@@ -32,8 +20,6 @@ def write(parsed: argparse.Namespace) -> None:
     OSError
         When something of it is there already, or cannot be written.
     """
-    from affinet.scaffold import making  # what there is of each kind takes a while to import
-
     folder = files.working_directory()
     made, then = making.make(parsed.kind, parsed.name, folder)
     for path in made:

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from affinet.cli import show
+from affinet.cli import means, show
+from affinet.cli.status import FAIL, PASS
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.runtimes.interruption import ended_by_signals
@@ -22,8 +23,8 @@ from affinet.studies.sharing import flown_by_case
 from affinet.studies.study import Case, Result, Study
 
 
-def fly_and_report(parsed: argparse.Namespace) -> bool:
-    """Fly a study and leave its report; whether all of it is there.
+def fly_and_report(parsed: argparse.Namespace) -> int:
+    """Fly a study and leave its report, which fails where not all of it is there.
 
     Raises
     ------
@@ -33,7 +34,7 @@ def fly_and_report(parsed: argparse.Namespace) -> bool:
     study = studies.load(parsed.study)
     planned = studies.plans(study, quick=parsed.quick)
     with _executor(parsed, [plan for _, plan in planned]) as executor:
-        return _into_its_directory(study, planned, parsed, executor)
+        return PASS if _into_its_directory(study, planned, parsed, executor) else FAIL
 
 
 @contextmanager
@@ -95,6 +96,7 @@ def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, o
         verdicts = judging.judge(study, results)
         judged = record.recorded(study, results, verdicts, flown=flown, quick=parsed.quick)
         record.write(out, judged)
+        means.of_study(judged, out)
         show.claims(judged, record.full_study(parsed.study), out)
         report.draw(out, study, results)
     except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said

@@ -7,6 +7,8 @@ import os
 import sys
 from typing import TYPE_CHECKING, TextIO
 
+from netem.processes.system_errors import about
+
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
@@ -34,7 +36,8 @@ class _WhileTaken(io.FileIO):
     def write(self, data: ReadableBuffer, /) -> int:
         """Write what is still taken."""
         try:
-            return super().write(data)
+            with about("what it prints"):
+                return super().write(data)
         except self._dropping:
             return memoryview(data).nbytes
 

@@ -17,26 +17,10 @@ from affinet.runtimes.rerun_command import NoViewer
 from affinet.runtimes.viewers import WebViewer, open_viewer, show
 from affinet.scenario import loading
 from affinet.scenario.names import apart
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
+from affinet.scenario.wrong import ScenarioError
 from netem.core.parts import parts
 from world.recording.file import RECORDING
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command `watch`."""
-    watch = commands.add_parser("watch", help="watch what was flown: one run, or several on one timeline")
-    watch.add_argument("directories", nargs="+", type=Path, metavar="RUN", help="run directories")
-    watch.add_argument("--serve", action="store_true", help="as a page for a browser on this machine, until Ctrl-C")
-
-
-def add_live(command: argparse.ArgumentParser) -> None:
-    """Add what shows a run while it flies."""
-    shown = command.add_mutually_exclusive_group()
-    shown.add_argument("--view", action="store_true", help="watch in a Rerun viewer while it flies")
-    shown.add_argument(
-        "--serve", action="store_true", help="watch in a browser on this machine while it flies, and on until Ctrl-C"
-    )
 
 
 def watch(parsed: argparse.Namespace) -> None:

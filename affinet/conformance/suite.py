@@ -12,7 +12,7 @@ from affinet.conformance.flights import PLAIN
 from affinet.conformance.flying import Patience, flown
 from affinet.conformance.record import Record
 from affinet.planning.plan import PlanError
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 Verdict = Literal["pass", "fail", "not applicable", "not reached"]
 

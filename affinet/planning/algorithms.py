@@ -7,7 +7,8 @@ from typing import Any
 
 from affinet.planning import checks, registry
 from affinet.scenario import sections
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from agents.centre.checked import CheckedCentre
 from agents.laws.base import Law
 from agents.loading import capabilities

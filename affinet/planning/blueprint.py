@@ -10,8 +10,9 @@ import numpy as np
 
 from affinet.planning.lateness import Lateness
 from affinet.scenario import sections, selectors
-from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
+from affinet.scenario.sections import Scenario, TimeSection
 from affinet.scenario.target import TargetSection, Waypoint
+from affinet.scenario.wrong import ScenarioError
 from agents.brief import Brief
 from agents.swarm import SwarmBrief
 from analysis.models.affine import Manoeuvre

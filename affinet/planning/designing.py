@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from affinet.scenario.sections import Scenario, ScenarioError
-from affinet.scenario.units import LARGEST
+from affinet.scenario.bounds import LARGEST
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import shown
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.arrays import Array
 from world.formation import layouts
 from world.formation.design import design

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from affinet.planning import csv_logs
 from affinet.planning.blueprint import formation_of
 from affinet.scenario import inputs, loading, sections
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
 from world.books import history
 from world.physics.recorded import RecordedFlight

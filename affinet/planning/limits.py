@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.link_classes import LinkClass
-from affinet.scenario.sections import Scenario, ScenarioError, TimeSection, TrustSection
-from affinet.scenario.units import LARGEST, SMALLEST
+from affinet.scenario.bounds import LARGEST, SMALLEST
+from affinet.scenario.sections import Scenario, TimeSection, TrustSection
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.finding import Finding
 from netem.core.links import Links
 from world.books.history import forms

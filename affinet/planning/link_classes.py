@@ -11,7 +11,8 @@ import numpy as np
 
 from affinet.scenario import profiles, selectors
 from affinet.scenario.profiles import LinkProfile
-from affinet.scenario.sections import NetworkSection, ScenarioError, said_at
+from affinet.scenario.sections import NetworkSection
+from affinet.scenario.wrong import ScenarioError, said_at
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
 from netem.impairments import delay, loss, measured

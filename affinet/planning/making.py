@@ -32,7 +32,8 @@ from affinet.planning.blueprint import brief_of, formation_of, keyframes_of, swa
 from affinet.planning.plan import Plan, PlanError, agents_of
 from affinet.planning.programs import refuse_strangers
 from affinet.scenario import inputs, loading
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from agents.centre.checked import centre_of
 from agents.laws.base import Law
 from agents.loading import capabilities

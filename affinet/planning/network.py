@@ -13,7 +13,8 @@ from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
 from affinet.scenario.profiles import LinkProfile
-from affinet.scenario.sections import NetworkSection, Scenario, ScenarioError, TimeSection
+from affinet.scenario.sections import NetworkSection, Scenario, TimeSection
+from affinet.scenario.wrong import ScenarioError
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.finding import Finding

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.finding import Finding
 from netem.faults.fault import Fault, Verb
 from netem.faults.trigger import Trigger

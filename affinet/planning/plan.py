@@ -23,6 +23,7 @@ from analysis.models.finding import Finding
 from analysis.models.information import reported
 from netem.core.channels import PLACE
 from netem.core.pace import Pace
+from netem.core.refusal import Refusal
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
@@ -38,7 +39,7 @@ _MOST_OF_A_BATCH = 50
 _BATCH_S, _BATCH_IN_REAL_TIME_S = 1.0, 0.25
 
 
-class PlanError(ValueError):
+class PlanError(Refusal, ValueError):
     """The scenario is well formed, but cannot fly: why, in plain words."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:

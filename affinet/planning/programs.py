@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from affinet.planning.plan import Plan, PlanError
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.finding import Finding
 from netem.core.listing import listed
 from netem.loading import modules

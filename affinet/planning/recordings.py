@@ -10,7 +10,8 @@ import numpy as np
 
 from affinet.planning.blueprint import formation_of
 from affinet.scenario import loading
-from affinet.scenario.sections import Scenario, ScenarioError, TimeSection
+from affinet.scenario.sections import Scenario, TimeSection
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.arrays import Mask
 from netem.core.links import Links
 from netem.core.listing import listed

@@ -10,14 +10,15 @@ from typing import Any, NamedTuple
 
 from affinet.planning import limits
 from affinet.scenario.profiles import IMPAIRMENTS
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import among, one_line
+from affinet.scenario.wrong import ScenarioError
 from agents.estimators.base import Estimator
 from agents.laws.base import Law
 from netem.impairments.own import Loss
 from netem.loading import modules, parameters
 from netem.loading.calling import Calling, NoSuchAlgorithm, load, name_of
-from netem.loading.choice import Choice, offered
+from netem.loading.choice import Choice
+from netem.loading.offers import offered
 from netem.loading.parameters import ParameterError
 from netem.processes.user_code import UserCodeError, definition, text_of
 
@@ -69,10 +70,24 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mappi
         When its module cannot be imported, or it is not what an algorithm of this group has to be.
     """
     path = _path(group, key, name)
-    algorithm = _load(key, path, own.get(name))
-    _refuse_another_kind(group, algorithm)
+    algorithm = loaded(group, key, path, own.get(name))
     table = key if group == IMPAIRMENTS else f"agents.parameters.{name}"  # parameters stand beside an impairment's name
     return _made(table, name, path, algorithm, given, own.get(name))
+
+
+def loaded(group: str, key: str, path: str, folder: Path | None) -> type:
+    """The class at "module:Class" of a folder, or of an installed package, which is an algorithm of this group.
+
+    Raises
+    ------
+    ScenarioError
+        When there is none.
+    UserCodeError
+        When its module cannot be imported, or it is not what an algorithm of this group has to be.
+    """
+    algorithm = _load(key, path, folder)
+    _refuse_another_kind(group, algorithm)
+    return algorithm
 
 
 def check_parameters(given: Mapping[str, Mapping[str, Any]], own: Mapping[str, Path]) -> None:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 from affinet.scenario import profiles, selectors, verbs
 from affinet.scenario.events import Event, Found, Lasting, When
-from affinet.scenario.sections import Scenario, ScenarioError, said_at
+from affinet.scenario.sections import Scenario
 from affinet.scenario.selectors import ChoiceKey
 from affinet.scenario.words import among
+from affinet.scenario.wrong import ScenarioError, said_at
 from netem.core.links import Links
 from netem.faults.fault import Fault, Pairs, Verb
 from netem.faults.timeline import Timeline

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from affinet.scenario import selectors
 from affinet.scenario.real_time import TimerSetting
-from affinet.scenario.sections import Scenario, ScenarioError, said_at
+from affinet.scenario.sections import Scenario
 from affinet.scenario.selectors import ChoiceKey
+from affinet.scenario.wrong import ScenarioError, said_at
 from agents.timer import Timer
 from netem.core.pace import Pace
 from world.formation.nominal import Formation

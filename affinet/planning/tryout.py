@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.agent import Agent, AgentAction
 from agents.brief import Brief
 from agents.centre.checked import CheckedCentre

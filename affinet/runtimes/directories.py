@@ -76,6 +76,18 @@ def new_file(file: Path, text: str) -> None:
             raise FileExistsError(f"{str(file)!r} is there already; name another") from error
 
 
+def refuse_there(file: Path) -> None:
+    """Go on if a file that is to be written would take the place of none.
+
+    Raises
+    ------
+    FileExistsError
+        When it would.
+    """
+    if file.is_file():  # what is no file, like /dev/stdout, is written to
+        raise FileExistsError(f"{str(file)!r} is there already; name another with --out, or remove it")
+
+
 @contextmanager
 def unless_empty(path: Path) -> Iterator[None]:
     """A directory or file made for what the block finds; it goes again where that was nothing."""

@@ -17,6 +17,7 @@ import psutil
 
 from affinet.planning import making
 from affinet.runtimes.private import socket_folder
+from affinet.runtimes.rerun_command import NoViewer, command
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from analysis.kernels import kept
@@ -122,13 +123,13 @@ def _kernels(check: str) -> Finding:
 
 
 def _viewer(check: str) -> Finding:
-    if shutil.which("rerun", path=os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])) is None:
-        return Finding(
-            check, "note", "the `rerun` command of rerun-sdk is not on the path; recordings are written all the same"
-        )
+    try:
+        viewer = command()
+    except NoViewer as error:
+        return Finding(check, "note", f"{error}; recordings are written all the same")
     if sys.platform == "linux" and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")):
-        return Finding(check, "note", "no display: fly without --view, and open run.rrd where there is one")
-    return Finding(check, "ok", "a display is there, and the `rerun` command")
+        return Finding(check, "note", "no display: `--serve` shows a run in a browser, in place of --view")
+    return Finding(check, "ok", f"a display is there, and {viewer}")
 
 
 def _self_test(check: str) -> Finding:

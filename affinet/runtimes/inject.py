@@ -13,9 +13,10 @@ from pydantic import TypeAdapter
 
 from affinet.planning.blueprint import formation_of
 from affinet.scenario import selectors
+from affinet.scenario.bounds import LARGEST
 from affinet.scenario.sections import Scenario
-from affinet.scenario.units import LARGEST
 from netem.core.links import Links
+from netem.core.refusal import Refusal
 from netem.faults.control import Answer, Order, OrderAction
 from netem.faults.fault import Fault, UnderWay, Verb
 from netem.processes.system_errors import about, afterwards
@@ -90,7 +91,7 @@ class InjectRequest:
             raise ValueError(f"a loss of {self.loss:g}: a probability lies in [0, 1]")
 
 
-class NotFlying(RuntimeError):
+class NotFlying(Refusal, RuntimeError):
     """There is no such run, or it flies no more."""
 
 

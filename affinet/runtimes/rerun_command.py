@@ -6,10 +6,12 @@ import subprocess
 from importlib.util import find_spec
 from pathlib import Path
 
+from netem.core.refusal import Refusal
+
 _NOTHING_IN_IT, _MAY_BE_NOTHING = b"no data recording found", 1024  # bytes: a first chunk alone is longer
 
 
-class NoViewer(RuntimeError):
+class NoViewer(Refusal, RuntimeError):
     """The command is not there, or no viewer could be started: why."""
 
 

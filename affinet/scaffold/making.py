@@ -15,7 +15,7 @@ from typing import Any
 
 from affinet.reference import schema
 from affinet.runtimes import directories
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 _NAME = re.compile(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*")
 _SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {

@@ -9,8 +9,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import hint, one_line
+from affinet.scenario.wrong import ScenarioError
 
 
 class Read(NamedTuple):

@@ -16,9 +16,10 @@ from affinet.scenario import files, inputs
 from affinet.scenario import overrides as changes
 from affinet.scenario.explain import explained
 from affinet.scenario.overrides import Given, Override
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
 from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.words import one_line
+from affinet.scenario.wrong import ScenarioError
 from netem.core.plain import shown
 
 FILE = inputs.SCENARIO

@@ -7,7 +7,7 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any
 
 from affinet.scenario import values
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.core.plain import shown
 from netem.loading import parameters
 from netem.loading.calling import Calling, name_of

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from affinet.scenario import inputs, objects, sections, source, values
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import among, one_line, shown
+from affinet.scenario.wrong import ScenarioError
 
 # Words of the command line, and keywords in Python, for the keys that are changed most.
 SHORT: Mapping[str, str] = {

@@ -32,7 +32,7 @@ from affinet.scenario.units import (
 )
 from affinet.scenario.words import among, hint, shown
 from netem.impairments import netem_string
-from netem.loading.choice import offered
+from netem.loading.offers import offered
 
 IMPAIRMENTS = "affinet.impairments"  # the group of entry points
 

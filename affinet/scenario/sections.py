@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -34,6 +33,7 @@ from affinet.scenario.units import (
 )
 from affinet.scenario.verbs import AnyEvent
 from affinet.scenario.words import among
+from affinet.scenario.wrong import ScenarioError
 from analysis.models.sensor import Sensor
 from world.formation import swarms
 from world.physics.bodies import BodyModel
@@ -41,24 +41,9 @@ from world.physics.bodies import BodyModel
 Matrix = list[list[Finite]]
 
 
-class ScenarioError(ValueError):
-    """What is wrong in a scenario, in one line: file, key, and what would be right."""
-
-
 def _edge(text: str) -> str:
     edge(text)
     return text
-
-
-@contextmanager
-def said_at(key: str) -> Iterator[None]:
-    """What is wrong in the block is said as a problem of this key."""
-    try:
-        yield
-    except ScenarioError:
-        raise
-    except ValueError as error:
-        raise ScenarioError(f"{key}: {error}") from error
 
 
 Edge = Annotated[str, AfterValidator(_edge)]

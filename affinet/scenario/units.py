@@ -1,8 +1,4 @@
-"""How small and how large the numbers of a scenario may be.
-
-In SI units nothing that flies is measured in less than a billionth, or in more than a billion; within these bounds squares and
-quotients of what a scenario says are far from where floats vanish and overflow, and counts from where integers wrap.
-"""
+"""The numbers of a scenario by what they are: types with their bounds, and times in order."""
 
 from __future__ import annotations
 
@@ -13,8 +9,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-SMALLEST, LARGEST = 1e-9, 1e9
-MOST = 10**9
+from affinet.scenario.bounds import LARGEST, MOST, SMALLEST
+
 _SHORTEST_TICK = 1e-6
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from analysis.models import autoregressive
 from analysis.models.autoregressive import Model
 from world.books import history

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies.quantities import Quantity, over_time, said
 from affinet.studies.study import Claim, Result, Study, selected
 from analysis.claims import checks, random_graphs

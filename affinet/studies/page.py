@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import record
 from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
 from affinet.verdicts.page import html

@@ -25,9 +25,10 @@ from affinet.scenario import loading as scenarios
 from affinet.scenario.explain import explained, named_in
 from affinet.scenario.keys import key
 from affinet.scenario.profiles import Section
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
 from affinet.scenario.source import Source
 from affinet.scenario.units import Finite, NotNegative
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import checks
 from affinet.studies.batch import Runs, fly_together
 from affinet.studies.checks import Wrong

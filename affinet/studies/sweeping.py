@@ -18,7 +18,8 @@ from affinet.planning.plan import Plan
 from affinet.planning.programs import refuse_in_process
 from affinet.runtimes.run import rehearse
 from affinet.runtimes.side_by_side import NotABatch, side_by_side
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import pool, study
 from affinet.studies.executor import Executor, Here
 from affinet.studies.study import Case

@@ -15,7 +15,8 @@ from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse
 from affinet.scenario.loading import extended
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing import strategies
 from affinet.testing.strategies import Entries
 from affinet.verdicts.checking import Checker, CheckResult

@@ -13,6 +13,8 @@ from world.books.history import Arrays
 
 Row = tuple[str, tuple[str, ...]]
 _UNSAID = "-"
+_NOT_FLOWN = ("record.", "description")  # settings of which a flight knows nothing
+_QUOTE, _LONGEST = '"', 60
 
 
 def settings(runs: Sequence[Evidence]) -> list[Row]:
@@ -21,6 +23,15 @@ def settings(runs: Sequence[Evidence]) -> list[Row]:
     keys = dict.fromkeys(key for one in said for key in one)
     rows = [(key, tuple(shown(one[key]) if one.get(key) is not None else _UNSAID for one in said)) for key in keys]
     return [(key, values) for key, values in rows if len(set(values)) > 1]
+
+
+def titles(runs: Sequence[Evidence], names: Sequence[str]) -> list[str]:
+    """What tells runs apart above a picture: the settings of the flight that differ, and their names where that does not do."""
+    rows = [(key.rpartition(".")[2], values) for key, values in settings(runs) if not key.startswith(_NOT_FLOWN)]
+    told = [", ".join(f"{key} {values[number].strip(_QUOTE)}" for key, values in rows) for number in range(len(runs))]
+    if not rows or len(set(told)) < len(told) or max(map(len, told)) > _LONGEST:
+        return list(names)
+    return told
 
 
 def figures(runs: Sequence[Evidence]) -> list[Row]:

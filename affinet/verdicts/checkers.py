@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from affinet.scenario.words import among
-from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, span_of, times
+from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, failed, moment, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
 from analysis.metrics import consistency, localization
@@ -82,8 +82,8 @@ def eventually(signal: Signal, *, since: float = 0.0, within: float | None = Non
             return CheckResult(name, "vacuous", None, "the run ended before")
         if holds.any():
             tick = span.start + int(np.argmax(holds))
-            return CheckResult(name, "pass", None, f"from tick {tick} ({tick * evidence.dt:g} s)")
-        return CheckResult(name, "fail", span.stop - 1, f"never, up to {(span.stop - 1) * evidence.dt:g} s")
+            return CheckResult(name, "pass", None, f"from {moment(evidence, tick)} on")
+        return CheckResult(name, "fail", span.stop - 1, f"never, up to {moment(evidence, span.stop - 1)}")
 
     return Checker(name, check)
 
@@ -159,8 +159,8 @@ def recovers(level: float, within: float) -> Checker:
             if late.any():
                 tick = deadline + int(np.argmax(late))
                 after = (tick - fault.end) * evidence.dt
-                says = f"{evidence.error[tick]:.4g} m² {after:g} s after the end of '{fault.describe()}'"
-                return CheckResult(name, "fail", tick, says)
+                says = f"it is {evidence.error[tick]:.4g} m², {after:g} s after the end of '{fault.describe()}'"
+                return failed(name, evidence, tick, says)
         if not lifted:
             return CheckResult(name, "vacuous", None, why)
         return CheckResult(name, "pass", None, f"after {lifted} faults")
@@ -220,7 +220,7 @@ def never_heard_across_a_cut() -> Checker:
                 tick, channel, place = heard[0].tolist()
                 row = int(np.flatnonzero(held)[place])
                 who = f"{links.dst[row]} heard {links.src[row]} on {evidence.plan.channels[channel]}"
-                return CheckResult(name, "fail", fault.start + tick, f"{who} across '{fault.describe()}'")
+                return failed(name, evidence, fault.start + tick, f"{who} across '{fault.describe()}'")
         if not kept_back:
             return CheckResult(name, "vacuous", None, "nothing was cut")
         return CheckResult(name, "pass", None, f"{kept_back} messages were cut")
@@ -266,7 +266,7 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
                 return CheckResult(
                     name, "vacuous", None, "it is not known where agents are, and so not how far off they are"
                 )
-            return CheckResult(name, "fail", tick, "the NEES is not a number any more")
+            return failed(name, evidence, tick, "the NEES is not a number any more")
         series, dimension = mean[ticks], evidence.plan.world.formation.dimension
         found = consistency.averaged(series, level)
         says = f"mean NEES {found.mean:.3g} +- {found.half:.2g} for {dimension} dimensions"
@@ -280,8 +280,8 @@ def consistent(level: float = 0.99, within: float = 0.25, since: float = 0.0) ->
             return CheckResult(name, "vacuous", None, f"{says} {few}")
         if abs(off) > found.half or not explicable:
             worst = int(np.argmax(np.sign(off) * (found.batches - dimension) >= abs(off)))
-            first = ticks[worst * len(ticks) // consistency.BATCHES]
-            return CheckResult(name, "fail", span.start + int(first), says)
+            first = span.start + int(ticks[worst * len(ticks) // consistency.BATCHES])
+            return CheckResult(name, "fail", first, f"{says}, as far off from {moment(evidence, first)} on")
         if found.half > within * dimension:
             return CheckResult(name, "vacuous", None, f"{says}: too few independent ticks to tell")
         return CheckResult(name, "pass", None, says)

@@ -142,6 +142,16 @@ def span_of(evidence: Evidence, since: float, until: float | None) -> range:
     return range(evidence.tick(since), stop)
 
 
+def moment(evidence: Evidence, tick: int) -> str:
+    """A tick, by its time and its number."""
+    return f"{tick * evidence.dt:g} s (tick {tick})"
+
+
+def failed(name: str, evidence: Evidence, tick: int, why: str) -> CheckResult:
+    """That something does not hold in a tick, the first in which it does not."""
+    return CheckResult(name, "fail", tick, f"at {moment(evidence, tick)} {why}")
+
+
 def every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[[int], str]) -> CheckResult:
     """Whether what should hold (T,) does in every tick of a span; `why` says what offends in one."""
     if not len(holds):
@@ -151,7 +161,7 @@ def every(name: str, evidence: Evidence, span: range, holds: Any, why: Callable[
     tick = span.start + int(np.argmin(holds))
     if not evidence.located[tick]:
         return CheckResult(name, "vacuous", None, f"from {tick * evidence.dt:g} s on it is not known where agents are")
-    return CheckResult(name, "fail", tick, f"at {tick * evidence.dt:g} s (tick {tick}) {why(tick)}")
+    return failed(name, evidence, tick, why(tick))
 
 
 def _joined(sign: str, one: Checker, other: Checker, worst: tuple[RunVerdict, ...]) -> Checker:

@@ -6,8 +6,8 @@ import ast
 import inspect
 from collections.abc import Callable
 
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import hint, one_line
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import checkers, pursued
 from affinet.verdicts.checking import Checker
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from msgspec import Meta
 
 from affinet.planning import making
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import outcome, timing
 from affinet.verdicts.evidence import Evidence
 from netem.core.plain import PlainError, from_plain

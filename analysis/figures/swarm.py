@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from numpy.typing import NDArray
 
@@ -21,6 +22,7 @@ from analysis.figures.axes import logarithmic
 from analysis.models.arrays import Array, Integers, Mask
 
 _TRAIL_S = 8.0
+_MOST_NUMBERS = 60  # agents, above which their numbers hide them
 _STYLE: dict[Any, Any] = {"font.size": 8, "axes.grid": False, "text.parse_math": False}
 _LEADER, _FOLLOWER, _FAINT, _WALL, _JAMMED = "#c98a00", "#2f7fc1", "#b4b4bc", "#8d8172", "#f2d024"
 _MARGIN = 0.4  # of what is shown, about a formation at its largest
@@ -129,6 +131,7 @@ class _Panel:
         self._trails.set_color(kinds)
         solid = {} if self._flat else {"depthshade": False}
         self._agents = axes.scatter(*flight.position[0].T, c=kinds, s=18, zorder=3, **solid)
+        self._numbers = [self._number(agent + 1) for agent in range(len(kinds))] if len(kinds) <= _MOST_NUMBERS else []
         for axis in "xy" if self._flat else "xyz":
             getattr(axes, f"set_{axis}label")(f"{axis} (m)")
         if self._flat:
@@ -136,6 +139,14 @@ class _Panel:
         self._cursor: Any = None
         extent = np.ptp(flight.target, axis=1).max(axis=0)
         self._reach = (1.0 + _MARGIN) / 2.0 * float(max(extent[0] / _WIDE, extent[1]) if self._flat else extent.max())
+
+    def _number(self, agent: int) -> Any:
+        """The number of an agent, beside it; beyond the panel there is none."""
+        look: Any = {"fontsize": 7, "zorder": 4, "path_effects": [withStroke(linewidth=1.5, foreground="white")]}
+        if self._flat:
+            beside = {"xytext": (3.0, 3.0), "textcoords": "offset points", "annotation_clip": True}
+            return self._axes.annotate(f"{agent}", (0.0, 0.0), **beside, **look)
+        return self._axes.text(0.0, 0.0, 0.0, f"  {agent}", axlim_clip=True, **look)
 
     def curve(self, axes: Any, flight: Flight) -> None:
         """The quantity over time, with a line at the moment that is shown."""
@@ -162,6 +173,12 @@ class _Panel:
             self._agents.set_offsets(position)
         else:
             self._agents._offsets3d = tuple(position.T)
+        for number, place in zip(self._numbers, position, strict=False):
+            number.set_visible(bool(np.isfinite(place).all()))
+            if self._flat:
+                number.xy = place
+            else:
+                number.set_position_3d(place)
         self._look_at(target)
         self._cursor.set_xdata([flight.seconds[tick]] * 2)
 

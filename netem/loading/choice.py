@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from typing import Any
 
 from netem.loading import parameters
@@ -42,8 +41,3 @@ class Choice:
         with Calling(kind, "__getattribute__"):
             made.__class__  # noqa: B018 - whoever asks what it is asks this, and it may refuse to tell
         return made
-
-
-def offered(group: str) -> dict[str, str]:
-    """What installed packages offer in a group of entry points: "module:Class" by name."""
-    return {point.name: f"{point.module}:{point.attr}" for point in entry_points(group=group)}

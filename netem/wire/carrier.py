@@ -10,6 +10,7 @@ from typing import Any
 
 import zenoh
 
+from netem.wire import reasons
 from netem.wire.session import CONTROL, Login, client, identity
 
 _WAITING_CHANGES = 4
@@ -222,7 +223,7 @@ class Session:
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
-            raise NotCarried(str(error)) from error
+            raise NotCarried(reasons.plain(str(error))) from error
         self._tokens: list[zenoh.LivelinessToken] = []
         self._handing: list[Any] = []  # hand over for as long as somebody has them
 
@@ -294,7 +295,7 @@ class Session:
                 consolidation=zenoh.ConsolidationMode.NONE,
             )
         except zenoh.ZError as error:
-            raise NotCarried(str(error)) from error
+            raise NotCarried(reasons.plain(str(error))) from error
         return [(str(reply.ok.key_expr), reply.ok.payload.to_bytes()) for reply in answers if reply.ok is not None]
 
     def doorway(self, names: Iterable[str]) -> Doorway:

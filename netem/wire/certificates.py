@@ -14,6 +14,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from netem.core.refusal import Refusal
+
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
 
@@ -29,7 +31,7 @@ _ALERTS = {
 }
 
 
-class NotTrusted(ValueError):
+class NotTrusted(Refusal, ValueError):
     """What a process would connect or listen with is no proof of who it is: why, in one line."""
 
 

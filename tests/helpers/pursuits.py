@@ -4,7 +4,8 @@ import pytest
 from flying import plan_of
 
 from affinet.planning.plan import PlanError
-from affinet.scenario.sections import INTEGRATORS, ScenarioError
+from affinet.scenario.sections import INTEGRATORS
+from affinet.scenario.wrong import ScenarioError
 
 NAME = "target"
 COARSE = ("time.dt=0.01", "target.latencies=[0.2,0.1]", "agents.parameters.target.theta=4")

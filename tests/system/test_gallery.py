@@ -8,7 +8,7 @@ import pytest
 from paths import ROOT
 
 from affinet.runtimes.run import rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import Swarm, SwarmRuns
 
 FAILURES = (AssertionError, ScenarioError, LookupError)

@@ -150,13 +150,13 @@ class Meets(importlib.abc.MetaPathFinder):
 
 sys.meta_path.insert(0, Meets())
 signal.signal(signal.SIGINT, {handler})
-sys.argv = ["affinet", "--version"]
+sys.argv = ["affinet", "check", "corridor"]
 from affinet.__main__ import command
 command()
 """
 
 
-@pytest.mark.parametrize("library", ["pydantic", "numpy", "affinet.cli.options"])
+@pytest.mark.parametrize("library", ["pydantic", "numpy", "affinet.cli.options", "affinet.cli.checking"])
 def test_ctrl_c_that_a_library_meets_while_it_is_imported_ends_the_command_by_that(library):
     code = MEETS_CTRL_C.format(library=library, handler="signal.default_int_handler")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -20,7 +20,7 @@ from affinet.runtimes.inject import Access, InjectRequest
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import outcome as outcomes
 from affinet.verdicts import reading
 from netem.core import arrow

@@ -15,7 +15,7 @@ from affinet.planning import making
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts.checkers import bounded, collision_free, consistent
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.outcome import Outcome

@@ -11,7 +11,7 @@ from paths import BENCH
 from scripted import timeline
 
 from affinet.runtimes.run import rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.estimators.target import TargetEstimator
 from analysis.models.information import position
 from world.formation.nominal import PRESETS

@@ -14,7 +14,7 @@ from affinet.planning import making
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from world.books import history
 
 pytestmark = PROCESSES

@@ -12,7 +12,7 @@ from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario import verbs as verb_models
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing import strategies
 from affinet.verdicts import checkers
 from tests.system.test_runtimes import OCTAHEDRON

@@ -71,8 +71,9 @@ def test_a_reader_that_has_gone_is_no_failure(command, tmp_path):
     ("arguments", "complaints", "status", "says"),
     [
         # Before: a second complaint of the interpreter as it ended, or its exit status 120.
-        pytest.param(("check", "corridor"), "pipe", 2, [b"No space left on device; free some room"], id="answer"),
-        pytest.param(("--help",), "pipe", 2, [b"No space left on device; free some room"], id="help"),
+        pytest.param(("check", "corridor"), "pipe", 2, [b"'what it prints': No space left on device; "], id="answer"),
+        pytest.param(("--help",), "pipe", 2, [b"'what it prints': No space left on device; free"], id="help"),
+        pytest.param(("list", "laws"), "pipe", 2, [b"'what it prints': No space left on device; free"], id="list"),
         pytest.param(("check", "corridor"), "full", 2, [], id="both"),
         pytest.param(("check", "nowhere"), "full", 2, [], id="complaint"),
     ],

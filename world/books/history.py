@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.metrics.errors import tracking_error
 from analysis.models.arrays import Array, Integers, Mask
+from netem.core.refusal import Refusal
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, newest_of
@@ -250,7 +251,7 @@ _UNREADABLE = (
 )  # fmt: skip
 
 
-class Damaged(ValueError):
+class Damaged(Refusal, ValueError):
     """What lies in a run directory is not what the run wrote: which file, what is wrong in it, and the way out.
 
     Parameters

@@ -10,8 +10,8 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from affinet.scenario import files
 from affinet.scenario.explain import explained, named_in
 from affinet.scenario.profiles import Section
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.source import Source
+from affinet.scenario.wrong import ScenarioError
 from netem.wire import endpoints
 
 Agent = Annotated[int, Field(ge=1)]

@@ -30,6 +30,7 @@ from affinet.runtimes.machines.joining import (
     Told,
     Up,
 )
+from netem.core.refusal import Refusal
 from netem.wire import offset, seats
 from netem.wire.carrier import Ear, NotCarried, Question
 from netem.wire.certificates import AGAIN
@@ -47,7 +48,7 @@ _PSS_EVERY = 20  # beats: it costs milliseconds
 Given = Callable[["Place", Down | Question | Exception], None]
 
 
-class Refused(RuntimeError):
+class Refused(Refusal, RuntimeError):
     """The coordinator does not take this machine: why."""
 
 

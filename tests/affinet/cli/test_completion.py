@@ -7,8 +7,8 @@ import pytest
 
 from affinet.cli import options
 from affinet.cli.commands import main
-from affinet.cli.completing import SHELLS
 from affinet.cli.helping import commands_of
+from affinet.cli.options.beginning import SHELLS
 from affinet.scenario import files
 
 BASH = """

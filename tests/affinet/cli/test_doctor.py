@@ -11,7 +11,7 @@ import pytest
 from flying import PROCESSES
 
 from affinet.cli.commands import main
-from affinet.runtimes import health
+from affinet.runtimes import health, rerun_command
 
 pytestmark = PROCESSES
 
@@ -105,9 +105,20 @@ def test_no_display_is_a_note_with_the_way_out(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("sys.platform", "linux")
-    assert look("viewer").says == "no display: fly without --view, and open run.rrd where there is one"
+    assert look("viewer").says == "no display: `--serve` shows a run in a browser, in place of --view"
+
+
+def test_the_viewer_is_that_which_commands_start_whatever_lies_on_the_path(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
-    assert look("viewer").level == "ok"
+    monkeypatch.setenv("PATH", "")
+    found = look("viewer")
+    assert (found.level, found.says) == ("ok", f"a display is there, and {rerun_command.command()}")
+    monkeypatch.setattr(rerun_command, "find_spec", lambda _: None)
+    found = look("viewer")
+    assert (found.level, found.says.partition(":")[0]) == (
+        "note",
+        "the `rerun` command of the rerun-sdk package is not there",
+    )
 
 
 def test_a_self_test_that_fails_or_differs_is_said(monkeypatch):

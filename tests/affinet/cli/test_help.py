@@ -43,7 +43,7 @@ def test_an_example_does_what_it_says(example, kept, tmp_path, monkeypatch, capf
 
 @pytest.mark.parametrize("example", [*ALL, *NEXT], ids=lambda e: e.line)
 def test_an_example_can_be_typed(example):
-    assert options.parser().parse_args(typed(example)).command == example.line.split()[1]
+    assert options.parser().read(typed(example)).command == example.line.split()[1]
 
 
 def test_every_command_ends_its_help_with_its_own_examples():

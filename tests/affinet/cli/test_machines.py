@@ -7,6 +7,7 @@ import pytest
 from paths import ROOT
 
 from affinet.cli import options
+from affinet.cli.commands import main
 from affinet.runtimes.machines import hosts
 from affinet.runtimes.machines.hosts import Hosts, Machine
 
@@ -20,6 +21,24 @@ def test_the_file_on_the_page_is_one(tmp_path):
     (tmp_path / "hosts.toml").write_text(file)
     read = hosts.load(tmp_path / "hosts.toml")
     assert [machine.name for machine in read.machines] == ["b", "c"]
+
+
+WRONG = {
+    "nonsense": "'nonsense' is no address for several machines: write tls/ADDRESS:PORT\n",
+    "tls/127.0.0.1:99999": "'tls/127.0.0.1:99999' is no address for several machines: write tls/ADDRESS:PORT\n",
+    "tls/203.0.113.1:7447": "tls/203.0.113.1:7447: this machine cannot listen there: Cannot assign requested address\n",
+}
+
+
+@pytest.mark.parametrize("command", ["world corridor", "netem --connect tls/127.0.0.1:7447"])
+@pytest.mark.parametrize("listen", WRONG)
+def test_where_this_machine_cannot_listen_is_said_before_anything_begins(
+    listen, command, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command.split(), "--listen", listen, "--keys", "keys"]) == 2
+    assert capsys.readouterr() == ("", WRONG[listen])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_its_commands_are_those_that_there_are():

@@ -11,7 +11,7 @@ from scipy import stats
 from affinet.cli.commands import main
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import sweeping
 
 SHORT = ("--duration", "0.5", "--set", "time.dt=0.05")

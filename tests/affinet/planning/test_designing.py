@@ -8,7 +8,8 @@ from affinet.planning import designing, making
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
+from affinet.scenario.wrong import ScenarioError
 from world.formation import layouts
 
 # The stress of zhao7, in the order of its edges.

@@ -15,7 +15,7 @@ from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 BEYOND = [5e-324, 1e300, inf, nan, -(2**63), 10**30]
 EXTREMES = [*BEYOND, 0, 0.0, -1, -1.0, 1e-300, 1.7e308, 2**63, 2**64, 1e-9, 1e9, 10**9]

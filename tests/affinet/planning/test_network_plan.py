@@ -9,7 +9,7 @@ from flying import plan_of
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, selectors
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.medium.verdict import Verdict
 
 CALM = ("network.availability=1.0", "time.duration=1")

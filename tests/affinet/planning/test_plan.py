@@ -11,7 +11,7 @@ import pytest
 from affinet.planning import making
 from affinet.planning.plan import PlanError
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.algebra import stability
 from agents.brief import Own
 from agents.estimate import Estimate

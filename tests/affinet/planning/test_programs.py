@@ -8,7 +8,7 @@ from affinet.planning.plan import PlanError
 from affinet.runtimes import launcher
 from affinet.runtimes.launcher import Launcher
 from affinet.runtimes.run import fly, rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 FLOWN = """agents.programs={ "2" = "python 'my agent.py' --fast" }"""
 

@@ -8,7 +8,7 @@ from affinet.cli import commands
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
 from netem.medium import journal
 from netem.medium.medium import JOURNAL

@@ -5,7 +5,7 @@ import pytest
 
 from affinet.planning import making
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.faults.fault import Fault, UnderWay, Verb
 from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger

@@ -7,8 +7,8 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from affinet.cli import listing
 from affinet.cli.commands import main
+from affinet.cli.options.beginning import LISTED
 from affinet.planning import registry
 from affinet.reference import catalogue
 from affinet.reference.docstrings import first_line, parameters_of, unit_of
@@ -28,7 +28,7 @@ BARE = {
 
 
 def test_the_kinds_are_those_of_the_command():
-    assert tuple(catalogue.KINDS) == listing.KINDS
+    assert tuple(catalogue.KINDS) == LISTED
 
 
 def test_all_of_each_kind_is_there():
@@ -177,3 +177,48 @@ def test_one_is_asked_for_by_name_and_a_stranger_is_one_line(capsys):
     assert main(["list", "verbs", "gusts"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("gusts: none of the verbs; did you mean 'gust'? there are cut, partition, ")
+
+
+OWN = '''
+from dataclasses import dataclass
+from affinet import Law
+
+
+@dataclass(frozen=True)
+class Spring(Law):
+    """Pull toward where one should be.
+
+    Parameters
+    ----------
+    gain
+        How fast, per second.
+    """
+
+    gain: float
+
+    def init(self, brief):
+        return None
+
+    def command(self, *given):
+        return None
+'''
+
+
+def test_a_class_of_ones_own_is_described_from_the_working_directory(tmp_path, monkeypatch, capsys):
+    module = "pull_that_is_listed"
+    name = f"{module}:Spring"
+    (tmp_path / f"{module}.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    assert main(["list", "laws", name, "--json"]) == 0
+    ((entry,),) = json.loads(capsys.readouterr().out).values()
+    assert (entry["name"], entry["says"]) == (name, "Pull toward where one should be.")
+    (gain,) = entry["parameters"]
+    assert (gain["name"], gain["required"], gain["unit"]) == ("gain", True, "1/s")
+    assert main(["list", "laws", name]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == name
+    assert main(["list", "estimators", name]) == 3
+    assert (
+        "Spring: has no method channels, sense, fuse: Estimator in docs/estimators.md says" in capsys.readouterr().err
+    )
+    assert main(["list", "laws", f"{name}s"]) == 2
+    assert "has no 'Springs'" in capsys.readouterr().err

@@ -10,8 +10,8 @@ import pytest
 from flying import PROCESSES
 from paths import ROOT
 
-from affinet.cli import scaffolding
 from affinet.cli.commands import main
+from affinet.cli.options.beginning import BEGUN
 from affinet.reference import schema
 from affinet.scaffold import making
 
@@ -40,7 +40,7 @@ def by_pytest(cwd, *words):
 
 
 def test_the_kinds_are_those_of_the_command():
-    assert tuple(making.KINDS) == scaffolding.KINDS
+    assert tuple(making.KINDS) == BEGUN
 
 
 def test_a_scenario_can_fly_and_does(folder, capsys):

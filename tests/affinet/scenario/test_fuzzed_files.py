@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import files, loading
-from affinet.scenario.sections import ScenarioError
 from affinet.scenario.words import one_line
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import study
 from affinet.verdicts import reading
 from netem.core.links import Links

@@ -10,7 +10,7 @@ from affinet.cli import commands
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import study
 from affinet.testing.swarm import SwarmRuns
 from world.books.history import digest

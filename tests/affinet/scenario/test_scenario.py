@@ -7,7 +7,7 @@ import pytest
 
 from affinet.planning import making
 from affinet.scenario import loading, selectors
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
 from netem.faults.fault import Fault, UnderWay, Verb
 from world.formation.nominal import PRESETS

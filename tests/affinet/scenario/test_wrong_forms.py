@@ -9,8 +9,9 @@ from pydantic import BaseModel, TypeAdapter
 from affinet.cli.commands import main
 from affinet.planning import making
 from affinet.scenario import forms, loading
-from affinet.scenario.sections import Scenario, ScenarioError
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line, shown
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies.study import Study
 from affinet.verdicts import invariants
 

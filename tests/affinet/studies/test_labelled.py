@@ -12,7 +12,7 @@ import pytest
 from flying import PROCESSES
 
 from affinet.cli import commands
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import labelled, record, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here

@@ -9,7 +9,7 @@ import pytest
 from flying import plan_of
 
 from affinet.cli import show
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import judging, record, study
 from affinet.studies.batch import fly_all
 from affinet.studies.executor import Here

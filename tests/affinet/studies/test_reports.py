@@ -11,7 +11,7 @@ from affinet.cli import commands
 from affinet.planning import making as planning
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import record, study
 from affinet.studies.batch import fly_all
 from affinet.verdicts import checkers

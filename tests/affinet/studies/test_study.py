@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.stats import chi2
 
 from affinet.cli import commands
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import judging, labelled, record, report, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here
@@ -100,6 +100,7 @@ def test_a_study_leaves_data_a_figure_and_verdicts(tiny, tmp_path, capsys):
     assert not (out / "consistency.png").exists()  # that goes with curves
     shown = capsys.readouterr().out
     assert "undecided" in shown
+    assert all(f"{case.found:.4g}" in shown for case in judged.cases)
     assert "quick: 2 runs of a coarse form" in shown
 
 

@@ -11,7 +11,7 @@ import pytest
 from flying import PROCESSES, plan_of
 
 from affinet.cli import commands
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies import pool, study
 from affinet.studies.batch import fly_all
 from analysis.figures import curves

@@ -9,7 +9,7 @@ from scripted import timeline
 
 from affinet.cli import commands, hunting
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing import hunt, strategies
 from affinet.verdicts import checkers
 from affinet.verdicts.checking import Checker, CheckResult

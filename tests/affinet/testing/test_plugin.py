@@ -10,7 +10,7 @@ import pytest
 from flying import PROCESSES
 
 from affinet.cli.commands import main
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 # A pytester forgets what its tests were the first to import; these are slow, or cannot be loaded twice.
 for module in ("affinet.testing.swarm", "netem.medium.journal", "world.recording.logbook", "cvxpy", "hypothesis"):

@@ -5,7 +5,7 @@ import inspect
 import pytest
 from judged import evidence
 
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import checkers, invariants, pursued
 
 

@@ -7,7 +7,7 @@ from flying import PROCESSES, plan_of
 from scipy.linalg import block_diag
 
 from affinet.runtimes.run import fly, rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.studies.batch import fly_all
 from agents.estimators.centralized import SwarmFilter
 from analysis.models.sensor import Sensor

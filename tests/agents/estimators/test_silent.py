@@ -5,7 +5,7 @@ import pytest
 from flying import plan_of
 
 from affinet.runtimes.run import rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.brief import Own
 from agents.estimators.silent import SilentEdgeFilter
 from agents.exchange import Heard

@@ -10,7 +10,7 @@ from flying import plan_of
 from affinet.planning import making
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.agent import Agent
 from agents.brief import Own
 from agents.estimators.none import NoEstimator

@@ -18,7 +18,7 @@ from affinet.planning import making
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.processes.user_code import UserCodeError
 from world.books.history import digest
 

@@ -10,7 +10,7 @@ from own_code import ESTIMATOR, broken, line_of, write
 from affinet.planning import making, registry
 from affinet.runtimes.run import rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.core.plain import from_plain, to_plain
 from netem.loading.choice import Choice
 from netem.processes.user_code import UserCodeError

@@ -18,7 +18,7 @@ from affinet.cli.commands import main
 from affinet.planning import making
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import Broken, SwarmRuns
 from affinet.verdicts.checkers import always, eventually
 from affinet.verdicts.checking import Checker

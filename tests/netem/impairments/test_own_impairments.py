@@ -13,7 +13,7 @@ from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.core.draws import Purpose, uniform
 from netem.medium.verdict import Verdict
 from netem.processes.user_code import UserCodeError

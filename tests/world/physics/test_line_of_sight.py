@@ -7,7 +7,7 @@ from localized_runs import FOUR, NAME
 from measured_graphs import LINE_OF_SIGHT, SPACES
 
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 
 
 def turn(angle):

@@ -9,7 +9,7 @@ from flying import plan_of
 from offered import by_affinet
 
 from affinet.runtimes.run import rehearse
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from agents.brief import Own
 from analysis.models.sensor import Sensor, moments
 from netem.medium.verdict import Verdict

@@ -12,7 +12,7 @@ from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly, rehearse
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.scenario import loading
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from world.physics.bodies import Motion, Unicycle
 
 pytestmark = PROCESSES

@@ -8,7 +8,7 @@ from flying import plan_of
 from affinet.runtimes.child import RunFailed
 from affinet.runtimes.machines import hosts, seats
 from affinet.runtimes.machines.commands import Command, Commands
-from affinet.scenario.sections import ScenarioError
+from affinet.scenario.wrong import ScenarioError
 from netem.wire.session import HUB
 
 WHOLE = """
