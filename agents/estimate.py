@@ -18,7 +18,8 @@ class Estimate(NamedTuple):
     Parameters
     ----------
     relative
-        Relative positions zhat_ij, shape (..., n, D), in metres; 0 where not known.
+        Relative positions zhat_ij of z_ij = z_i - z_j, where the agent is from its neighbour, shape (..., n, D), in metres; 0
+        where not known.
     known
         Where there is an estimate at all, shape (..., n).
     covariance

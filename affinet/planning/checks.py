@@ -138,7 +138,7 @@ def step(law: Any, swarm: SwarmBrief) -> Finding:
         return Finding(
             "step",
             "note",
-            f"{type(law).__name__} brings no step_matrix (docs/estimators.md): whether it settles with this step is not known",
+            f"{type(law).__name__} brings no step_matrix (docs/laws.md): whether it settles with this step is not known",
         )
     radius, gain = stability.radius(matrix), capabilities.step_gain(law)
     if radius < 1.0:

@@ -36,7 +36,7 @@ class _Kind(NamedTuple):
 
 _KINDS: Mapping[str, _Kind] = {
     ESTIMATORS: _Kind(Estimator, ("channels", "init", "sense", "fuse"), "docs/estimators.md"),
-    LAWS: _Kind(Law, ("init", "command"), "docs/estimators.md"),
+    LAWS: _Kind(Law, ("init", "command"), "docs/laws.md"),
     IMPAIRMENTS: _Kind(Loss, ("lost",), "docs/extending.md"),
 }
 

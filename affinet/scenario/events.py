@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import AfterValidator, Field, PlainValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, model_validator
 
 from affinet.scenario import selectors
 from affinet.scenario.keys import key
@@ -18,7 +18,8 @@ Whom = Annotated[
     list[Annotated[int | str, PlainValidator(selectors.agent_or_word, json_schema_input_type=int | str)]],
     Field(min_length=1),
 ]
-On = Annotated[list[Links], Field(min_length=1)]
+_SeveralLinks = Annotated[list[Links], Field(min_length=1)]
+On = Annotated[_SeveralLinks, BeforeValidator(selectors.several, json_schema_input_type=Links | _SeveralLinks)]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 InFlight = Literal["drop", "deliver", "hold"]
 

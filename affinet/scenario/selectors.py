@@ -67,6 +67,11 @@ def check(selector: str) -> str:
     return selector
 
 
+def several(given: object) -> object:
+    """One selector, like "all", as a list of one; anything else as it is."""
+    return [given] if isinstance(given, str) else given
+
+
 def check_agents(selector: str) -> str:
     """The selector of agents itself, if it is one.
 

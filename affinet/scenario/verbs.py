@@ -17,7 +17,7 @@ class Cut(Lasting):
     """Links that carry nothing; `in_flight` says what becomes of the messages under way on them."""
 
     verb: Literal["cut"] = "cut"
-    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    links: On = key(..., 'which, like "all" or ["1-2", "2->4"]')
     in_flight: InFlight = key("drop", "what becomes of the messages under way on them")
 
     def faults(self, found: Found) -> list[Fault]:
@@ -46,7 +46,7 @@ class Lose(Lasting):
     """Links that lose messages with a probability, on top of what else they lose."""
 
     verb: Literal["lose"] = "lose"
-    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    links: On = key(..., 'which, like "all" or ["1-2", "2->4"]')
     loss: Probability = key(..., "probability that a message is lost")
 
     def faults(self, found: Found) -> list[Fault]:
@@ -58,7 +58,7 @@ class Delay(Lasting):
     """Links whose communication takes longer, in seconds; sensing is not delayed."""
 
     verb: Literal["delay"] = "delay"
-    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    links: On = key(..., 'which, like "all" or ["1-2", "2->4"]')
     delay: Positive = key(..., "by how much longer it takes", "s")
 
     def faults(self, found: Found) -> list[Fault]:
@@ -70,7 +70,7 @@ class Degrade(Lasting):
     """Links that have another profile in place of their own."""
 
     verb: Literal["degrade"] = "degrade"
-    links: On = key(..., 'which, like ["1-2", "2->4"]')
+    links: On = key(..., 'which, like "all" or ["1-2", "2->4"]')
     profile: str = key(..., "by name")
 
     def faults(self, found: Found) -> list[Fault]:

@@ -24,7 +24,7 @@ State = TypeVar("State")
 
 
 class Law(Protocol[State]):
-    """A control law for followers.
+    """A control law for followers (docs/laws.md): `order`, `by_stress`, `init` and `command`; the rest may be left out.
 
     `order` is that of the bodies it steers, by a velocity (1), an acceleration (2) or a higher derivative; `by_stress` says
     whether it weighs the edges by the stress of the formation, which then must have one.
@@ -42,7 +42,10 @@ class Law(Protocol[State]):
     def command(
         self, brief: Brief, state: State, tick: Reading, own: Own, estimate: Estimate, inputs: Heard
     ) -> tuple[State, Array]:
-        """The input of this tick, shape (..., D), in metres per second, or per second squared.
+        """The state after this tick, and the input that its body flies until the next one; of leaders it is not flown.
+
+        The input has shape (..., D), with the leading axes of `own.input`, in metres per second, or of double integrators per
+        second squared.
 
         Parameters
         ----------
@@ -51,9 +54,10 @@ class Law(Protocol[State]):
         tick, own
             What its clock says, and what it knows of itself.
         estimate
-            What its estimator believes of its edges.
+            What its estimator believes of its edges: `relative`, shape (..., n, D), in metres, where `known`, shape (..., n).
         inputs
-            What the neighbours said of theirs.
+            What the neighbours said that they fly from the tick before on: `inputs.fields["velocity"]`, shape (..., n, D), and
+            "acceleration" beside it of double integrators, where `inputs.fresh`, shape (..., n), says that it arrived.
         """
 
     @property
@@ -97,7 +101,16 @@ class Nothing(NamedTuple):
 
 
 def stress_force(brief: Brief, estimate: Estimate) -> Array:
-    """sum_j l_ij zhat_ij over the edges with an estimate, shape (..., D), in metres."""
+    """sum_j l_ij zhat_ij over the edges with an estimate, shape (..., D), in metres.
+
+    It is 0 where the neighbours are in any affine image of their nominal places (paper 000, eq. 3) with the agent, and points
+    away from where that would be: a follower that flies -alpha times it, alpha in 1/s, goes there (paper 000, Table II).
+
+    Parameters
+    ----------
+    brief, estimate
+        As a law is given them.
+    """
     force: Array = _weighted(brief.stress, estimate.known, estimate.relative)
     return force
 

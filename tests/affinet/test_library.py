@@ -6,6 +6,7 @@ import importlib
 import inspect
 import json
 import pickle
+import pydoc
 import re
 import shutil
 import subprocess
@@ -28,7 +29,7 @@ from world.books.history import ARRAYS, load
 
 ROOT = Path(affinet.__file__).parents[1]
 SHORT = ("time.dt=0.05", "time.duration=1")
-TYPES = {"Array", "Channels", "Fields", "Integers", "Mask", "Reading"}  # of annotations
+TYPES = {"Array", "Channels", "Fields", "Integers", "Mask"}  # of annotations
 NAMES = sorted(affinet.__all__)
 
 
@@ -53,6 +54,24 @@ def test_every_name_is_there_and_has_its_line_in_the_docs(name):
     assert f"`{name}" in (ROOT / "docs" / "library.md").read_text()
     assert name in TYPES | {"__version__"} or inspect.getdoc(held)
     assert getattr(affinet, name) is held
+
+
+@pytest.mark.parametrize("kind", [affinet.Brief, affinet.Own])
+def test_help_says_of_what_a_law_is_given_what_it_is_in_which_shape_and_unit(kind):
+    page = pydoc.plain(pydoc.render_doc(kind))
+    fields = re.findall(
+        r"^ \|  (\w+)\n((?: \|      .*\n)+)", page.partition("----")[2].partition("Meth")[0], re.MULTILINE
+    )
+    assert {name for name, _ in fields} == {*kind.__annotations__}
+    arrays = [(name, says) for name, says in fields if "Array" in str(kind.__annotations__[name])]
+    assert len(arrays) >= 4
+    for name, says in arrays:
+        assert "(...," in says, name
+        assert re.search(r"metres|without a unit", says), name
+
+
+def test_help_says_what_a_reading_is():
+    assert "What a clock says: ticks since take-off." in pydoc.render_doc(affinet.Reading)
 
 
 def test_no_name_would_be_taken_by_a_module_of_affinet_when_that_is_imported():

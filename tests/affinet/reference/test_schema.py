@@ -102,6 +102,7 @@ def test_names_and_parameters_that_there_are_not_do_not_fit_either(path, value):
         (("network", "profiles"), {"mine": {"loss": [{"model": "my_module:Loss", "reach": 8.0}]}}),
         (("network", "profiles"), {"mine": {"delay": {"model": "table", "table": "delays.csv"}}}),
         (("timeline", 0, "groups"), "halves"),
+        (("timeline", 2), {"verb": "lose", "at": 1.0, "loss": 0.5, "links": "all"}),
     ],
 )
 def test_what_is_the_users_own_fits(path, value):

@@ -5,7 +5,7 @@ import threading
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet.cli import commands
+from affinet.cli import commands, options
 from affinet.planning import making as planning
 from affinet.runtimes.inject import Access, InjectRequest, NotFlying
 from affinet.runtimes.run import fly
@@ -96,6 +96,14 @@ def test_bad_wishes_are_refused_before_they_are_sent(words, says, out, capsys):
     fly(plan_of("corridor", "time.duration=0.1"), "inprocess", out, lambda *_: None)
     assert commands.main(["inject", str(out), *words]) == 2
     assert says in capsys.readouterr().err
+
+
+def test_the_word_all_selects_every_link():
+    given = plan_of("corridor").scenario
+    asked = InjectRequest("lose", links=("all",), loss=0.5).order(given)
+    assert len(asked.fault.pairs) == 24
+    typed = options.parser().parse_args(["inject", "RUN", "lose", "0.5", "--links", "all"])
+    assert typed.links == ["all"]
 
 
 def test_a_journal_of_other_agents_is_no_judge(out, tmp_path, capsys):

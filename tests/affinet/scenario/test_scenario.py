@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from affinet.planning import making
-from affinet.scenario import loading, selectors
+from affinet.scenario import loading, selectors, verbs
 from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
 from netem.faults.fault import Fault, UnderWay, Verb
@@ -205,6 +205,31 @@ def test_links_are_selected_one_way_or_both_ways_by_agents_or_by_roles(selector,
 
 def test_links_that_are_selected_twice_are_selected_once():
     assert selectors.pairs(["2-4", "2->4", "1->2"], FORMATION, LINKS) == ((4, 2), (2, 4), (1, 2))
+
+
+LINKED = [verb for verb, model in verbs.VERBS.items() if "links" in model.model_fields]
+NEEDS = {"lose": "loss=0.5", "delay": "delay=0.02", "degrade": 'profile="wifi_clear"', "bias": "by=[0.1, 0.0]"}
+NEEDS |= {"outlier": "p=0.5\nsigma=1.0"}
+
+
+@pytest.mark.parametrize("verb", LINKED)
+@pytest.mark.parametrize("word", ["all", "leaders->followers", "2->4"])
+def test_a_selector_of_links_alone_is_a_list_of_one(verb, word, file):
+    flown = []
+    for links in (f'"{word}"', f'["{word}"]'):
+        file.write_text(f"{GOOD}[[timeline]]\nverb='{verb}'\nat=0.6\nlinks={links}\n{NEEDS.get(verb, '')}\n")
+        plan = making.make(loading.load(str(file)))
+        flown.append((plan.timeline.scripted, plan.scenario.timeline[-1]))
+    assert flown[0] == flown[1]
+    assert flown[0][1].links == [word]
+
+
+def test_the_word_all_selects_links_wherever_they_are_selected(file):
+    everywhere = """[[network.zones]]\ncentre=[0.0, 0.0]\nradius=3.0\nlinks="all"\n
+        [[network.links]]\nlinks="all"\navailability=0.4\n"""
+    file.write_text(GOOD.replace('["2->4", "1-2"]', '"all"').replace("[[timeline]]", f"{everywhere}\n[[timeline]]", 1))
+    plan = making.make(loading.load(str(file)))
+    assert set(plan.timeline.scripted[0].pairs) == set(LINKS.index)
 
 
 @pytest.mark.parametrize("selector", ["2=4", "2<-4", "2 -> 4", "a->b", "2->", "2--4", "", "2->4->5", "leader"])
@@ -444,6 +469,7 @@ WRONG = [
     ('links = "1->2"', 'links = "1->9"', "network.links.1.links", "agent 9 does not exist: agents are 1 to 7"),
     ('links = "1->2"', 'links = "1->2"\nchannels = "comms"', "network", "coupled = true gives sensing and comms one"),
     ('"1-2"]', '"1~2"]', "timeline.1.links.2", "'1~2' selects no links; write '2->4'"),
+    ('["2->4", "1-2"]', '"1~2"', "timeline.1.links.1", "'1~2' selects no links; write '2->4'"),
     ('"1-2"]', '"1-7"]', "timeline.1.links", "'1-7' matches no link of the formation"),
     (
         '"1-2"]',

@@ -143,7 +143,7 @@ def test_the_closed_loop_of_a_users_own_law_decides_whether_it_flies(folder):
     mute = write(folder, broken(PILOTED, ("def step_matrix", "def of_the_step")))
     said = [found for found in plan_of(*steers(mute), *SHORT).findings if found.check == "step"]
     assert [found.says for found in said] == [
-        "Own brings no step_matrix (docs/estimators.md): whether it settles with this step is not known"
+        "Own brings no step_matrix (docs/laws.md): whether it settles with this step is not known"
     ]
 
 

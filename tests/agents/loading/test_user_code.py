@@ -373,8 +373,8 @@ ABSTRACT = (
     ("    def fuse", "    @abc.abstractmethod\n    def fuse"),
 )
 LACKING = [
-    pytest.param("law", shortened(LAW, "command"), "has no method command: Law in docs/estimators.md", id="law"),
-    pytest.param("law", ESTIMATOR, "has no method command: Law in docs/estimators.md", id="estimator-as-law"),
+    pytest.param("law", shortened(LAW, "command"), "has no method command: Law in docs/laws.md", id="law"),
+    pytest.param("law", ESTIMATOR, "has no method command: Law in docs/laws.md", id="estimator-as-law"),
     pytest.param("estimator", LAW, "has no method channels, sense, fuse: Estimator in docs/est", id="law-as-estimator"),
     # Before: the method of the protocol was called, which returns nothing.
     pytest.param("estimator", broken(shortened(ESTIMATOR, "fuse"), *STUB), "has no method fuse", id="protocol"),
