@@ -95,7 +95,7 @@ def algorithms() -> Lines:
     yield from titled(
         "Estimators and laws",
         "`agents.estimator` and `agents.law` of a scenario, and what `[agents.parameters.NAME]` can set. How to write one of",
-        "your own: [estimators](../estimators.md).",
+        "your own: [estimators](../estimators.md), [laws](../laws.md).",
     )
     yield from ("", "## Estimators", *_each(catalogue.estimators(), "###"))
     yield from ("", "## Laws", *_each(catalogue.laws(), "###"))
