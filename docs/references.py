@@ -125,6 +125,8 @@ def arrays() -> Lines:
     )
     yield from ("", "## Axes", "", *table(("axis", "what stands along it"), _coded(described.AXES.items())))
     yield from ("", "## By tick", "", *table(_OF_ARRAYS, (_array(*one) for one in described.BY_TICK.items())))
+    yield from ("", "Of `run.dataset` and what is exported, made of these when it is asked for:", "")
+    yield from table(_OF_ARRAYS, (_array(*one) for one in described.DERIVED.items()))
     yield from ("", "What an input is depends on the bodies: m/s of those that integrate it once, m/s2 of those twice.")
     yield from ("", "## What estimators report", "")
     yield from ("Each begins with the ticks and the agents; an estimator of your own may have others.", "")
