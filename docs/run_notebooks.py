@@ -113,7 +113,7 @@ def told(cell: NotebookNode) -> Iterator[str]:
     for output in cell.outputs:
         if "text" in output:
             yield f"{output.name}: {_plain(output.text)}"
-        for kind, content in output.get("data", {}).items():
+        for kind, content in sorted(output.get("data", {}).items()):
             yield f"{kind}: {_seen(content) if kind == _PNG else _plain(content)}"
 
 

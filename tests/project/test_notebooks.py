@@ -1,7 +1,10 @@
 """The notebooks of docs/notebooks say what comes of them when they are executed now."""
 
 import copy
+import json
+import os
 import re
+import sys
 
 import nbformat
 import psutil
@@ -63,8 +66,8 @@ def test_what_is_executed_again_is_the_same_to_the_letter(small):
     assert outputs(small) == [
         "stdout: 42\n",
         "stdout: drawn\n",
-        "text/plain: <Figure size 640x480 with 1 Axes>",
         "image/png: a picture",
+        "text/plain: <Figure size 640x480 with 1 Axes>",
         "text/plain: 'words'",
     ]
     assert nbformat.writes(executed(small)) == nbformat.writes(small)
@@ -87,6 +90,15 @@ def test_an_output_that_a_cell_has_not_is_found(cell, change, small):
     change(wrong.cells[cell])
     assert differences(wrong, small)[0].startswith(f"cell {cell + 1} has\n")
     assert differences(small, small) == []
+
+
+def test_this_interpreter_executes_in_a_folder_of_its_own_whatever_is_installed(tmp_path, monkeypatch):
+    other = tmp_path / "kernels" / "python3" / "kernel.json"
+    other.parent.mkdir(parents=True)
+    other.write_text(json.dumps({"argv": ["false"], "display_name": "other", "language": "python"}))
+    monkeypatch.setenv("JUPYTER_PATH", str(tmp_path))
+    asked = f"import os, sys\nprint(sys.executable == {sys.executable!r}, os.listdir(), os.getcwd() == {os.getcwd()!r})"
+    assert outputs(executed(notebook_of(asked))) == ["stdout: True [] False\n"]
 
 
 def test_a_picture_that_shows_nothing_is_found(small):
