@@ -10,11 +10,13 @@ import pytest
 from flying import PROCESSES, digest_of, plan_of
 from paths import ROOT
 
+from affinet import library
 from affinet.planning import making as planning
 from affinet.planning import registry
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, sections, verbs
 from affinet.studies import quantities, study
+from affinet.testing.swarm import Swarm
 from netem.loading import parameters
 from netem.loading.calling import load
 
@@ -149,6 +151,16 @@ def test_every_verb_of_the_timeline_is_documented():
         assert f"| `{verb}` |" in text
         for key in set(model.model_fields) - {"verb"}:
             assert f"`{key}`" in text
+
+
+def test_the_script_of_all_verbs_flies_and_each_touches_something():
+    faults = re.findall(r"^\| `(\.fault\(.*\))` \|", (DOCS / "testing.md").read_text(), re.MULTILINE)
+    given = loading.load("corridor", ("time.dt=0.05", "time.duration=16"))
+    script = eval(f"swarm{''.join(faults)}", {"swarm": Swarm(given, library.run)})
+    assert sorted(entry.verb for entry in script.scenario.timeline) == sorted(verbs.VERBS)
+    flown = library.run(script.scenario)
+    assert flown.outcome.verdict == "pass", flown.outcome.reasons
+    assert all(bite.touched for bite in flown.bites)
 
 
 def test_the_tests_in_the_docs_pass(tmp_path):
