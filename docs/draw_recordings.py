@@ -2,7 +2,8 @@
 
     python docs/draw_recordings.py [--only corridor ...] [--out docs/pictures]
 
-Each scenario is flown in one process, and shown at one moment. `film` is the film of the README, which takes no viewer.
+Each scenario is flown in one process, and shown at one moment. `film` is the film of the README, and `tutorial` has the
+pictures that the commands of docs/tutorial.md draw, which take no viewer.
 """
 
 from __future__ import annotations
@@ -95,16 +96,32 @@ def film(folder: Path, path: Path) -> None:
     shutil.copy(folder / path.name, path)
 
 
+def tutorial(folder: Path, pictures: Path) -> None:
+    """What the commands of docs/tutorial.md draw."""
+    names = ("ga-rkf", "rkf")
+    runs = [str(flown(folder / name, "bursts", f"agents.estimator={name}", "time.duration=20")) for name in names]
+    for words in (
+        ["compare", *runs, "--out", str(pictures / "tutorial-errors.png")],
+        ["render", *runs, "--at", "18", "--out", str(pictures / "tutorial-moment.png")],
+    ):
+        if cli.main(words):
+            raise RuntimeError(f"no picture was made by {words[0]}")
+
+
 def main() -> None:
     """Fly, and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=["film", *_MOMENTS], default=["film", *_MOMENTS])
+    everything = ["film", "tutorial", *_MOMENTS]
+    parser.add_argument("--only", nargs="+", choices=everything, default=everything)
     parser.add_argument("--out", type=Path, default=_HERE / "pictures")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in given.only:
             if name == "film":
                 film(Path(folder), given.out / "bursts.gif")
+                continue
+            if name == "tutorial":
+                tutorial(Path(folder), given.out)
                 continue
             out = flown(Path(folder) / name, name)
             shot = Image.open(io.BytesIO(picture(parts(out / "run.rrd"), _MOMENTS[name])))

@@ -1,8 +1,9 @@
 """What stands on a page of the docs, done as somebody who reads it does it, and compared with what it shows.
 
 A page is worked through in one folder, from top to bottom: a block that begins with `# name.py:`, or with another name of a
-file, is written there; a program runs, and prints what the `text` below it says; an indented `$ command` runs, and answers what
-stands below it. `...` in a line of its own stands for lines that are left out, within a line for words.
+file, is written there, or with `# name.toml, at its end:` added to it; a program runs, and prints what the `text` below it
+says; an indented `$ command` runs, and answers what stands below it. `...` in a line of its own stands for lines that are left
+out, within a line for words.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _STEP = re.compile(
     r"|^    \$ (?P<command>[^\n]*)\n(?P<shown>(?:    (?!\$ )[^\n]*\n|\n+(?=    (?!\$ )))*)",
     re.MULTILINE | re.DOTALL,
 )
-_NAMED = re.compile(r"# ([\w/.-]+\.\w+)(?::.*)?\n")
+_NAMED = re.compile(r"# ([\w/.-]+\.\w+)(, at its end)?(?::.*)?\n")
 
 
 class Step(NamedTuple):
@@ -36,8 +37,8 @@ class Step(NamedTuple):
         The command, the program, or what is in the file.
     shown
         What the page shows of what it says.
-    file
-        The name of the file.
+    file, more
+        The name of the file, and whether it is there already, and this comes at its end.
     program
         Whether it is Python.
     """
@@ -45,6 +46,7 @@ class Step(NamedTuple):
     what: str
     shown: str
     file: str | None = None
+    more: bool = False
     program: bool = False
 
 
@@ -64,9 +66,9 @@ def steps(text: str) -> list[Step]:
         if match["command"] is not None:
             found.append(Step(match["command"], match["shown"]))
         elif named := _NAMED.match(match["text"]):
-            found.append(Step(match["text"], "", named[1]))
+            found.append(Step(match["text"], "", named[1], more=named[2] is not None))
         elif match["kind"] == "python":
-            found.append(Step(match["text"], match["printed"] or "", None, program=True))
+            found.append(Step(match["text"], match["printed"] or "", program=True))
     return found
 
 
@@ -125,7 +127,8 @@ def work_through(text: str, folder: Path, elsewhere: Mapping[str, str]) -> list[
         if step.file is not None:
             path = folder / step.file
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(step.what, encoding="utf-8")
+            there = path.read_text(encoding="utf-8") + "\n" if step.more else ""
+            path.write_text(there + step.what, encoding="utf-8")
         elif step.program:
             status, told = _done([sys.executable, "-c", step.what], folder)
             _compare(step, status, told, exact=True)

@@ -10,10 +10,12 @@ import pytest
 from flying import PROCESSES, digest_of, plan_of
 from paths import ROOT
 
+from affinet import library
 from affinet.planning import making as planning
 from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading, profiles, verbs
 from affinet.studies import quantities, study
+from affinet.testing.swarm import Swarm
 
 pytestmark = PROCESSES
 
@@ -104,6 +106,16 @@ def test_every_check_and_quantity_of_a_study_is_explained():
 def test_the_page_of_scenarios_leads_to_every_verb():
     linked = re.findall(r"\[`(\w+)`\]\(reference/verbs\.md#(\w+)\)", (DOCS / "scenario.md").read_text())
     assert linked == [(verb, verb) for verb in verbs.VERBS]
+
+
+def test_the_script_of_all_verbs_flies_and_each_touches_something():
+    faults = re.findall(r"^\| `(\.fault\(.*\))` \|", (DOCS / "testing.md").read_text(), re.MULTILINE)
+    given = loading.load("corridor", ("time.dt=0.05", "time.duration=16"))
+    script = eval(f"swarm{''.join(faults)}", {"swarm": Swarm(given, library.run)})
+    assert sorted(entry.verb for entry in script.scenario.timeline) == sorted(verbs.VERBS)
+    flown = library.run(script.scenario)
+    assert flown.outcome.verdict == "pass", flown.outcome.reasons
+    assert all(bite.touched for bite in flown.bites)
 
 
 def test_the_tests_in_the_docs_pass(tmp_path):

@@ -19,6 +19,7 @@ ELSEWHERE = {
     "installing.md": {},
     "launch.md": {},
     "laws.md": {},
+    "tutorial.md": {},
 }
 
 
@@ -49,6 +50,7 @@ def test_the_extras_are_those_there_are():
     assert f"wheels/affinet-{project['version']}-py3-none-any.whl" in page("installing.md")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", re.findall(r"- run: ((?:affinet|pytest).*)", page("installing.md")))
 def test_what_ci_runs_passes_in_a_scaffolded_project(command, tmp_path):
     making.make("project", "my-swarm", tmp_path)
@@ -66,8 +68,13 @@ print("one")
 ```
 
 ```python
+# one.py, at its end: more
+two = 2
+```
+
+```python
 import one
-print(2)
+print(one.two)
 ```
 
 ```text
@@ -90,13 +97,14 @@ Text, and a command that does not run:
 def test_a_page_is_worked_through(tmp_path):
     assert steps(TEXT) == [
         Step('# one.py: a file\nprint("one")\n', "", "one.py"),
-        Step("import one\nprint(2)\n", "one\n2\n", None, program=True),
+        Step("# one.py, at its end: more\ntwo = 2\n", "", "one.py", more=True),
+        Step("import one\nprint(one.two)\n", "one\n2\n", program=True),
         Step("python -c 'import one; raise SystemExit(3)'", "    one\n"),
         Step("echo $?", "    3\n"),
         Step("true", ""),
     ]
-    assert len(work_through(TEXT, tmp_path, {})) == 5
-    assert len(work_through(TEXT, tmp_path, {"true": "nobody"})) == 4
+    assert len(work_through(TEXT, tmp_path, {})) == 6
+    assert len(work_through(TEXT, tmp_path, {"true": "nobody"})) == 5
 
 
 @pytest.mark.parametrize(
