@@ -14,7 +14,7 @@ from awaiting import await_true
 from flying import PROCESSES, TRIANGLE, digest_of, plan_of
 from scripted import timeline
 
-from affinet.cli import commands
+from affinet.cli import commands, status
 from affinet.planning import making as planning
 from affinet.runtimes.inject import Access, InjectRequest
 from affinet.runtimes.launcher import Launcher
@@ -122,7 +122,7 @@ def test_the_journals_verdicts_are_those_of_a_replay_which_says_how_far_apart_th
 ):
     _, out = corridor
     lockstep = ["--set", 'time.mode="lockstep"', "--runtime", "inprocess", "--out", str(tmp_path / "again")]
-    assert commands.main(["replay", str(out), "--verdicts", *lockstep]) == commands.PASS
+    assert commands.main(["replay", str(out), "--verdicts", *lockstep]) == status.PASS
     said = capsys.readouterr().err
     assert "m apart on average" in said
     before, after = (journal.read(run / JOURNAL) for run in (out, tmp_path / "again"))

@@ -11,7 +11,7 @@ import pytest
 from flying import PROCESSES
 from paths import DOCS, PROGRAMS
 
-from affinet.cli import commands, conforming
+from affinet.cli import commands, conforming, status
 from affinet.conformance import flights
 from affinet.conformance.air import Air
 from affinet.conformance.flying import Patience
@@ -191,8 +191,8 @@ def test_the_command_says_what_was_found_and_writes_it_down(tmp_path, capsys, mo
     some = [case for case in CASES if case.flight in (flights.PLAIN, flights.UNASKED)]
     monkeypatch.setattr(conforming, "findings", partial(findings, cases=some))
     report = tmp_path / "report.json"
-    status = commands.main(["conformance", shlex.join(deviant("leaves with an error")), "--out", str(report)])
-    assert status == commands.FAIL
+    ended = commands.main(["conformance", shlex.join(deviant("leaves with an error")), "--out", str(report)])
+    assert ended == status.FAIL
     said = capsys.readouterr().out
     assert f"{len(some) - 2} pass, 2 fail" in said
     assert "exit: it has to leave then, with exit status 0\n    agent 5 (pid " in said
@@ -204,9 +204,9 @@ def test_the_command_says_what_was_found_and_writes_it_down(tmp_path, capsys, mo
 
 
 def test_a_command_that_starts_nothing_is_bad_input(capsys):
-    assert commands.main(["conformance", "no-such-program"]) == commands.BAD_INPUT
+    assert commands.main(["conformance", "no-such-program"]) == status.BAD_INPUT
     assert "no-such-program" in capsys.readouterr().err
-    assert commands.main(["conformance", "true", "--estimator", "nonsense"]) == commands.BAD_INPUT
+    assert commands.main(["conformance", "true", "--estimator", "nonsense"]) == status.BAD_INPUT
     assert "agents.estimator" in capsys.readouterr().err
 
 
@@ -214,7 +214,7 @@ def test_a_command_that_starts_nothing_is_bad_input(capsys):
 def test_a_command_line_is_one(command, capsys):
     with pytest.raises(SystemExit, match="2"):
         commands.main(["conformance", command])
-    assert "argument COMMAND" in capsys.readouterr().err
+    assert "COMMAND: " in capsys.readouterr().err
 
 
 PROTOCOL = (DOCS / "protocol.md").read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 import pytest
 from flying import plan_of
 
-from affinet.cli import commands
+from affinet.cli import commands, status
 from affinet.planning.plan import PlanError
 from affinet.runtimes import launcher
 from affinet.runtimes.launcher import Launcher
@@ -46,7 +46,7 @@ def test_programs_fly_over_processes_only(tmp_path):
 def test_the_command_refuses_them_in_process_before_it_makes_a_directory(tmp_path, capsys):
     out = tmp_path / "run"
     given = ["run", "corridor", "--runtime", "inprocess", "--set", FLOWN, "--out", str(out)]
-    assert commands.main(given) == commands.BAD_INPUT
+    assert commands.main(given) == status.BAD_INPUT
     assert capsys.readouterr().err.startswith("programs: agents 2 fly by programs of your own")
     assert not out.exists()
 
