@@ -181,6 +181,7 @@ ORDER = [
     "raises",
     "warns",
     "admonition",
+    "examples",
 ]
 
 
