@@ -22,8 +22,8 @@ _READING = """What a clock says: ticks since take-off.
 
 An `int` where one reading holds for all agents that are computed together, as it does of an agent in a process of its own,
 and of all while their clocks agree; else int64 of shape (...), each agent its own. It counts the ticks of the agent's own
-clock, which the verb `clock` makes wrong. Times `brief.dt` it is in seconds. `Manoeuvre.target`, `velocity` and
-`acceleration` take both forms.
+clock, which the verb `clock` makes wrong. Times `brief.dt` it is in seconds. `numpy.asarray(tick)[..., None]` goes beside
+arrays (..., D) in both forms, which `Manoeuvre.target`, `velocity` and `acceleration` take, too.
 """
 Reading = Annotated[int | Integers, "ticks"]
 Reading.__doc__ = _READING

@@ -1,6 +1,7 @@
 """The pages that are worked through: all that stands on them is done, in one folder, and says what they show."""
 
 import re
+import shlex
 import tomllib
 
 import pytest
@@ -8,6 +9,8 @@ from flying import PROCESSES
 from pages import Step, Wrong, is_answered, page, said, steps, work_through
 from paths import ROOT
 
+from affinet.cli import options
+from affinet.cli.helping import commands_of
 from affinet.planning import registry
 from affinet.scaffold import making
 from affinet.scenario.profiles import IMPAIRMENTS
@@ -30,6 +33,21 @@ def test_a_page_says_what_happens(name, tmp_path):
     done = work_through(text, tmp_path, elsewhere)
     assert len(done) >= 3
     assert {step.what for step in steps(text)} - {step.what for step in done} == set(elsewhere)
+
+
+def typed(text):
+    """Commands of affinet that stand on a page without an answer: in a line of their own, or in the text."""
+    lines = re.findall(r"^    (affinet .*?)(?: +#.*)?$", text, re.MULTILINE)
+    return {*lines, *(" ".join(command.split()) for command in re.findall(r"(?<!`)`(affinet [a-z][^`]*)`", text))}
+
+
+@pytest.mark.parametrize("command", sorted({command for name in ELSEWHERE for command in typed(page(name))}))
+def test_what_stands_without_an_answer_can_be_typed(command):
+    _, *words = shlex.split(command)
+    if words[1:] in ([], ["--dask"]):  # a command by its name
+        assert words[0] in commands_of(options.parser())
+    else:
+        assert options.parser().parse_args(words)
 
 
 def test_a_scaffolded_project_offers_what_the_page_says(tmp_path):
