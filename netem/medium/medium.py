@@ -19,7 +19,8 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.core.channels import SENSE
 from netem.core.draws import DrawnAhead, Purpose, Seed
 from netem.core.links import Links
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.conditions import Conditions
+from netem.faults.timeline import Timeline
 from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, Waits, deliver
 from netem.medium.link_model import LinkModel, Memory
