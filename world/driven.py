@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from analysis.models.arrays import Array
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 from netem.processes.supervised import Supervisor
 from netem.wire import messages
 from netem.wire.arrays import packed

@@ -10,7 +10,8 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from analysis.models.arrays import Array
 from netem.core.clock import Clock
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.conditions import Conditions
+from netem.faults.timeline import Timeline
 from world.books.history import ErrorMonitor
 from world.physics.world import Scene
 

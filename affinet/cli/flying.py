@@ -65,7 +65,16 @@ def hosts(parsed: argparse.Namespace) -> int:
 
 
 def fly_plan(plan: Plan, name: str, parsed: argparse.Namespace, spread: Callable[[Path], Spread] | None = None) -> int:
-    """Fly a plan, and say what came of it.
+    """Fly a plan, and say what came of it; its exit status.
+
+    Parameters
+    ----------
+    plan, name
+        What flies, and what it is called.
+    parsed
+        How, by the command line.
+    spread
+        Makes the other machines of a run that some of them fly, for its directory.
 
     Raises
     ------

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from affinet.planning import checks, registry
-from affinet.scenario import sections
+from affinet.scenario.bodies import INTEGRATORS
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError
 from agents.centre.checked import CheckedCentre
@@ -104,7 +104,7 @@ def _check_order(given: Scenario, law: Law[Any]) -> None:
         raise ScenarioError("formation.leaders: who leads is steered by velocities or accelerations; give none")
     if law.order != given.dynamics.order:
         steers = ("velocities", "accelerations", "jerks", "snaps")[law.order - 1]
-        fits = sections.INTEGRATORS[law.order - 1]
+        fits = INTEGRATORS[law.order - 1]
         raise ScenarioError(
             f"dynamics.model: {given.agents.law} steers {steers}, and bodies are {given.dynamics.model}s; "
             f"set it to {fits!r}, or choose another law"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from affinet.planning.lateness import Lateness
-from affinet.scenario import sections, selectors
+from affinet.scenario import bodies, matrices, selectors
 from affinet.scenario.sections import Scenario, TimeSection
 from affinet.scenario.target import TargetSection, Waypoint
 from affinet.scenario.wrong import ScenarioError
@@ -69,7 +69,7 @@ def _weights(given: Scenario, edges: int) -> Array | None:
     if section.weights is None:
         return None
     both_ways = any(isinstance(weight, list) for weight in section.weights)
-    weights = sections.array("formation.weights", section.weights, (edges, 2) if both_ways else (edges,))
+    weights = matrices.array("formation.weights", section.weights, (edges, 2) if both_ways else (edges,))
     return weights if both_ways else np.column_stack([weights, weights])
 
 
@@ -90,7 +90,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
         manoeuvre=_manoeuvre(given, formation.dimension),
-        sensor=sections.sensor(given.sensing, formation.dimension),
+        sensor=bodies.sensor(given.sensing, formation.dimension),
         disturbance=_disturbance(given, formation.dimension),
         pursuit=_pursuit(given, formation),
         start=given.formation.start,
@@ -113,7 +113,7 @@ def _body(given: Scenario, dimension: int) -> BodyModel:
 def _disturbance(given: Scenario, dimension: int) -> Disturbance:
     section = given.dynamics
     kernel = None if section.kernel is None else Kernel(**dict(section.kernel))
-    return Disturbance(sections.displacement(section, dimension), kernel, section.persistence)
+    return Disturbance(bodies.displacement(section, dimension), kernel, section.persistence)
 
 
 def _pursuit(given: Scenario, formation: Formation) -> MovingTarget | None:
@@ -152,7 +152,7 @@ def _start(section: TargetSection, dimension: int) -> Array:
     start = np.zeros((section.order, dimension))
     for derivative, (key, values) in enumerate((("position", section.position), ("velocity", section.velocity))):
         if values is not None and derivative < section.order:
-            start[derivative] = sections.array(f"target.{key}", values, (dimension,))
+            start[derivative] = matrices.array(f"target.{key}", values, (dimension,))
     return start
 
 
@@ -160,7 +160,7 @@ def _course(path: Sequence[Waypoint], order: int, time: TimeSection, dimension: 
     times = [point.time for point in path]
     _refuse_within_a_tick("target.path", times, time.dt)
     points = [
-        sections.array(f"target.path.{number}.position", point.position, (dimension,))
+        matrices.array(f"target.path.{number}.position", point.position, (dimension,))
         for number, point in enumerate(path, start=1)
     ]
     seconds: Array = np.arange(time.ticks + 1, dtype=np.float64) * time.dt
@@ -171,7 +171,7 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
     seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
     section = given.manoeuvre
     for number, wall in enumerate(section.walls, start=1):
-        sections.array(f"manoeuvre.walls.{number}", wall, (len(wall), dimension))
+        matrices.array(f"manoeuvre.walls.{number}", wall, (len(wall), dimension))
     if section.preset == "hover":
         return manoeuvre.hover(seconds, dimension)
     if section.preset is not None:
@@ -207,8 +207,8 @@ def keyframes_of(given: Scenario, dimension: int) -> Keyframes:
     theta, offset = [], []
     for number, frame in enumerate(section.keyframes, start=1):
         key = f"manoeuvre.keyframes.{number}"
-        theta.append(sections.array(f"{key}.theta", frame.theta, square))
-        offset.append(sections.array(f"{key}.offset", frame.offset, (dimension,)))
+        theta.append(matrices.array(f"{key}.theta", frame.theta, square))
+        offset.append(matrices.array(f"{key}.offset", frame.offset, (dimension,)))
     times = [frame.time for frame in section.keyframes]
     angles = [frame.angle for frame in section.keyframes if frame.angle is not None]
     return Keyframes(times, np.array(theta), np.array(offset), np.array(angles) if angles else None)

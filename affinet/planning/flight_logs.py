@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from affinet.planning import csv_logs
 from affinet.planning.blueprint import formation_of
-from affinet.scenario import inputs, loading, sections
+from affinet.scenario import bodies, inputs, loading
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
@@ -47,7 +47,7 @@ def _of_run(out: Path, given: Scenario, world: World) -> RecordedFlight:
     flown = formation_of(before)
     if Links.both_ways(flown.agents, flown.edges).index != links.index:
         raise ValueError(f"{out}: it was flown over other links: leave the formation as it was")
-    sensed = sections.sensor(before.sensing, world.formation.dimension).reads
+    sensed = bodies.sensor(before.sensing, world.formation.dimension).reads
     if sensed != world.sensor.reads:
         raise ValueError(f"{out}: its sensors said {sensed}, and these say {world.sensor.reads}: set sensing alike")
     if before.dynamics.order != 1:

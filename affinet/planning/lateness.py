@@ -14,8 +14,9 @@ from affinet.planning.script import Script
 from affinet.scenario.sections import Scenario
 from agents.swarm import Late
 from netem.core.links import Links
+from netem.faults.conditions import Conditions
 from netem.faults.fault import Fault, UnderWay, Verb
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.timeline import Timeline
 from netem.impairments import delay
 from world.formation.nominal import Formation
 

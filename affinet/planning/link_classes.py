@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from affinet.scenario import profiles, selectors
+from affinet.scenario.air import NetworkSection
 from affinet.scenario.profiles import LinkProfile
-from affinet.scenario.sections import NetworkSection
 from affinet.scenario.wrong import ScenarioError, said_at
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links

@@ -93,7 +93,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
     ScenarioError
         When it holds no run, or no journal, or its verdicts are of other ticks or links.
     """
-    from netem.medium import journal  # pyarrow takes a while to import, and only a replay reads journals
+    from netem.medium import journal, recorded  # pyarrow takes a while to import, and only a replay reads journals
 
     file, judge = (out / JOURNAL).resolve(), inputs.kept(out).verdicts
     given = loading.resolved(out, overrides, folder)
@@ -106,7 +106,7 @@ def again(out: Path, overrides: Sequence[str], *, verdicts: bool, folder: Path |
     try:
         plan = make(given, injected=journal.told(file).injected, journal=judged_by)
         if judged_by is not None:
-            journal.check(journal.read(judged_by), plan.channels, plan.world.ticks)
+            recorded.check(journal.read(judged_by), plan.channels, plan.world.ticks)
     except journal.JournalError as error:
         raise ScenarioError(f"{out}: {error}") from error
     return replace(plan, findings=(*plan.findings, *inputs.changed(out)))

@@ -12,8 +12,9 @@ from affinet.planning import limits, own_losses, recordings
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
+from affinet.scenario.air import NetworkSection
 from affinet.scenario.profiles import LinkProfile
-from affinet.scenario.sections import NetworkSection, Scenario, TimeSection
+from affinet.scenario.sections import Scenario, TimeSection
 from affinet.scenario.wrong import ScenarioError
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask

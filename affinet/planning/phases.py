@@ -13,8 +13,9 @@ from analysis.models.arrays import Array, Mask
 from analysis.models.finding import Finding
 from netem.core.links import Links
 from netem.core.listing import listed
+from netem.faults.conditions import Conditions
 from netem.faults.fault import Fault
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.timeline import Timeline
 from netem.medium.verdict import PASSED, standing
 
 _ZERO = 1e-6  # of eigenvalues, as a share of the largest where nothing is missing

@@ -19,7 +19,7 @@ from netem.impairments.trace import MeasuredAvailability
 from netem.medium.medium import JOURNAL
 
 if TYPE_CHECKING:
-    from netem.medium.journal import Carried
+    from netem.medium.recorded import Carried
 
 
 def refuse_to_judge(before: Scenario, given: Scenario) -> None:
@@ -63,12 +63,12 @@ def trace(
     ValueError
         When it says nothing of a link, or ended too early.
     """
-    from netem.medium import journal  # pyarrow takes a while to import
+    from netem.medium import journal, recorded  # pyarrow takes a while to import
 
     if not (run / JOURNAL).exists():
         raise ValueError(f"the directory holds no {JOURNAL}: name that of a run, or a CSV file")
     before = loading.resolved(run)
-    carried = journal.carried(journal.read(run / JOURNAL), links, sensing=sensing)
+    carried = recorded.carried(journal.read(run / JOURNAL), links, sensing=sensing)
     if silent := [pair for pair, row in links.index.items() if rows[row] and not carried.known[row]]:
         raise ValueError(f"the run has no verdict on {_pairs(silent)}")
     flown = len(carried.share) * before.time.dt

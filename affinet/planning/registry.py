@@ -78,6 +78,13 @@ def choose(group: str, key: str, name: str, given: Mapping[str, Any], own: Mappi
 def loaded(group: str, key: str, path: str, folder: Path | None) -> type:
     """The class at "module:Class" of a folder, or of an installed package, which is an algorithm of this group.
 
+    Parameters
+    ----------
+    group, key
+        Which, and the key that names it, for error messages.
+    path, folder
+        The class, and where its module lies; None for one that is installed.
+
     Raises
     ------
     ScenarioError

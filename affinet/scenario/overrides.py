@@ -8,7 +8,8 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from affinet.scenario import inputs, objects, sections, source, values
+from affinet.scenario import inputs, objects, source, values
+from affinet.scenario.bodies import SENSORS
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import among, one_line, shown
 from affinet.scenario.wrong import ScenarioError
@@ -129,6 +130,6 @@ def _plain(key: str, value: Any) -> Any:
 
 def _make_room(sensing: dict[str, Any], name: str) -> None:
     """Leave out what a file says of another sensor than the one that this key is of."""
-    own = [kind for kind in sections.SENSORS if name in kind]
-    for other in (key for kind in sections.SENSORS if own and kind not in own for key in kind):
+    own = [kind for kind in SENSORS if name in kind]
+    for other in (key for kind in SENSORS if own and kind not in own for key in kind):
         sensing.pop(other, None)

@@ -38,6 +38,7 @@ Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Tick = Annotated[float, Field(gt=0.0, le=100.0, allow_inf_nan=False), AfterValidator(_long_enough)]
 Steps = Annotated[int, Field(ge=1, le=MOST)]
+Matrix = list[list[Finite]]
 Ticks = Annotated[int, Field(ge=0, le=MOST)]
 
 

@@ -19,7 +19,8 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.core.channels import SENSE
 from netem.core.draws import DrawnAhead, Purpose, Seed
 from netem.core.links import Links
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.conditions import Conditions
+from netem.faults.timeline import Timeline
 from netem.impairments.profile import Profile
 from netem.medium.in_flight import Delivery, MediumState, Verdicts, Waits, deliver
 from netem.medium.link_model import LinkModel, Memory
@@ -36,7 +37,7 @@ _DELIVERED, _DELAYED, _PAUSED, _SCRIPTED, _DROPOUT = (
 
 
 class Verdicted(Protocol):
-    """A source of verdicts that were decided before: `journal.Recorded`."""
+    """A source of verdicts that were decided before: `recorded.Recorded`."""
 
     def verdicts(self, tick: int, offered: Mask) -> Verdicts:
         """On the messages of a tick."""
@@ -47,8 +48,9 @@ def recorded(path: Path | None, links: Links, channels: Sequence[str]) -> Verdic
     if path is None:
         return None
     from netem.medium import journal  # pyarrow takes a while to import, and only a replay reads journals
+    from netem.medium.recorded import Recorded
 
-    return journal.Recorded(journal.read(path), links, channels)
+    return Recorded(journal.read(path), links, channels)
 
 
 class _Under(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
 from netem.core.plain import to_plain
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Entry, Verdicts, Waits
 from netem.medium.medium import Medium

@@ -15,9 +15,10 @@ import numpy as np
 from analysis.models.arrays import Array, Integers, Mask, chosen
 from netem.core.plain import to_plain
 from netem.faults import control, lie
+from netem.faults.conditions import Conditions
 from netem.faults.control import Answer, Order
 from netem.faults.fault import Fault
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks, corrupted_fields
 from netem.medium.in_flight import Delivery, Entry, Verdicts, out_of_the_ordinary
 from netem.medium.medium import Medium

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from analysis.kernels.kernel import Part, Plain, kernel
 from analysis.models.arrays import Mask
 from netem.core.links import Links
+from netem.faults.conditions import Conditions
 from netem.faults.fault import Verb
-from netem.faults.timeline import Conditions
 
 VerdictCodes = NDArray[np.uint8]
 

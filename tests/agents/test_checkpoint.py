@@ -14,7 +14,7 @@ from offered import by_affinet
 from own_code import ESTIMATOR
 from paths import HELPERS
 
-from affinet.scenario.sections import INTEGRATORS
+from affinet.scenario.bodies import INTEGRATORS
 from agents import checkpoint
 from agents.agent import Agent
 from agents.exchange import Heard

@@ -4,7 +4,7 @@ import pytest
 from flying import plan_of
 
 from affinet.planning.plan import PlanError
-from affinet.scenario.sections import INTEGRATORS
+from affinet.scenario.bodies import INTEGRATORS
 from affinet.scenario.wrong import ScenarioError
 
 NAME = "target"

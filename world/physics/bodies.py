@@ -17,7 +17,7 @@ import numpy as np
 from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array
 from analysis.models.elementary import cos, sin, whole_power
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 
 
 class Motion(NamedTuple):

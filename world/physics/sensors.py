@@ -8,7 +8,7 @@ from analysis.kernels.kernel import Plain, kernel
 from analysis.models.algebra import product
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 
 
 def relative(position: Array, links: Links) -> Array:

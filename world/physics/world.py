@@ -15,7 +15,7 @@ from analysis.models.pursuit import Sighting
 from analysis.models.sensor import Sensor
 from netem.core.draws import DrawnAhead, Purpose, Seed, uniform
 from netem.core.links import Links
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 from world.formation.nominal import Formation
 from world.physics import bodies, sensors
 from world.physics.bodies import Body, BodyModel, Motion

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.conditions import Conditions
+from netem.faults.timeline import Timeline
 from world.books.kept import Kept
 from world.recording import palette
 from world.recording.stage import Stage, Stretch

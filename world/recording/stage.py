@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from analysis.models.arrays import Array, Mask
 from analysis.models.elementary import cos, sin
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.conditions import Conditions
+from netem.faults.timeline import Timeline
 from world.books.history import Moments
 from world.books.realised import Realised
 from world.physics.world import World

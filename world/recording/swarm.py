@@ -9,7 +9,7 @@ import rerun as rr
 
 from analysis.models.arrays import Array
 from analysis.models.elementary import whole_power
-from netem.faults.timeline import Conditions
+from netem.faults.conditions import Conditions
 from world.physics.world import World
 from world.recording import palette
 from world.recording.stage import Colours, Stage, Stretch, spatial

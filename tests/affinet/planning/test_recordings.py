@@ -10,7 +10,7 @@ from affinet.runtimes.run import fly, rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links
-from netem.medium import journal
+from netem.medium import journal, recorded
 from netem.medium.medium import JOURNAL
 from netem.medium.verdict import Verdict
 from world.books import history
@@ -137,7 +137,7 @@ def test_of_a_larger_swarm_the_links_that_are_here_are_taken(tmp_path):
     plan, verdicts = flown(tmp_path / "run", HEXA)
     both = [pair for pair in plan.world.links.index if max(pair) < 10 and min(pair) <= 2]
     links = Links.both_ways(9, both)
-    carried = journal.carried(journal.read(tmp_path / "run" / JOURNAL), links, sensing=True)
+    carried = recorded.carried(journal.read(tmp_path / "run" / JOURNAL), links, sensing=True)
     rows = [plan.world.links.index[pair] for pair in links.index]
     assert np.array_equal(carried.share, verdicts[:, 0, rows] == Verdict.DELIVERED)
     assert carried.known.all()

@@ -179,7 +179,7 @@ def test_one_is_asked_for_by_name_and_a_stranger_is_one_line(capsys):
     assert line.startswith("gusts: none of the verbs; did you mean 'gust'? there are cut, partition, ")
 
 
-OWN = '''
+SPRING = '''
 from dataclasses import dataclass
 from affinet import Law
 
@@ -207,7 +207,7 @@ class Spring(Law):
 def test_a_class_of_ones_own_is_described_from_the_working_directory(tmp_path, monkeypatch, capsys):
     module = "pull_that_is_listed"
     name = f"{module}:Spring"
-    (tmp_path / f"{module}.py").write_text(OWN)
+    (tmp_path / f"{module}.py").write_text(SPRING)
     monkeypatch.chdir(tmp_path)
     assert main(["list", "laws", name, "--json"]) == 0
     ((entry,),) = json.loads(capsys.readouterr().out).values()

@@ -20,7 +20,7 @@ from affinet.verdicts import reading
 from netem.core.links import Links
 from netem.impairments import trace
 from netem.impairments.trace import TraceError
-from netem.medium import journal
+from netem.medium import journal, recorded
 from netem.medium.journal import JournalError
 from netem.medium.medium import JOURNAL
 from netem.processes.user_code import UserCodeError
@@ -58,8 +58,8 @@ def reads_trace(path):
 def reads_journal(path):
     table = journal.read(path)
     journal.told(path)
-    journal.check(table, ("sense",), 20)
-    journal.carried(table, LINKS, sensing=True)
+    recorded.check(table, ("sense",), 20)
+    recorded.carried(table, LINKS, sensing=True)
 
 
 def reads_run(path):

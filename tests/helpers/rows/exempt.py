@@ -71,7 +71,7 @@ EXEMPT = {
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
         netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
         netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
-        netem.impairments.measured.delays netem.medium.journal.carried world.formation.manoeuvre.narrowest
+        netem.impairments.measured.delays netem.medium.recorded.carried world.formation.manoeuvre.narrowest
         world.formation.manoeuvre.turned world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
@@ -93,7 +93,7 @@ EXEMPT = {
         netem.medium.open_tick.OpenTick.close netem.medium.real_time.RealTimeRelay.closed
         netem.ports.MediumPorts.as_it_arrives netem.ports.MediumPorts.hand_out_measurements
         netem.ports.MediumPorts.journal netem.ports.MediumPorts.seen netem.ports.MediumPorts.where
-        netem.medium.relay.Relayed.entry netem.medium.journal.Recorded.verdicts
+        netem.medium.relay.Relayed.entry netem.medium.recorded.Recorded.verdicts
         world.books.history.ErrorMonitor.errors world.books.history.ErrorMonitor.see
         world.books.history.History.extend world.books.history.History.arrays world.books.history.load
         world.books.history.digest world.books.history.one_nan world.books.history.forms world.books.history.by_span

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from netem.core.links import Links
+from netem.faults.conditions import Conditions
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
-from netem.faults.timeline import Conditions, Timeline
+from netem.faults.timeline import Timeline
 from netem.faults.trigger import Trigger
 
 LINKS = Links.both_ways(4, [(1, 2), (2, 3), (3, 4), (4, 1)])

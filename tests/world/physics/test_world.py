@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from affinet.scenario.sections import INTEGRATORS
+from affinet.scenario.bodies import INTEGRATORS
 from analysis.models.sensor import Sensor
 from netem.core.links import Links
 from netem.faults.fault import DepartedBody, Fault, UnderWay, Verb
