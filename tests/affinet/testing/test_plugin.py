@@ -74,7 +74,7 @@ def test_calm(swarm):
 """
     result = tested(text)
     assert outcomes(result) == {"failed": 1}
-    result.stdout.fnmatch_lines(["*Broken: recovers(0.1, within=0.2): vacuous: no fault that ended*"])
+    result.stdout.fnmatch_lines(["*Broken: recovers(0.1, within=0.2): vacuous: no fault that had its time*"])
 
 
 def test_what_comes_out_badly_can_be_what_is_expected(tested):
