@@ -37,9 +37,9 @@ EXEMPT = {
         netem.core.links.Links.degree netem.core.links.Links.present netem.core.links.Links.slots
         netem.core.links.Links.neighbours netem.core.links.Links.back netem.core.links.Links.touching
         netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
-        netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
-        netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
-        netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.faults.conditions.Conditions.absent netem.faults.conditions.Conditions.idle
+        netem.faults.conditions.Conditions.still netem.faults.conditions.Conditions.coasting
+        netem.faults.conditions.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.faults.timeline.Timeline.each
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
