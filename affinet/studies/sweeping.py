@@ -16,7 +16,7 @@ import numpy as np
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.planning.programs import refuse_in_process
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.runtimes.side_by_side import NotABatch, side_by_side
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError

@@ -12,7 +12,8 @@ from typing import Any
 
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan
-from affinet.runtimes.run import Runtime, evidence, fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import Runtime, evidence, fly
 from affinet.scenario import loading as scenarios
 from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario

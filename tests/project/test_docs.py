@@ -12,7 +12,8 @@ from paths import ROOT
 
 from affinet import library
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading, profiles, verbs
 from affinet.studies import quantities, study
 from affinet.testing.swarm import Swarm

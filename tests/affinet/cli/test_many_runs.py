@@ -9,7 +9,7 @@ from own_code import LAW, broken, write
 from scipy import stats
 
 from affinet.cli.commands import main
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import sweeping

@@ -28,7 +28,9 @@ EXEMPT = {
     """,
     WHOLE: """
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
-        netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
+        netem.medium.entry.out_of_the_ordinary netem.medium.entry.by_part
+        netem.medium.in_flight.MediumState.over_links netem.medium.relay.Relay.under_way
+        netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
         netem.medium.verdict.stronger netem.medium.verdict.also_held netem.medium.picking.picked
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
@@ -89,7 +91,7 @@ EXEMPT = {
     """,
     WRITTEN: """
         world.books.history.read
-        netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.in_flight.Entry.dropped_by_verdict
+        netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.entry.Entry.dropped_by_verdict
         netem.medium.open_tick.OpenTick.close netem.medium.real_time.RealTimeRelay.closed
         netem.ports.MediumPorts.as_it_arrives netem.ports.MediumPorts.hand_out_measurements
         netem.ports.MediumPorts.journal netem.ports.MediumPorts.seen netem.ports.MediumPorts.where
