@@ -39,6 +39,7 @@ _WORK: Mapping[str, tuple[str, str]] = {
     "fit": ("fitting", "fit"),
     "inject": ("injecting", "inject"),
     "study": ("studying", "fly_and_report"),
+    "score": ("scoring", "fly_and_report"),
     "hunt": ("hunting", "hunt_and_report"),
     "conformance": ("conforming", "judge_and_report"),
     "design": ("designing", "design"),

@@ -108,6 +108,16 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
             "affinet study mine.toml --out studies/mine --jobs 1", "your own (`affinet new study mine`)", "--quick"
         ),
     ),
+    "score": (
+        Example(
+            "affinet score ga-rkf --quick", "in minutes, against others; a page in scores/ga-rkf-quick/", alone=False
+        ),
+        Example(
+            "affinet score my_filter:MyFilter --against rkf,ga-rkf --out scores/mine",
+            "your own, in full: what has flown there does not fly again",
+            alone=False,
+        ),
+    ),
     "design": (
         Example("affinet design grid --agents 50 --range 2.25", "writes designed-grid.toml"),
         Example("affinet design random --agents 45 --dimension 3 --range 3 --seed 7 --out cloud.toml", "in space"),

@@ -116,8 +116,14 @@ def cell(given: Cell) -> Flown:
 def descent(given: Descent) -> list[float]:
     """How bad it has to be for the swarm of each seed to be lost, by bisection; infinite where it is not lost at the worst.
 
+    Nothing of an entrant that does not suit the task.
+
     Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
     """
+    try:
+        given.cell.plans(given.cell.seeds[:1], given.worsening.at(given.worsening.most))
+    except (ScenarioError, PlanError):
+        return []  # the cells of the same task say why
     seeds, worse = given.cell.seeds, given.worsening
     low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
     survived = ~_lost(given, seeds, high.tolist())
@@ -128,9 +134,15 @@ def descent(given: Descent) -> list[float]:
     return [float(one) for one in np.where(survived, np.inf, worse.between(low, high))]
 
 
-def timed(given: Cell) -> Timed:
-    """Take the time of flights of one run of a cell; others on the machine make it longer, so the median counts."""
-    (plan,) = given.plans(given.seeds[:1])
+def timed(given: Cell) -> Timed | None:
+    """Take the time of flights of one run of a cell; others on the machine make it longer, so the median counts.
+
+    None of an entrant that does not suit the task.
+    """
+    try:
+        (plan,) = given.plans(given.seeds[:1])
+    except (ScenarioError, PlanError):
+        return None
     rehearse(plan)  # kernels are compiled
     took = [rehearse(plan).outcome.wall_s for _ in range(_TIMED)]
     said = measures.load_of(plan)
