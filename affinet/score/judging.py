@@ -156,26 +156,28 @@ def _against(raw: Raw, compared: Sequence[Compared]) -> Iterator[str]:
 
 
 def _points(raw: Raw, break_downs: Sequence[BreakDown]) -> Iterator[str]:
-    units = {one.name: one.unit for one in raw.worsenings}
+    of = {one.name: one for one in raw.worsenings}
     for own in break_downs:
         if own.entrant != raw.scored:
             continue
+        worse = of[own.worsening]
         others = [
-            f"{one.entrant} at {point(one.median)} ({one.decision})"
+            f"with {one.entrant} at {point(one.median, worse.most)} ({one.decision})"
             for one in break_downs
             if (one.task, one.worsening) == (own.task, own.worsening) and one.entrant != raw.scored
         ]
-        unit = f" {units[own.worsening]}".rstrip()
+        unit = f" {worse.unit}".rstrip()
         against = f"; {', '.join(others)}" if others else ""
-        yield f"{own.task}, {own.worsening}: half of the swarms are lost at {point(own.median)}{unit}{against}"
+        yield f"{own.task}, {own.worsening}: half of the swarms are lost at {point(own.median, worse.most)}{unit}{against}"
 
 
-def point(found: Interval) -> str:
-    """A break-down point with its interval, in words."""
+def point(found: Interval, most: float) -> str:
+    """A break-down point with its interval, in words, where it was looked for up to `most`."""
+    beyond = f"beyond {most:g}"
     if np.isinf(found.found):
-        return f"none (beyond {found.low:.3g})" if np.isfinite(found.low) and found.low > 0 else "none"
-    high = "none" if np.isinf(found.high) else f"{found.high:.3g}"
-    return f"{found.found:.3g} ({found.low:.3g} to {high})"
+        return beyond
+    low = "0" if np.isinf(found.low) else f"{found.low:.3g}"
+    return f"{found.found:.3g} ({low} to {beyond if np.isinf(found.high) else f'{found.high:.3g}'})"
 
 
 def _honest(raw: Raw) -> Iterator[str]:
@@ -216,7 +218,7 @@ def _cost(raw: Raw) -> Iterator[str]:
         if who != raw.scored:
             continue
         others = [
-            f"{rival} {raw.times[task, rival].tick_s * 1e3:.2g} ms"
+            f"with {rival} {raw.times[task, rival].tick_s * 1e3:.2g} ms"
             for rival in raw.entrants[1:]
             if (task, rival) in raw.times
         ]
