@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from affinet.planning import limits, own_losses, recordings
+from affinet.planning import limits, own_losses, recordings, traces
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
 from affinet.scenario import profiles
@@ -16,6 +16,7 @@ from affinet.scenario.air import NetworkSection
 from affinet.scenario.profiles import LinkProfile
 from affinet.scenario.sections import Scenario, TimeSection
 from affinet.scenario.wrong import ScenarioError
+from affinet.traces.link_data import Quantity
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.finding import Finding
@@ -28,7 +29,7 @@ from netem.impairments.jamming import Zone
 from netem.impairments.profile import Profile
 from netem.impairments.rate import Rate
 from netem.impairments.reach import Reach
-from netem.impairments.trace import MeasuredAvailability, Trace
+from netem.impairments.trace import Trace
 from world.formation.nominal import Formation
 
 _ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
@@ -154,13 +155,13 @@ def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer
 
 
 def _trace(one: LinkClass, links: Links, rows: Mask, time: TimeSection) -> tuple[Trace, list[Finding]]:
-    file = Path(one.losses(profiles.Traced).file)
+    model = one.losses(profiles.Traced)
+    file = Path(model.file)
     try:
         if file.is_dir():
             measured, notes = recordings.trace(file, links, rows, time, sensing=one.sensing)
         else:
-            measured = trace.from_csv(file, links)
-            notes = _on_measured(measured, rows, time)
+            measured, notes = traces.measured(model, Quantity.AVAILABILITY, links, rows, time)
         held = trace.table(measured, links, rows, time.dt, time.ticks)
     except FileNotFoundError as error:
         raise ScenarioError(f"network.profiles.{one.name}: trace {file}: no such file") from error
@@ -168,15 +169,6 @@ def _trace(one: LinkClass, links: Links, rows: Mask, time: TimeSection) -> tuple
         raise ScenarioError(f"network.profiles.{one.name}: trace {file}: {error}") from error
     said = [Finding("trace", "note", f"profile {one.name!r}: {file.name}: {note}") for note in notes]
     return Trace(*held, one.sensing, one.comms), said
-
-
-def _on_measured(measured: MeasuredAvailability, rows: Mask, time: TimeSection) -> list[str]:
-    moments, notes = measured.time[rows[measured.link]], []
-    if len(moments) and (last := float(moments.max())) < time.duration - time.dt:
-        notes.append(f"its last row is of {last:g} s, and each value holds to the end of the run ({time.duration:g} s)")
-    if measured.splits_ticks(time.dt, time.ticks):
-        notes.append(f"it changes within ticks of {time.dt:g} s: each tick has its mean over time")
-    return notes
 
 
 def _reach(one: LinkClass, dt: float) -> Reach:
