@@ -59,6 +59,35 @@ def measured(
     return given, [*notes, *more, *_at_its_end(given, rows, time)]
 
 
+def told(file: TraceFile, every: float) -> tuple[str, LinkData, list[str]]:
+    """The format of a file, what it says, with what a curve makes of it, and what is taken to be so.
+
+    Parameters
+    ----------
+    file
+        Which, with its meaning.
+    every
+        At which times to look how far nodes that move are apart, in seconds.
+
+    Raises
+    ------
+    MeasuredError
+        When it cannot be understood.
+    OSError
+        When it cannot be read.
+    """
+    name, data = formats.read(Path(file.file), file.format)
+    data, notes = _in_seconds(data, file)
+    notes += data.assumed
+    if data.paths:
+        time: Array = np.arange(0.0, data.ends + every / 2.0, every)
+        data = replace(data, steps={Quantity.DISTANCE: movement.between_all(data.paths, time)})
+    if file.curve is not None:
+        worth = _worth(data, Quantity.AVAILABILITY, file, name)
+        data = replace(data, steps={**data.steps, Quantity.AVAILABILITY: worth})
+    return name, data, notes
+
+
 def curve_of(said: object) -> Curve:
     """What a scenario says of a curve as a function."""
     match said:
@@ -70,15 +99,6 @@ def curve_of(said: object) -> Curve:
             return curves.LogDistance(said.range, said.exponent, said.shadowing)
     assert isinstance(said, list)
     return curves.Points(said)
-
-
-def by_curve(data: LinkData, curve: Curve) -> LinkData:
-    """With the availability that a curve makes of what was measured."""
-    what = next(one for one in INDIRECT if one in data.steps)
-    held = data.steps[what]
-    return replace(
-        data, steps={**data.steps, Quantity.AVAILABILITY: held._replace(value=np.asarray(curve(held.value)))}
-    )
 
 
 def _in_seconds(data: LinkData, file: TraceFile) -> tuple[LinkData, list[str]]:
@@ -109,7 +129,8 @@ def _worth(data: LinkData, what: Quantity, file: TraceFile, name: str) -> Steps:
         )
     if not isinstance(file.curve, list) and indirect[0] is not Quantity.DISTANCE:
         raise MeasuredError(f"it says {indirect[0]}, and the curve is one by distance: give points")
-    return by_curve(data, curve_of(file.curve)).steps[Quantity.AVAILABILITY]
+    held = data.steps[indirect[0]]
+    return held._replace(value=curve_of(file.curve)(held.value))
 
 
 def _agents(data: LinkData, file: TraceFile, links: Links, lines: Integers | None = None) -> Integers:

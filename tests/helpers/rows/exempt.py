@@ -69,8 +69,8 @@ EXEMPT = {
     ONCE: """
         world.brief.DriverBrief.of
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
-        netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
-        netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
+        netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.likelihood.log_likelihood
+        netem.impairments.trace.table netem.impairments.trace.Measured.over netem.impairments.likelihood.predicted
         netem.impairments.measured.delays netem.medium.recorded.carried world.formation.manoeuvre.narrowest
         world.formation.manoeuvre.turned world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
