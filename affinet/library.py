@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from affinet.planning import making
-from affinet.runtimes.run import Runtime, rehearse, runtime_of
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import Runtime, runtime_of
 from affinet.scenario import files, loading
 from affinet.scenario.overrides import Given
 from affinet.scenario.sections import Scenario

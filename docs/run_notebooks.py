@@ -32,7 +32,11 @@ FOLDER = Path(__file__).parent / "notebooks"
 LONGEST_S = 300.0  # of a cell; one that takes longer hangs
 _PNG = "image/png"
 _DIGEST = re.compile("[0-9a-f]{12,64}")  # other processors have other bits
-_ALIKE = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "COLUMNS": "80"}  # whoever executes them
+_ALIKE = {
+    "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+    "COLUMNS": "80",
+    "PYTEST_ADDOPTS": "",
+}  # whoever executes them
 _DRAWN = 0.01  # of a picture that is not blank, at least
 
 

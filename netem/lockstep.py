@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.models.arrays import Array, Integers
 from netem.brief import MediumBrief
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.medium.relay import Relay, Relayed, changed_on_the_way
 from netem.ports import MediumPorts, Seen, medium_of
 from netem.processes.supervised import Supervisor, called

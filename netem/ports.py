@@ -17,7 +17,7 @@ from netem.brief import MediumBrief
 from netem.core import channels
 from netem.faults.control import Order
 from netem.faults.timeline import Timeline
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.medium.medium import Medium, recorded
 from netem.medium.relay import FaultedRelay
 from netem.wire import messages

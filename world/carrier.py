@@ -11,7 +11,7 @@ from analysis.models.arrays import Array
 from netem.core.plain import from_plain
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.processes.supervised import Supervisor, called
 from netem.wire import messages
 from netem.wire.arrays import CODE, WHOLE, numbers, packed

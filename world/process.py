@@ -12,7 +12,7 @@ import numpy as np
 
 from netem.core.clock import Clock, Lockstep
 from netem.faults.timeline import Timeline
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.processes import system_errors
 from netem.processes.background import Background
 from netem.processes.supervised import Supervisor

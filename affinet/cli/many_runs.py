@@ -15,6 +15,7 @@ from rich.console import Console
 from affinet.cli import means
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
+from affinet.runtimes.rehearsing import why_alone
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
@@ -47,7 +48,7 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     plans = sweeping.planned(load, sweeps, None if parsed.seeds is None else parsed.seeds.start)
     runs = 1 if parsed.seeds is None else len(parsed.seeds)
     if runs > 1:
-        reasons = dict.fromkeys(filter(None, (sweeping.why_alone(plan, checker) for _, plan in plans)))
+        reasons = dict.fromkeys(filter(None, (why_alone(plan) for _, plan in plans)))
         for why in reasons:
             print(one_line(f"note: runs fly one by one, and not side by side: {why}"), file=sys.stderr)  # noqa: T201
     name = Path(parsed.scenario).stem

@@ -70,8 +70,13 @@ def rehearsal(world: World, channels: int, reports: Mapping[str, tuple[int, ...]
     memory
         Of the machine, in bytes.
     """
-    each = sum(array.dtype.itemsize * prod(array.shape[1:]) for array in forms(world, channels, reports).values())
-    return _ticks_fit(_COPIES * each, world, world.ticks, memory, "; or give a run directory (out)")
+    each = _COPIES * of_a_tick(world, channels, reports)
+    return _ticks_fit(each, world, world.ticks, memory, "; or give a run directory (out)")
+
+
+def of_a_tick(world: World, channels: int, reports: Mapping[str, tuple[int, ...]]) -> int:
+    """How many bytes there are in the arrays of a tick, of a world, over so many channels, with these reports."""
+    return sum(array.dtype.itemsize * prod(array.shape[1:]) for array in forms(world, channels, reports).values())
 
 
 def _ticks_fit(each: int, world: World, ticks: int, memory: int, or_else: str = "") -> Finding:

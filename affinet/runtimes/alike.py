@@ -18,9 +18,11 @@ from affinet.planning.plan import Plan
 from netem.impairments.profile import Profile
 
 # Of a plan: the scenario is compared apart, the profiles too, and what was found in planning flies nowhere.
-_APART = frozenset({"scenario", "profiles", "findings"})
+_APART = frozenset({"scenario", "profiles", "findings", "faults", "world"})
+# Each run has its own draws, and its own faults: both are laid over the links and agents of it alone.
+_SEED = frozenset({"run_seed"})
 # Of a scenario: what becomes of the network is the air, and how late messages may be, which both briefs say.
-_NETWORK = frozenset({"network"})
+_OF_A_RUN = frozenset({"network", "seed", "timeline"})
 # Of a profile: one figure, or one row, for each link; chains, with whatever states, are laid over all links.
 BY_LINK = frozenset({"chains", "duplicate", "reorder", "corrupt", "bias"})
 _ROWS = frozenset({"rows"})
@@ -33,7 +35,8 @@ def alike(one: Plan, other: Plan) -> bool:
     """Whether runs of both can fly side by side, if those of each can."""
     return (
         _same_but(_APART, one, other)
-        and _same_but(_NETWORK, one.scenario, other.scenario)
+        and _same_but(_SEED, one.world, other.world)
+        and _same_but(_OF_A_RUN, one.scenario, other.scenario)
         and len(one.profiles) == len(other.profiles)
         and all(map(_alike_airs, one.profiles, other.profiles))
     )

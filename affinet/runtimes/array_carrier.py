@@ -78,6 +78,11 @@ class ArrayCarrier:
         """Messages under way."""
         return self._relay.in_flight
 
+    @property
+    def under_way(self) -> Integers:
+        """Messages under way on each link, shape (L,)."""
+        return self._relay.under_way
+
     def fire(self, tick: int, triggers: Sequence[int]) -> None:
         """From this tick on, what waited for these triggers holds."""
         self._relay.fire(triggers, tick)

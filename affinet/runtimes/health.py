@@ -17,8 +17,9 @@ import psutil
 
 from affinet.planning import making
 from affinet.runtimes.private import socket_folder
+from affinet.runtimes.rehearsing import rehearse
 from affinet.runtimes.rerun_command import NoViewer, command
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from analysis.kernels import kept
 from analysis.models.finding import Finding

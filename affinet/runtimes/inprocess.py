@@ -14,10 +14,10 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.runtimes.array_carrier import ArrayCarrier, BatchActed
-from analysis.models.arrays import Array, chosen
+from analysis.models.arrays import Array, Integers, chosen
 from netem.core.clock import Lockstep
 from netem.faults.timeline import Timeline
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.processes.user_code import UserCodeError
 from world import flight
 from world.books.history import UNTOLD, Moment, Moments, gather
@@ -53,6 +53,11 @@ class InProcessSwarm:
     def in_flight(self) -> int:
         """Messages under way."""
         return self._carrier.in_flight
+
+    @property
+    def under_way(self) -> Integers:
+        """Messages under way on each link, shape (L,)."""
+        return self._carrier.under_way
 
     def fly(
         self,

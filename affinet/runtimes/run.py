@@ -9,10 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, cast, get_args
 
-import psutil
-
-from affinet.planning import limits
-from affinet.planning.plan import Plan, PlanError
+from affinet.planning.plan import Plan
 from affinet.planning.programs import refuse_in_process, refuse_over_processes
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.interruption import Interrupted, Interruption, interruptible
@@ -31,7 +28,7 @@ from netem.processes.user_code import UserCodeError
 from netem.wire import keys
 from world.books import history
 from world.books.archive import Archive
-from world.books.history import History, Moments
+from world.books.history import Moments
 from world.recording.file import RECORDING, wrong_with
 
 Runtime = Literal["processes", "inprocess"]
@@ -96,40 +93,6 @@ def fly(
             done = done.failing(f"the summary is not written: {said(error)}")
     interruption.heed()
     return done
-
-
-def rehearse(plan: Plan) -> Evidence:
-    """Run a plan in this process, and leave nothing behind.
-
-    Raises
-    ------
-    UserCodeError
-        When estimator or law do something wrong.
-    PlanError
-        When it is too long for the memory.
-    """
-    channels = len(plan.channels)
-    fits = limits.rehearsal(plan.world, channels, plan.reports, psutil.virtual_memory().total)
-    if fits.fatal:
-        raise PlanError([fits])
-    swarm, flown = InProcessSwarm(plan), History(plan.world, channels, plan.reports)
-    started = time.perf_counter()
-    swarm.fly(flown.extend, plan.batch)
-    wall_s, arrays = time.perf_counter() - started, flown.arrays()
-    accounts = outcome.accounts_of(arrays, swarm.in_flight)
-    done = outcome.judge(
-        plan,
-        swarm.timeline,
-        arrays,
-        accounts=accounts,
-        uninstructed=0,
-        failure=None,
-        user_code=False,
-        wall_s=wall_s,
-        processes=[],
-        out=Path(),
-    )
-    return Evidence(plan, arrays, done)
 
 
 def evidence(plan: Plan, done: Outcome) -> Evidence | None:

@@ -7,8 +7,9 @@ the plans are alike (`alike.py`): what differs is laid over the links of each.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -43,7 +44,8 @@ def side_by_side(plan: Plan, seeds: Sequence[int]) -> Plan:
     Raises
     ------
     NotABatch
-        When its air depends on positions, counts messages, or follows a trace; or a fault waits for a condition.
+        When its air depends on positions, counts messages, or follows a trace; a fault waits for a condition, or it is
+        an earlier run that is flown again.
     """
     return together([Flight(plan, seeds)])
 
@@ -62,8 +64,10 @@ def together(flights: Sequence[Flight]) -> Plan:
             raise NotABatch("plans that differ in more than what each link has for itself are not flown side by side")
     for profile in plan.profiles:
         _refuse(profile)
-    if plan.triggers or plan.journal:
+    if plan.triggers:
         raise NotABatch("a fault that waits for a condition comes at another time in each run; fly them one by one")
+    if plan.journal or plan.injected:
+        raise NotABatch("a run that is flown again is flown alone; fly the runs one by one")
     seeds = np.concatenate([np.array(flight.seeds, dtype=np.uint64) for flight in flights])
     number, size = len(seeds), world.formation.agents
     return replace(
@@ -80,7 +84,7 @@ def together(flights: Sequence[Flight]) -> Plan:
             _profile([(flight.plan.profiles[place], len(flight.seeds)) for flight in flights])
             for place in range(len(plan.profiles))
         ),
-        faults=tuple(_fault(fault, number, size) for fault in plan.faults),
+        faults=tuple(_faults(flights, size)),
         brief=_brief(plan.brief, number),
     )
 
@@ -195,11 +199,22 @@ def _padded(layer: ChainLayer, states: int) -> ChainLayer:
     )
 
 
-def _fault(fault: Fault, number: int, size: int) -> Fault:
-    first = [place * size for place in range(number)]
+def _faults(flights: Sequence[Flight], size: int) -> Iterator[Fault]:
+    """Those of all runs, each run's in its own order; one that several have in the same place there is one."""
+    ends = [*accumulate((len(flight.seeds) for flight in flights), initial=0)]
+    for place in range(max(len(flight.plan.faults) for flight in flights)):
+        whose: dict[Fault, list[int]] = {}
+        for flight, first, end in zip(flights, ends, ends[1:], strict=False):
+            if place < len(flight.plan.faults):
+                whose.setdefault(flight.plan.faults[place], []).extend(range(first, end))
+        yield from (_fault(fault, [run * size for run in runs]) for fault, runs in whose.items())
+
+
+def _fault(fault: Fault, before: Sequence[int]) -> Fault:
+    """A fault of the runs that have so many agents before them."""
     return replace(
         fault,
-        pairs=tuple((src + offset, dst + offset) for offset in first for src, dst in fault.pairs),
-        groups=tuple(tuple(agent + offset for offset in first for agent in group) for group in fault.groups),
-        agents=tuple(agent + offset for offset in first for agent in fault.agents),
+        pairs=tuple((src + offset, dst + offset) for offset in before for src, dst in fault.pairs),
+        groups=tuple(tuple(agent + offset for offset in before for agent in group) for group in fault.groups),
+        agents=tuple(agent + offset for offset in before for agent in fault.agents),
     )

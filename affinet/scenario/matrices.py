@@ -16,6 +16,17 @@ def covariance(
 ) -> np.ndarray[Any, np.dtype[np.float64]]:
     """The covariance in a section, or that of a standard deviation on each axis, shape (D, D), in square metres.
 
+    Parameters
+    ----------
+    section
+        Which says it.
+    sigma
+        The standard deviation, in metres; None is 0.
+    given
+        The covariance, in square metres, where it is said in full.
+    dimension
+        D.
+
     Raises
     ------
     ScenarioError

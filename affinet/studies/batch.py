@@ -190,7 +190,7 @@ def _fly(flights: Sequence[Flight], firsts: Sequence[int], every: int, tell: Cal
             present = of_runs(~swarm.timeline.at(instant.tick).absent)
             goal = batch.world.goal(instant.tick, instant.scene)
             flown.step(of_runs(instant.scene.position), of_runs(goal), of_runs(instant.input), present)
-            places.measure(instant, plan.timeline)
+            places.measure(instant, swarm.timeline)
             if instant.tick % every == 0:
                 moment = swarm.moment(instant)
                 looked_at = _looked_at(batch, present, moment)
@@ -271,7 +271,7 @@ class _Places:
         self._rang: list[Array] = []
 
     def measure(self, instant: BatchTick, timeline: Timeline) -> None:
-        """Take in the measurements of a tick; all runs have the faults of one."""
+        """Take in the measurements of a tick, under the timeline of all runs."""
         if self._wanted:
             measured, verdicts = self._of_runs(instant.measured), self._of_runs(instant.acted.relayed.verdicts.kind[0])
             self._first.tick(timeline, instant.tick, measured, verdicts)

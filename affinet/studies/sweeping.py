@@ -1,7 +1,6 @@
 """A scenario over settings and seeds, without a study file: a figure of each run, and what the runs came to.
 
-Runs fly side by side in process, as those of studies do, where all that is asked of them is known of such a flight; else one by
-one, and it is said why.
+Runs fly side by side in this process, as those of studies do; what cannot flies one by one, and it is said why.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ import numpy as np
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.planning.programs import refuse_in_process
-from affinet.runtimes.run import rehearse
-from affinet.runtimes.side_by_side import NotABatch, side_by_side
+from affinet.runtimes.rehearsing import rehearse_all, why_alone
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import pool, study
@@ -32,6 +30,7 @@ from analysis.models.arrays import Array
 
 CONFIDENCE = 0.95
 _WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
+_LOOKED_AT = 100  # runs of which all is kept at once
 
 Load = Callable[[Sequence[str]], Scenario]
 Labelled = tuple[Mapping[str, str], Plan]
@@ -139,8 +138,7 @@ def fly(
         When a user's own code does something wrong.
     """
     found: dict[int, Setting] = {}
-    reasons = [why_alone(plan, checker) for _, plan in plans]
-    together = [number for number, why in enumerate(reasons) if why is None and runs > 1]
+    together = [number for number, (_, plan) in enumerate(plans) if runs > 1 and _enough(plan, checker)]
     cases = [(Case(dict(plans[number][0]), ()), plans[number][1]) for number in together]
     if cases:
         flown = study.fly(cases, runs, _executor(cases, runs), watch=lambda shares: watch(sum(shares)))
@@ -149,22 +147,14 @@ def fly(
             watch(len(found))
     for number, (labels, plan) in enumerate(plans):
         if number not in found:
-            alone = _told(_one_by_one(labels, plan, runs, load), len(found), runs, watch)
-            found[number] = _of_evidence(labels, plan, alone, checker, reasons[number] if runs > 1 else None)
+            whole = _told(_looked_at(labels, plan, runs, load), len(found), runs, watch)
+            found[number] = _of_evidence(labels, plan, whole, checker, why_alone(plan) if runs > 1 else None)
     return [found[number] for number in range(len(plans))]
 
 
-def why_alone(plan: Plan, checker: Checker | None) -> str | None:
-    """Why runs of a plan do not fly side by side; None if they do."""
-    if checker is not None:
-        return "a check looks at all of each run"
-    if plan.faults or plan.triggers:
-        return "whether a fault of the timeline touches something is known of each run by itself"
-    try:
-        side_by_side(plan, [0])
-    except NotABatch as error:
-        return str(error).partition(";")[0]
-    return None
+def _enough(plan: Plan, checker: Checker | None) -> bool:
+    """Whether what studies keep of a run is all that is asked of it: not what a fault touched, and what a check looks at."""
+    return checker is None and not plan.faults and why_alone(plan) is None
 
 
 def _executor(cases: Sequence[tuple[Case, Plan]], runs: int) -> Executor:
@@ -187,11 +177,13 @@ def _of_runs(result: study.Result) -> Setting:
     return Setting(result.labels, quantity, values, verdicts, None)
 
 
-def _one_by_one(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
-    yield rehearse(plan)
+def _looked_at(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
     overrides, first = [f"{key}={value}" for key, value in labels.items()], plan.scenario.seed
-    for seed in range(first + 1, first + runs):
-        yield rehearse(planning.make(load([*overrides, f"seed={seed}"])))
+    for begin in range(first, first + runs, _LOOKED_AT):
+        seeds = range(begin, min(begin + _LOOKED_AT, first + runs))
+        yield from rehearse_all(
+            [plan if seed == first else planning.make(load([*overrides, f"seed={seed}"])) for seed in seeds]
+        )
 
 
 def _told(flown: Iterable[Evidence], done: int, runs: int, watch: Callable[[float], None]) -> Iterator[Evidence]:

@@ -13,7 +13,7 @@ from hypothesis.errors import NoSuchExample
 
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.loading import extended
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError

@@ -5,6 +5,7 @@ What it needs is imported when a test asks for it: pytest loads this file in eve
 
 from __future__ import annotations
 
+import argparse
 import os
 import shlex
 from collections.abc import Generator, Iterator
@@ -20,12 +21,20 @@ if TYPE_CHECKING:
 _SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
 _RUNTIMES = ("inprocess", "processes")
 _MOST = 2**64  # seeds are below
+_COMMANDS = 50  # of other seeds that fail
 _RUNS: pytest.StashKey[SwarmRuns] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Where the swarms of tests fly."""
-    parser.getgroup("affinet").addoption(
+    """Where the swarms of tests fly, and with how many seeds."""
+    group = parser.getgroup("affinet")
+    group.addoption(
+        "--affinet-seeds",
+        type=_number_of_seeds,
+        metavar="N",
+        help="every test of a swarm with each of the seeds 1 to N, where no mark of its own says which",
+    )
+    group.addoption(
         "--affinet-runtime",
         choices=_RUNTIMES,
         default="inprocess",
@@ -44,9 +53,16 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     for one in metafunc.definition.iter_markers():
         if (wrong := _wrong(one)) is not None:
             pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
-    mark = metafunc.definition.get_closest_marker(_SEEDS)
-    if mark and "swarm" in metafunc.fixturenames:
-        metafunc.parametrize("swarm", mark.args, indirect=True, ids=[f"seed{seed}" for seed in mark.args])
+    mark, number = metafunc.definition.get_closest_marker(_SEEDS), metafunc.config.getoption("--affinet-seeds")
+    seeds = mark.args if mark else range(1, number + 1) if number else ()
+    if seeds and "swarm" in metafunc.fixturenames:
+        metafunc.parametrize("swarm", seeds, indirect=True, ids=[f"seed{seed}" for seed in seeds])
+
+
+def _number_of_seeds(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: give how many seeds, at least 1")
+    return int(text)
 
 
 def _wrong(mark: pytest.Mark) -> str | None:
@@ -93,6 +109,10 @@ def swarm(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     yield runs
     if not runs.failed:
         runs.clear()
+        if runs.unasked:
+            pytest.fail(
+                "fly(seeds=...) was asked nothing, and nothing has flown: `.check(...)` what should hold", pytrace=False
+            )
 
 
 @pytest.hookimpl(wrapper=True)
@@ -113,13 +133,36 @@ def _kept(runs: SwarmRuns) -> list[str]:
     from affinet.runtimes.directories import on_a_command_line
 
     try:
-        return [
+        return _kept_of_many(runs) + [
             f"seed {plan.scenario.seed}, {runs.runtime}\nrecording: {out / 'run.rrd'}\n"
             f"fly the same bits again: affinet replay {on_a_command_line(out)} --runtime {runs.runtime}"
             for plan, out in runs.keep()
         ]
     except Exception as error:  # noqa: BLE001 - whatever goes wrong here, the test's own failure is what counts
         return [f"the run could not be recorded: {error!r}"]
+
+
+def _kept_of_many(runs: SwarmRuns) -> list[str]:
+    """The worst run of many seeds, over processes, and a command for each of those that fail."""
+    from affinet.runtimes.directories import on_a_command_line
+
+    said = []
+    for kept in runs.keep_worst():
+        where = on_a_command_line(kept.out)
+        replay = f"affinet replay {where} --runtime inprocess --seed"
+        said.append(
+            "\n".join(
+                [
+                    f"seed {kept.worst.seed}, the worst of {1 + len(kept.others)} that fail, processes",
+                    f"recording: {kept.out / 'run.rrd'}",
+                    f"fly the same bits again: affinet replay {where}",
+                    *(["the others that fail:"] if kept.others else []),
+                    *(f"{replay} {one.seed}" for one in kept.others[:_COMMANDS]),
+                    *([f"... and {len(kept.others) - _COMMANDS} more"] if len(kept.others) > _COMMANDS else []),
+                ]
+            )
+        )
+    return said
 
 
 def _checked_again(item: pytest.Item) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -301,6 +302,10 @@ def _tracking(arrays: Arrays | None) -> Figures:
 
 def _flown(plan: Plan) -> dict[str, Any]:
     agents = plan.scenario.agents
+    return {"estimator": agents.estimator, "law": agents.law, "seed": plan.scenario.seed, "versions": dict(_versions())}
+
+
+@cache
+def _versions() -> Mapping[str, str]:
     packages = {"affinet": "affinet", "numpy": "numpy", "zenoh": "eclipse-zenoh"}
-    versions = {name: version(package) for name, package in packages.items()} | {"python": platform.python_version()}
-    return {"estimator": agents.estimator, "law": agents.law, "seed": plan.scenario.seed, "versions": versions}
+    return {name: version(package) for name, package in packages.items()} | {"python": platform.python_version()}

@@ -143,17 +143,19 @@ def student(runs: Integers, tests: int, confidence: float = CONFIDENCE) -> Array
     return np.where(runs > 1, quantile, np.inf)
 
 
-def share(those: int, unknown: int, runs: int) -> Interval:
-    """Which share of all runs does what `those` did, by Clopper and Pearson, each end with the confidence.
+def share(those: int, unknown: int, runs: int, confidence: float = CONFIDENCE) -> Interval:
+    """Which share of all runs does what `those` did, by Clopper and Pearson.
 
     Parameters
     ----------
     those, unknown, runs
         How many did, of how many it cannot be told, and of how many: none of them below, all of them above.
+    confidence
+        Of each end.
     """
     could = those + unknown
-    low = float(special.betaincinv(those, runs - those + 1, 1.0 - CONFIDENCE)) if those else 0.0
-    high = float(special.betaincinv(could + 1, runs - could, CONFIDENCE)) if could < runs else 1.0
+    low = float(special.betaincinv(those, runs - those + 1, 1.0 - confidence)) if those else 0.0
+    high = float(special.betaincinv(could + 1, runs - could, confidence)) if could < runs else 1.0
     return Interval(those / runs, low, high)
 
 

@@ -15,16 +15,12 @@ from analysis.kernels.kernel import Plain, kernel
 from analysis.models.arrays import Array, Integers, Mask
 from netem.impairments.corrupt import Marks
 from netem.medium.under_way import CELL, DUE, FIELDS, NUMBER, SENT, in_order, newest_in, parted, set_out
-from netem.medium.verdict import Verdict, VerdictCodes, passed
-
-# Columns of `Entry.odd` and `Entry.dropped`.
-_COPY_DUE, _WHY = 4, 4
+from netem.medium.verdict import Verdict, VerdictCodes
 
 # Looking up the members of an enumeration costs as much as an operation on a small array.
 _DELIVERED, _DELAYED = int(Verdict.DELIVERED), int(Verdict.DELAYED)
 
 _NO_DROPPED = np.empty((0, 5), dtype=np.int64)
-_NOTHING_ODD = np.empty((0, 5), dtype=np.int64)
 _NO_RELEASED = np.empty((0, 4), dtype=np.int64)
 _A_ROW = np.empty(4, dtype=np.int64)
 _NOTHING = (np.empty((0, 4), dtype=np.int64), 0, _NO_DROPPED, _NO_RELEASED)
@@ -110,6 +106,11 @@ class MediumState(NamedTuple):
         """How many messages are under way."""
         return self.under_way.shape[1]
 
+    def over_links(self) -> Integers:
+        """How many messages are under way on each link, shape (L,)."""
+        links = self.offered.shape[1]
+        return np.bincount(self.under_way[CELL] % links, minlength=links)
+
     def oldest_sent(self, tick: int) -> int:
         """When the oldest message under way was sent, or now."""
         return int(self.under_way[SENT].min()) if self.in_flight else tick
@@ -143,40 +144,6 @@ class Delivery(NamedTuple):
     late: int
     dropped: Integers
     released: Integers
-
-
-class Entry(NamedTuple):
-    """What is written down of one tick of the medium.
-
-    Parameters
-    ----------
-    verdicts
-        What was decided of each message, shape (C, L).
-    odd
-        Messages that passed late, twice or corrupted, rows of `out_of_the_ordinary`.
-    apart, late, dropped, released
-        What became of messages under way, as in `Delivery`.
-    injected
-        All faults injected so far, in plain form, when one was injected or healed.
-    """
-
-    verdicts: VerdictCodes
-    odd: Integers
-    apart: Integers
-    late: int
-    dropped: Integers
-    released: Integers
-    injected: list[Any] | None
-
-    @property
-    def copies(self) -> int:
-        """How many messages were doubled."""
-        return int(np.count_nonzero(self.odd[:, _COPY_DUE] >= 0))
-
-    @property
-    def dropped_by_verdict(self) -> Integers:
-        """How many messages under way were dropped, by verdict, shape (verdicts,)."""
-        return np.bincount(self.dropped[:, _WHY], minlength=len(Verdict))
 
 
 def deliver(
@@ -230,16 +197,6 @@ def newest_of(plain: Integers, apart: Integers) -> Integers:
     return newest
 
 
-def out_of_the_ordinary(tick: int, verdicts: Verdicts) -> Integers:
-    """Messages that passed late, twice or corrupted: rows of (channel row, link row, due, mark, copy due), shape (m, 5)."""
-    odd, number = _odd(tick, *verdicts)
-    if not number:
-        return _NOTHING_ODD
-    channel, link = np.nonzero(odd)
-    details = [field[channel, link] for field in (verdicts.due, verdicts.mark, verdicts.copy_due)]
-    return np.stack([channel, link, *details], axis=-1).astype(np.int64)
-
-
 def _without(last_due: Integers, dropped: Integers) -> Integers:
     """When the last message arrives, where nobody waits for one that was dropped: with it went all others of its link."""
     after = last_due.copy()
@@ -276,29 +233,5 @@ def _plainly() -> Plain:
                 newest[channel, link] = tick if as_it_is else -1
                 late[0] += int(kind[channel, link] == _DELAYED) + int(copy_due[channel, link] >= 0)
                 marked[0] += int(on_time and not as_it_is)
-
-    return plain
-
-
-@kernel("(),(c,l),(c,l),(c,l),(c,l)->(c,l),()", "lBlBl->?l")
-def _odd() -> Plain:
-    """Where a message passed late, twice or corrupted, and how often."""
-
-    def plain(
-        tick: int,
-        kind: VerdictCodes,
-        due: Integers,
-        mark: Marks,
-        copy_due: Integers,
-        odd: Mask,
-        number: Integers,
-    ) -> None:
-        number[0] = 0
-        for channel in range(kind.shape[0]):
-            for link in range(kind.shape[1]):
-                late, twice = due[channel, link] != tick, copy_due[channel, link] >= 0
-                strange = late or twice or mark[channel, link] != 0
-                odd[channel, link] = strange and passed(kind[channel, link])
-                number[0] += int(odd[channel, link])
 
     return plain

@@ -21,7 +21,7 @@ from netem.core.links import Links
 from netem.core.plain import from_plain
 from netem.faults.fault import Fault
 from netem.impairments.corrupt import Mark
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.medium.ledger import NOTHING, Accounts, Ledger
 from netem.medium.rows import VERDICTS, Rows, rows_of
 from netem.medium.verdict import Verdict, VerdictCodes

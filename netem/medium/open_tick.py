@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from analysis.models.arrays import Integers
-from netem.medium.in_flight import Entry, Verdicts, Waits, out_of_the_ordinary
+from netem.medium.entry import Entry, out_of_the_ordinary
+from netem.medium.in_flight import Verdicts, Waits
 from netem.medium.verdict import Verdict
 
 _SILENT, _UNSAID = np.uint8(Verdict.SILENT), np.uint8(Verdict.UNSAID)

@@ -18,7 +18,8 @@ from netem.core.links import Links
 from netem.core.plain import to_plain
 from netem.faults.conditions import Conditions
 from netem.impairments.corrupt import Mark
-from netem.medium.in_flight import Entry, Verdicts, Waits
+from netem.medium.entry import Entry
+from netem.medium.in_flight import Verdicts, Waits
 from netem.medium.medium import Medium
 from netem.medium.open_tick import OpenTick, Voice
 from netem.medium.parcels import Parcel, Parcels

@@ -20,7 +20,8 @@ from netem.faults.control import Answer, Order
 from netem.faults.fault import Fault
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark, Marks, corrupted_fields
-from netem.medium.in_flight import Delivery, Entry, Verdicts, out_of_the_ordinary
+from netem.medium.entry import Entry, out_of_the_ordinary
+from netem.medium.in_flight import Delivery, Verdicts
 from netem.medium.medium import Medium
 from netem.medium.verdict import Verdict
 
@@ -167,6 +168,11 @@ class Relay(FaultedRelay, Generic[Said]):
     def in_flight(self) -> int:
         """Messages under way after the last tick that is finished."""
         return self._state.in_flight
+
+    @property
+    def under_way(self) -> Integers:
+        """Of them, those on each link, shape (L,)."""
+        return self._state.over_links()
 
     @property
     def ahead(self) -> bool:

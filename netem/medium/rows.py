@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.models.arrays import Integers
-from netem.medium.in_flight import Entry
+from netem.medium.entry import Entry
 from netem.medium.verdict import Verdict, VerdictCodes
 
 VERDICTS = ("delivered", "delayed", "dropped", "copied", "released")

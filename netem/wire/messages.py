@@ -217,7 +217,7 @@ class Journal(_Message, frozen=True, kw_only=True):
     """Medium to world: the verdicts of tick k.
 
     `verdicts` has the verdict on what was offered on each channel and link, shape (C, L), numbers of `Verdict`; `odd` the
-    messages that passed late, twice or corrupted, rows of `in_flight.out_of_the_ordinary`; `apart`, `late`, `dropped` and
+    messages that passed late, twice or corrupted, rows of `entry.out_of_the_ordinary`; `apart`, `late`, `dropped` and
     `released` say how messages under way arrived or were dropped, as in `in_flight.Delivery`; `handed` how many broadcasts
     were put into each agent's inbox, shape (N,); `injected` all faults injected so far, in plain form, when one was injected
     or healed. In real time it tells its `punctuality`.

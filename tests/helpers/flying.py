@@ -6,7 +6,7 @@ import pytest
 
 from affinet.planning import making as planning
 from affinet.planning.plan import Plan
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from world.books.history import digest
 

@@ -5,7 +5,7 @@ from functools import cache
 
 from flying import plan_of
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts.evidence import Evidence
 
 COARSE = ("time.dt=0.05", "time.duration=4")

@@ -4,7 +4,7 @@ from functools import cache
 
 from flying import plan_of
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from world.books.localized import FirstMeasurements
 
 NAME = "localization"

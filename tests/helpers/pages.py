@@ -19,6 +19,8 @@ from typing import NamedTuple
 from paths import DOCS
 
 WIDTH = "100"
+# What whoever runs the tests has set up for these tests, and a reader has not.
+_NOT_A_READERS = ("DISPLAY", "WAYLAND_DISPLAY", "PYTEST_ADDOPTS")
 _DIGEST = re.compile(r"\b[0-9a-f]{64}\b")  # other processors have other bits
 _STEP = re.compile(
     r"^```(?P<kind>python|toml|yaml)\n(?P<text>.*?)^```\n(?:\n```text\n(?P<printed>.*?)^```\n)?"
@@ -153,7 +155,7 @@ def _compare(step: Step, status: int, told: str, *, exact: bool = False) -> None
 
 def _done(words: Sequence[str], folder: Path) -> tuple[int, str]:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    environ = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environ = {name: value for name, value in os.environ.items() if name not in _NOT_A_READERS}
     done = subprocess.run(
         words,
         cwd=folder,

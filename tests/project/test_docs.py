@@ -12,7 +12,8 @@ from paths import ROOT
 
 from affinet import library
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading, profiles, verbs
 from affinet.studies import quantities, study
 from affinet.testing.swarm import Swarm
@@ -111,7 +112,7 @@ def test_the_page_of_scenarios_leads_to_every_verb():
 def test_the_script_of_all_verbs_flies_and_each_touches_something():
     faults = re.findall(r"^\| `(\.fault\(.*\))` \|", (DOCS / "testing.md").read_text(), re.MULTILINE)
     given = loading.load("corridor", ("time.dt=0.05", "time.duration=16"))
-    script = eval(f"swarm{''.join(faults)}", {"swarm": Swarm(given, library.run)})
+    script = eval(f"swarm{''.join(faults)}", {"swarm": Swarm(given, library.run, lambda *_: None)})
     assert sorted(entry.verb for entry in script.scenario.timeline) == sorted(verbs.VERBS)
     flown = library.run(script.scenario)
     assert flown.outcome.verdict == "pass", flown.outcome.reasons

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import Swarm, SwarmRuns
 

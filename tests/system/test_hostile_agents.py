@@ -13,7 +13,8 @@ from paths import PROGRAMS
 from affinet.planning import making as planning
 from affinet.runtimes import run as runs
 from affinet.runtimes.launcher import Launcher
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.verdicts import reading
 from netem.wire.wrong import Wrong

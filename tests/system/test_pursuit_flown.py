@@ -11,7 +11,8 @@ from scripted import timeline
 from targets import van_loan
 
 from affinet.runtimes.inprocess import InProcessSwarm
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.studies.batch import fly_all
 from analysis.models.information import position, unpacked

@@ -18,7 +18,8 @@ from affinet.cli import commands, status
 from affinet.planning import making as planning
 from affinet.runtimes.inject import Access, InjectRequest
 from affinet.runtimes.launcher import Launcher
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import outcome as outcomes

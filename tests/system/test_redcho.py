@@ -10,7 +10,7 @@ from flying import plan_of
 from paths import BENCH
 from scripted import timeline
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.wrong import ScenarioError
 from agents.estimators.target import TargetEstimator
 from analysis.models.information import position

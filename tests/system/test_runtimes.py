@@ -10,7 +10,8 @@ import pytest
 from flying import PROCESSES, digest_of, plan_of
 
 from affinet.planning.registry import ESTIMATORS
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from world.books import history
 

@@ -9,7 +9,8 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario import verbs as verb_models
 from affinet.scenario.wrong import ScenarioError

@@ -7,7 +7,8 @@ import pytest
 from flying import PROCESSES, plan_of
 
 from affinet.runtimes.inprocess import InProcessSwarm
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.studies.batch import fly_all
 from analysis.metrics.consistency import nees

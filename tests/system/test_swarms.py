@@ -6,7 +6,8 @@ from extremes import BASES
 from flying import PROCESSES, digest_of, plan_of
 
 from affinet.planning import making
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario.sections import Scenario
 
 

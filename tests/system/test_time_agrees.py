@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from flying import PROCESSES, plan_of
 
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from netem.medium import deliveries
 from netem.medium.verdict import Verdict
 from world.books import history

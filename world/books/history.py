@@ -18,7 +18,8 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.core.refusal import Refusal
 from netem.faults.timeline import Timeline
 from netem.impairments.corrupt import Mark
-from netem.medium.in_flight import Entry, newest_of
+from netem.medium.entry import Entry
+from netem.medium.in_flight import newest_of
 from netem.medium.verdict import Verdict, VerdictCodes
 from world.books import growing
 from world.books.described import BY_TICK, DERIVED

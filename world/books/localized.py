@@ -53,9 +53,9 @@ class FirstMeasurements:
         return first
 
     def tick(self, timeline: Timeline, tick: int, measured: Array, verdicts: VerdictCodes) -> None:
-        """Take in a tick of the runs, each as in the timeline: measurements (..., L, D), and their verdicts (..., L)."""
+        """Take in a tick of the runs, whose timeline this is: measurements (..., L, D), and their verdicts (..., L)."""
         if fresh := set(timeline.restarted(tick)) - set(timeline.remembering(tick)):
-            self.seen = self.seen & ~np.isin(self.links.dst, [*fresh])
+            self.seen = self.seen & ~np.isin(timeline.links.dst, [*fresh]).reshape(self.seen.shape)
         self.take(measured, verdicts == Verdict.DELIVERED)
 
     def take(self, measured: Array, delivered: Mask) -> None:

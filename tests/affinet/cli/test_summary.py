@@ -10,7 +10,7 @@ import pytest
 from flying import plan_of
 
 from affinet.cli import show
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts.checkers import localized
 
 VERSIONS = {

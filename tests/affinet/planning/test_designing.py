@@ -6,7 +6,7 @@ from extremes import BASES
 
 from affinet.planning import designing, making
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError

@@ -13,7 +13,7 @@ from flying import plan_of
 
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 

@@ -7,7 +7,8 @@ import pytest
 from flying import plan_of
 
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading, profiles, selectors
 from affinet.scenario.wrong import ScenarioError
 from netem.medium.verdict import Verdict

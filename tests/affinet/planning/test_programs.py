@@ -7,7 +7,8 @@ from affinet.cli import commands, status
 from affinet.planning.plan import PlanError
 from affinet.runtimes import launcher
 from affinet.runtimes.launcher import Launcher
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario.wrong import ScenarioError
 
 FLOWN = """agents.programs={ "2" = "python 'my agent.py' --fast" }"""

@@ -6,7 +6,8 @@ from flying import plan_of
 
 from affinet.cli import commands
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from netem.core.links import Links

@@ -9,7 +9,8 @@ from scripted import timeline
 from affinet.planning import limits
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.sections import Scenario, TrustSection
 from affinet.studies.batch import fly_all

@@ -10,7 +10,7 @@ from flying import plan_of
 from affinet.planning.plan import Plan
 from affinet.runtimes.alike import BY_LINK, alike, same
 from affinet.runtimes.inprocess import InProcessSwarm
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.runtimes.side_by_side import Flight, NotABatch, together
 from affinet.studies.batch import fly_all, fly_together
 from netem.impairments.delay import DelayLaw
@@ -100,10 +100,10 @@ def test_what_comes_of_each_plan_is_what_comes_of_it_alone():
 
 
 OTHERWISE = [
-    *("time.dt=0.04", "time.duration=1.2", 'time.exchange="next-tick"', "seed=2", "sensing.sigma=0.2"),
+    *("time.dt=0.04", "time.duration=1.2", 'time.exchange="next-tick"', "sensing.sigma=0.2"),
     *("formation.scale=1.1", "formation.spread=0.3", "dynamics.disturbance=0.01", "agents.leader_gain=0.9"),
     *("agents.limit=3.0", 'agents.estimator="ral"', 'agents.law="static"', "agents.parameters.ga-rkf.sigma_w=0.4"),
-    *("network.delay_ticks=1", SPLIT, 'timeline=[{verb="cut",at=0.5,links=["2->4"]}]', "record.every=3"),
+    *("network.delay_ticks=1", SPLIT, "record.every=3"),
 ]
 
 
@@ -117,6 +117,13 @@ def test_plans_that_differ_in_more_than_their_links_are_refused(otherwise):
         together([Flight(plan, [1]), Flight(other, [1])])
 
 
+@pytest.mark.parametrize("own", ["seed=2", 'timeline=[{verb="cut",at=0.5,links=["2->4"]}]'])
+def test_draws_and_faults_are_each_runs_own(own):
+    plan, other = plan_of("corridor", *SHORT), plan_of("corridor", *SHORT, own)
+    assert alike(plan, other)
+    assert alike(other, plan)
+
+
 def test_delays_of_other_laws_are_refused():
     late = [aired(f'delay={{model="exponential",mean={mean}}}') for mean in (0.1, 0.2)]
     plan, other = plans_of(late)
@@ -126,9 +133,9 @@ def test_delays_of_other_laws_are_refused():
 
 FLOWN = [
     *((("brief",), field.name) for field in fields(plan_of("corridor", *SHORT).brief)),
-    *((("world",), field.name) for field in fields(plan_of("corridor", *SHORT).world)),
+    *((("world",), field.name) for field in fields(plan_of("corridor", *SHORT).world) if field.name != "run_seed"),
     *((("swarm",), field.name) for field in fields(plan_of("corridor", *SHORT).swarm)),
-    *(((), field.name) for field in fields(Plan) if field.name not in ("findings", "scenario", "profiles")),
+    *(((), field.name) for field in fields(Plan) if field.name not in ("findings", "scenario", "profiles", "faults")),
 ]
 
 

@@ -6,7 +6,7 @@ from flying import plan_of
 from pursuits import COARSE, NAME, refusal
 from scripted import timeline
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 
 
 def reporting(name):

@@ -5,7 +5,7 @@ import pytest
 from flying import plan_of
 
 from affinet.runtimes.inprocess import InProcessSwarm
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.runtimes.side_by_side import NotABatch, side_by_side
 from affinet.studies.batch import fly_all
 from agents.algebra import kalman

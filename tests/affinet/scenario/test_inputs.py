@@ -8,7 +8,8 @@ from flying import PROCESSES
 
 from affinet.cli import commands
 from affinet.planning import making as planning
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import study

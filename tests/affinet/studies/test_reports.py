@@ -9,7 +9,7 @@ from PIL import Image
 
 from affinet.cli import commands
 from affinet.planning import making as planning
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import record, study

@@ -1,6 +1,7 @@
 """The pytest plugin as the tests of others see it: what passes, what fails, what a failure says and leaves behind."""
 
 import importlib
+import json
 import re
 import shlex
 import sys
@@ -74,7 +75,7 @@ def test_calm(swarm):
 """
     result = tested(text)
     assert outcomes(result) == {"failed": 1}
-    result.stdout.fnmatch_lines(["*Broken: recovers(0.1, within=0.2): vacuous: no fault that ended*"])
+    result.stdout.fnmatch_lines(["*Broken: recovers(0.1, within=0.2): vacuous: no fault that had its time*"])
 
 
 def test_what_comes_out_badly_can_be_what_is_expected(tested):
@@ -295,3 +296,46 @@ def test_flies(swarm):
     swarm({SHORT}).fly()
 """, "--strict-markers")  # fmt: skip
     assert outcomes(result) == {"passed": 1}
+
+
+# ---- many seeds
+
+
+def test_of_many_seeds_that_fail_the_worst_is_kept_and_each_has_a_command(tested, pytester, capsys):
+    text = """
+def test_split(swarm):
+    split = swarm("corridor", "time.dt=0.05", "time.duration=3", "agents.estimator=none")
+    split.fault("partition", groups="leaders", at=0.5, until=1.5).fly(seeds=4).check(bounded(1.5), share=0.9)
+"""
+    result = tested(text)
+    assert outcomes(result) == {"failed": 1}
+    said = result.stdout.str()
+    seed, runtime, recording, again = SAYS_WHERE.search(re.sub(r", the worst of \d+ that fail,", ",", said)).groups()
+    assert (runtime, Path(recording).exists()) == ("processes", True)
+    others = re.findall(r"^affinet (replay .+ --seed (\d+))$", said, re.MULTILINE)
+    assert {int(other) for _, other in others} == {1, 2, 3, 4} - {int(seed)}
+    assert main([*shlex.split(again), "--runtime", "inprocess", "--out", str(pytester.path / "again")]) == 0
+    assert main([*shlex.split(others[0][0]), "--out", str(pytester.path / "other"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["flown"]["seed"] == int(others[0][1])
+
+
+def test_many_seeds_that_are_asked_nothing_are_an_error(tested):
+    assert outcomes(tested(f"def test_nothing(swarm): swarm({SHORT}).fly(seeds=3)")) == {"passed": 1, "errors": 1}
+
+
+def test_a_whole_suite_flies_with_so_many_seeds(tested):
+    text = f"""
+@pytest.mark.affinet_seeds(7)
+def test_marked(swarm):
+    assert swarm({SHORT}).fly().plan.scenario.seed == 7
+
+def test_plain(swarm):
+    assert swarm({SHORT}).fly().plan.scenario.seed in (1, 2, 3)
+
+def test_without():
+    pass
+"""
+    result = tested(text, "--affinet-seeds=3", "-v")
+    assert outcomes(result) == {"passed": 5}
+    result.stdout.fnmatch_lines(["*test_plain?seed1?*", "*test_plain?seed2?*", "*test_plain?seed3?*"])
+    assert tested(text, "--affinet-seeds=0").ret != 0

@@ -14,7 +14,8 @@ from paths import PROGRAMS
 from affinet.cli import commands
 from affinet.runtimes import launcher
 from affinet.runtimes.inject import Access
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.runtimes.supervision import ProcessGroup
 from affinet.verdicts import outcome
 from affinet.verdicts.outcome import accounts_of

@@ -5,7 +5,7 @@ import pytest
 from flying import plan_of
 from scripted import timeline
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts.bites import bites
 from netem.faults.timeline import Timeline
 from netem.medium.medium import Medium

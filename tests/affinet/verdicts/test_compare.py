@@ -7,7 +7,8 @@ import pytest
 from flying import PROCESSES, plan_of
 
 from affinet.cli import commands
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.verdicts.compare import first_difference
 from netem.medium.verdict import Verdict
 from world.books import history

@@ -9,7 +9,7 @@ from judged import changed, tampered
 from pursuits import ALONE, COARSE, NAME
 from scripted import timeline
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts import invariants
 from affinet.verdicts.pursued import agreed, found
 

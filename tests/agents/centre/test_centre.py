@@ -6,7 +6,8 @@ from briefs import of_all
 from flying import PROCESSES, plan_of
 from scipy.linalg import block_diag
 
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies.batch import fly_all
 from agents.estimators.centralized import SwarmFilter

@@ -9,7 +9,7 @@ from filterpy.kalman import KalmanFilter
 from offered import by_affinet
 
 from affinet.planning.making import make
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from agents.algebra.unknowns import Belief, EdgeModel
 from agents.brief import Own

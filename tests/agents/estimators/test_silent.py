@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flying import plan_of
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.wrong import ScenarioError
 from agents.brief import Own
 from agents.estimators.silent import SilentEdgeFilter

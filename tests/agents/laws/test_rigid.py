@@ -12,7 +12,7 @@ from flying import plan_of
 from affinet.planning import making as planning
 from affinet.planning.checks import leaders_apart
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from agents.agent import Agent
 from agents.estimate import Estimate

@@ -8,7 +8,7 @@ from briefs import BRIEF, ESTIMATE, FORCE
 from flying import plan_of
 
 from affinet.planning import making
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from agents.agent import Agent

@@ -16,7 +16,8 @@ import affinet
 from affinet.cli.commands import main
 from affinet.planning import making
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from netem.processes.user_code import UserCodeError

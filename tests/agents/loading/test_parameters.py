@@ -8,7 +8,7 @@ import pytest
 from own_code import ESTIMATOR, broken, line_of, write
 
 from affinet.planning import making, registry
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from netem.core.plain import from_plain, to_plain

@@ -16,7 +16,8 @@ from own_code import ESTIMATOR, LAW, broken, line_of, write
 import agents
 from affinet.cli.commands import main
 from affinet.planning import making
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import Broken, SwarmRuns

@@ -28,7 +28,9 @@ EXEMPT = {
     """,
     WHOLE: """
         netem.medium.in_flight.MediumState.empty netem.medium.in_flight.deliver netem.medium.in_flight.newest_of
-        netem.medium.in_flight.out_of_the_ordinary netem.core.arrow.named netem.core.arrow.places
+        netem.medium.entry.out_of_the_ordinary netem.medium.entry.by_part
+        netem.medium.in_flight.MediumState.over_links netem.medium.relay.Relay.under_way
+        netem.core.arrow.named netem.core.arrow.places
         netem.faults.cut.severed netem.faults.cut.separated netem.medium.verdict.standing netem.medium.verdict.doom
         netem.medium.verdict.stronger netem.medium.verdict.also_held netem.medium.picking.picked
         netem.medium.ledger.Ledger.of netem.core.links.Links.own_number netem.core.links.Links.ends
@@ -37,9 +39,9 @@ EXEMPT = {
         netem.core.links.Links.degree netem.core.links.Links.present netem.core.links.Links.slots
         netem.core.links.Links.neighbours netem.core.links.Links.back netem.core.links.Links.touching
         netem.impairments.schedule.round_robin netem.impairments.schedule.slotted
-        netem.faults.timeline.Conditions.absent netem.faults.timeline.Conditions.idle
-        netem.faults.timeline.Conditions.still netem.faults.timeline.Conditions.coasting
-        netem.faults.timeline.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
+        netem.faults.conditions.Conditions.absent netem.faults.conditions.Conditions.idle
+        netem.faults.conditions.Conditions.still netem.faults.conditions.Conditions.coasting
+        netem.faults.conditions.Conditions.under netem.faults.timeline.Timeline.present netem.faults.timeline.Timeline.held
         netem.faults.timeline.Timeline.each
         netem.medium.by_tick.ImpairmentsByTick.acts netem.medium.by_tick.ImpairmentsByTick.on
         agents.agent.Agent.revived agents.algebra.inputs.refuse_accelerations world.formation.nominal.Formation.is_leader
@@ -89,7 +91,7 @@ EXEMPT = {
     """,
     WRITTEN: """
         world.books.history.read
-        netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.in_flight.Entry.dropped_by_verdict
+        netem.medium.journal.Writer.enter netem.medium.rows.rows_of netem.medium.entry.Entry.dropped_by_verdict
         netem.medium.open_tick.OpenTick.close netem.medium.real_time.RealTimeRelay.closed
         netem.ports.MediumPorts.as_it_arrives netem.ports.MediumPorts.hand_out_measurements
         netem.ports.MediumPorts.journal netem.ports.MediumPorts.seen netem.ports.MediumPorts.where

@@ -29,7 +29,8 @@ from netem.impairments.corrupt import Mark
 from netem.impairments.delay import DelayLaw, MessageDelay
 from netem.impairments.loss import gilbert_elliott
 from netem.impairments.rate import Rate
-from netem.medium.in_flight import Verdicts, newest_of, out_of_the_ordinary
+from netem.medium.entry import out_of_the_ordinary
+from netem.medium.in_flight import Verdicts, newest_of
 from netem.medium.ledger import Accounts, Ledger
 from netem.medium.medium import Medium
 from netem.medium.verdict import REASONS, VERDICT_OF, Verdict

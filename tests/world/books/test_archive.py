@@ -9,7 +9,7 @@ from flying import plan_of
 from kept_arrays import rewrite
 
 from affinet.runtimes.inprocess import InProcessSwarm
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from world.books import growing, history
 from world.books.archive import UNBEGUN, Archive
 from world.books.history import ARRAYS, Damaged, History, by_span, digest, load

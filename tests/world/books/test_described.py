@@ -6,7 +6,7 @@ import pytest
 from flying import plan_of
 
 from affinet.planning import registry
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
 from netem.medium.verdict import Verdict
 from world.books import described

@@ -3,7 +3,7 @@
 import numpy as np
 from flying import plan_of
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
 

@@ -8,7 +8,7 @@ from flying import plan_of
 from pursuits import COARSE, FEW, NAME, refusal
 from targets import at_random
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 
 AT_RANDOM = at_random(2)
 MANY = 20_000

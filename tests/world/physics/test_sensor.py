@@ -8,7 +8,7 @@ from briefs import brief, hears
 from flying import plan_of
 from offered import by_affinet
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.wrong import ScenarioError
 from agents.brief import Own
 from analysis.models.sensor import Sensor, moments

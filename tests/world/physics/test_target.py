@@ -10,7 +10,7 @@ from flying import plan_of
 from pursuits import ALONE, COARSE, NAME
 from targets import at_random, drive_of, target_of, van_loan
 
-from affinet.runtimes.run import rehearse
+from affinet.runtimes.rehearsing import rehearse
 from world.formation.manoeuvre import course
 from world.physics.target import MovingTarget
 

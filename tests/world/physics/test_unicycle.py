@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from affinet.runtimes.side_by_side import side_by_side
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError

@@ -9,7 +9,8 @@ from recorded import column
 from rerun.chunk import RrdReader
 from scipy.stats import chi2
 
-from affinet.runtimes.run import fly, rehearse
+from affinet.runtimes.rehearsing import rehearse
+from affinet.runtimes.run import fly
 from netem.medium.verdict import Verdict
 from world.books.history import ARRAYS, UNTOLD, load
 
