@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from affinet.planning import traces
 from affinet.scenario import profiles, selectors
 from affinet.scenario.air import NetworkSection
-from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.profiles import LinkProfile, TraceFile
 from affinet.scenario.wrong import ScenarioError, said_at
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
@@ -79,7 +80,7 @@ class LinkClass:
             )
         if (model := self.profile.delay) is not None:
             spread, kept = model.jitter or 0.0, model.order == "kept"
-            law = delay.DelayLaw(model.model)
+            law = delay.DelayLaw.TABLE if model.trace else delay.DelayLaw(model.model)
             laws.append(MessageDelay(law, self.rows, model.mean or 0.0, spread, self.measured, model.correlation, kept))
         return laws
 
@@ -142,6 +143,8 @@ def classes(network: NetworkSection, formation: Formation, links: Links) -> list
 
 def _measured(name: str, profile: LinkProfile) -> Array:
     table = None if profile.delay is None else profile.delay.table
+    if profile.delay is not None and profile.delay.trace is not None:
+        return _traced(name, profile.delay.trace)
     if not isinstance(table, str):
         return _NOTHING if table is None else np.sort(np.array(table))
     try:
@@ -150,6 +153,16 @@ def _measured(name: str, profile: LinkProfile) -> Array:
         raise ScenarioError(f"network.profiles.{name}: delays {table}: no such file") from error
     except (OSError, ValueError) as error:
         raise ScenarioError(f"network.profiles.{name}: delays {table}: {error}") from error
+
+
+def _traced(name: str, file: TraceFile) -> Array:
+    """The delays that a file says, whenever they held."""
+    try:
+        return np.sort(traces.said_delays(file))
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{name}.delay: trace {file.file}: no such file") from error
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{name}.delay: trace {file.file}: {error}") from error
 
 
 def _possible(one: LinkClass) -> LinkClass:

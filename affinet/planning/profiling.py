@@ -33,18 +33,24 @@ def profile(data: LinkData, file: TraceFile, fit: Fit | None, step: str, out: Pa
         Where it will be written: paths in it count from there.
     """
     said: dict[str, Any] = {}
+    meaning = file.model_dump(exclude_defaults=True, exclude={"file"})
+    where = os.path.relpath(os.path.abspath(file.file), os.path.abspath(out.parent))
     if fit is not None:
         own = {name: float(f"{one.value:.6g}") for name, one in fit.parameters.items()}
         said["loss"] = [{"model": fit.model, **own, **({} if fit.model == "bernoulli" else {"step": step})}]
     elif Quantity.AVAILABILITY in data.steps:
-        meaning = file.model_dump(exclude_defaults=True, exclude={"file"})
-        where = os.path.relpath(os.path.abspath(file.file), os.path.abspath(out.parent))
         said["loss"] = [{"model": "trace", "file": where, **meaning}]
     if data.messages is not None:
         arrived = ~data.messages.lost
         said["delay"] = {"model": "table", "table": _quantiles(data.messages.delay[arrived])}
         if data.messages.doubled:
             said["duplicate"] = float(f"{data.messages.doubled / arrived.sum():.6g}")
+        return said
+    direct = file.model_dump(exclude_defaults=True, exclude={"file", "curve"})
+    if Quantity.DELAY in data.steps:
+        said["delay"] = {"model": "trace", "trace": {"file": where, **direct}}
+    if Quantity.RATE in data.steps and not data.offered:
+        said["rate"] = {"trace": {"file": where, **direct}}
     return said
 
 

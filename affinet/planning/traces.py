@@ -59,6 +59,20 @@ def measured(
     return given, [*notes, *more, *_at_its_end(given, rows, time)]
 
 
+def said_delays(file: TraceFile) -> Array:
+    """All delays that a file says, in seconds, whenever and wherever they held, shape (n,).
+
+    Raises
+    ------
+    MeasuredError
+        When it says none.
+    OSError
+        When it cannot be read.
+    """
+    name, data = formats.read(Path(file.file), file.format)
+    return _worth(data, Quantity.DELAY, file, name).value
+
+
 def told(file: TraceFile, every: float) -> tuple[str, LinkData, list[str]]:
     """The format of a file, what it says, with what a curve makes of it, and what is taken to be so.
 

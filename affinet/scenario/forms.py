@@ -56,6 +56,18 @@ EXAMPLES: Mapping[str, Any] = {
     "network.profiles.*.corrupt": [{"kind": "nan", "p": 0.1}],
     "network.profiles.*.delay": {"model": "constant", "mean": 0.05},
     "network.profiles.*.delay.table": [0.01, 0.05],
+    **{
+        f"network.profiles.*.{table}.trace{key}": said
+        for table in ("delay", "rate")
+        for key, said in (
+            ("", {"file": "links.csv"}),
+            (".file", "links.csv"),
+            (".format", "table"),
+            (".agents", {"uav1": 1, "uav2": 2}),
+            (".curve", [[-90.0, 0.0], [-70.0, 1.0]]),
+        )
+    },
+    "network.profiles.*.rate": {"rate": 1e6},
     "network.links.links": "1->2",
     "network.links.profile": "wifi_busy",
     "network.zones.links": "all",

@@ -238,6 +238,9 @@ def _profile_placed(profile: Any, place: Callable[[str], str]) -> Any:
         moved["loss"] = [_with_path(loss, "file", place) for loss in losses]
     if "delay" in profile:
         moved["delay"] = _with_path(profile["delay"], "table", place)
+    for key in ("delay", "rate"):
+        if isinstance(table := moved.get(key), dict) and "trace" in table:
+            moved[key] = table | {"trace": _with_path(table["trace"], "file", place)}
     return moved
 
 

@@ -284,10 +284,10 @@ def _delays(given: Any) -> list[float] | str | None:
 class DelayModel(Section):
     """One-way delay in seconds; `jitter` is a half-width (uniform) or a standard deviation (normal, pareto).
 
-    `table` holds measured delays, or names a file of them.
+    `table` holds measured delays, or names a file of them; `trace` is a file that says which held when.
     """
 
-    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"] = key(
+    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table", "trace"] = key(
         ..., "how delays are distributed"
     )
     mean: NotNegative | None = key(None, "of a delay, one way", "s")
@@ -295,13 +295,16 @@ class DelayModel(Section):
     table: Annotated[
         list[float] | str | None, PlainValidator(_delays, json_schema_input_type=list[NotNegative] | str | None)
     ] = key(None, "measured delays, each as probable as the others, or a file of them", "s")
+    trace: TraceFile | None = key(None, "a file of link data that says delays over time")
     correlation: Below1 = key(0.0, "from tick to tick")
     order: Literal["free", "kept"] = key("free", "whether messages may overtake each other")
 
     @model_validator(mode="after")
     def _whole(self) -> DelayModel:
-        needs = {"table": {"table"}, "constant": {"mean"}, "exponential": {"mean"}}.get(self.model, {"mean", "jitter"})
-        given = {name for name in ("mean", "jitter", "table") if getattr(self, name) is not None}
+        needs = {"table": {"table"}, "trace": {"trace"}, "constant": {"mean"}, "exponential": {"mean"}}.get(
+            self.model, {"mean", "jitter"}
+        )
+        given = {name for name in ("mean", "jitter", "table", "trace") if getattr(self, name) is not None}
         if given != needs:
             raise ValueError(f"the model {self.model!r} is given by {' and '.join(sorted(needs))}")
         if self.model == "pareto" and not (self.mean and self.jitter):
@@ -326,11 +329,18 @@ class Corruption(Section):
 
 
 class RateLimit(Section):
-    """A token bucket: rate in bits per second, burst and queue in bytes."""
+    """A token bucket: rate in bits per second, or a file that says it over time; burst and queue in bytes."""
 
-    rate: BitsPerSecond = key(..., "per directed link", "bit/s")
+    rate: BitsPerSecond | None = key(None, "per directed link", "bit/s")
+    trace: TraceFile | None = key(None, "a file of link data that says rates over time, in place of one rate")
     queue: Steps = key(10_000, "what may wait", "B")
     burst: Ticks = key(0, "what may pass at once", "B")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.rate is None) == (self.trace is None):
+            raise ValueError("give a rate, or a trace of it")
+        return self
 
 
 class LinkProfile(Section):

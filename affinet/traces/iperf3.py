@@ -49,6 +49,7 @@ def read(lines: Lines) -> LinkData:
         ends=last[1] + _number(last[2], "seconds", last[0]),
         steps=held,
         one_link=True,
+        offered=True,
         assumed=tuple(assumed),
     )
 

@@ -121,6 +121,8 @@ class LinkData:
         Whether it tells of one link, whose ends are not named by it.
     everybody
         Whether it tells of all pairs, linked or not.
+    offered
+        Whether its rates are what was offered and passed, and no limits.
     paced
         Whether its times count messages, and are no seconds.
     period
@@ -136,6 +138,7 @@ class LinkData:
     paths: Sequence[Waypoints] = ()
     one_link: bool = False
     everybody: bool = False
+    offered: bool = False
     paced: bool = False
     period: float | None = None
     assumed: tuple[str, ...] = ()

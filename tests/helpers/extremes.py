@@ -27,6 +27,7 @@ _LOSSES: dict[str, dict[str, Any]] = {
 # Of profiles that no link has: no file is read.
 _TRACED = {"model": "trace", "file": "field.txt", "agents": {"a": 1, "b": 2}, "begins": 1.0, "interval": 0.5}
 _BY_CURVE = {"model": "trace", "file": "field.txt", "first": 0, "curve": [[-90.0, 0.0], [-70.0, 1.0]]}
+_WAITS = {"delay": {"model": "trace", "trace": {"file": "d.csv"}}, "rate": {"trace": {"file": "r.csv", "first": 0}}}
 _DELAYS: dict[str, dict[str, Any]] = {
     "constant": {"mean": 0.1},
     "uniform": {"mean": 0.1, "jitter": 0.05},
@@ -116,7 +117,10 @@ BASES: dict[str, dict[str, Any]] = {
             "zones": [{"centre": [0.0, 0.0], "radius": 1.0, "share": 0.5}],
         },
     },
-    "traces": {**_FLOWN, "network": {"profiles": {"one": {"loss": [_TRACED]}, "other": {"loss": [_BY_CURVE]}}}},
+    "traces": {
+        **_FLOWN,
+        "network": {"profiles": {"one": {"loss": [_TRACED]}, "other": {"loss": [_BY_CURVE]}, "waits": _WAITS}},
+    },
     "timeline": {**_FLOWN, "network": {"profiles": {"rest": _PROFILES["rest"]}}, "timeline": _FAULTS},
     "covariances": {
         **_FLOWN,

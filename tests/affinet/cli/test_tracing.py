@@ -88,6 +88,20 @@ def test_the_profile_of_a_file_follows_it_from_where_it_lies(told, tmp_path):
     assert loss == {"model": "trace", "file": "field/met.txt"}
 
 
+def test_the_profile_of_rates_and_delays_follows_them(told, tmp_path):
+    (tmp_path / "lte.txt").write_text("1\n2\n")
+    (tmp_path / "links.csv").write_text("time,src,dst,delay,rssi\n0,1,2,0.1,-80\n0,2,1,0.2,-70\n")
+    told(tmp_path / "lte.txt", "--profile", tmp_path / "lte.toml")
+    told(tmp_path / "links.csv", "--curve", "[[-80,0.5],[-70,1.0]]", "--profile", tmp_path / "links.toml")
+    said = [
+        tomllib.loads((tmp_path / f"{name}.toml").read_text())["network"]["profiles"][name] for name in ("lte", "links")
+    ]
+    assert said[0] == {"rate": {"trace": {"file": "lte.txt"}}}
+    assert said[1]["delay"] == {"model": "trace", "trace": {"file": "links.csv"}}
+    assert said[1]["loss"] == [{"model": "trace", "file": "links.csv", "curve": [[-80.0, 0.5], [-70.0, 1.0]]}]
+    assert "rate" not in said[1]
+
+
 def test_contacts_are_fitted_step_by_step(told, tmp_path):
     (tmp_path / "met.txt").write_text(CONTACTS)
     said = json.loads(told(tmp_path / "met.txt", "--json", "--fit", "gilbert", "--dt", 0.5))
@@ -111,7 +125,7 @@ def test_nodes_that_move_say_how_far_they_are_and_a_curve_what_passes(told, tmp_
         (CONTACTS, ["--fit", "gilbert"], "give the step of the chain by --dt"),
         ("time,src,dst,availability\n0,1,2,0.5\n", ["--fit", "best"], "how long bursts are cannot be known"),
         ("5\n", ["--fit", "best"], "it says nothing of losses"),
-        ("5\n", ["--profile", "{}.toml"], "there is no profile of it"),
+        ("0 0 0\n0 5 5\n", ["--profile", "{}.toml"], "there is no profile of it"),
         (CONTACTS, ["--curve", "[["], "no TOML"),
         (CONTACTS, ["--curve", "[[1,2]]"], "give a curve like"),
         (CONTACTS, ["--interval", "2"], "its times are in seconds"),

@@ -18,7 +18,9 @@ EXEMPT = {
         netem.medium.link_model.LinkModel.draw netem.medium.medium.Verdicted.verdicts
         netem.medium.medium.Medium.begin netem.medium.medium.Medium.judge netem.medium.medium.Medium.deliver
         netem.medium.medium.Medium.bit_draws netem.medium.medium.Medium.bias netem.impairments.rate.Rate.begin
-        netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.jamming.Zone.jammed
+        netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.rate_over_time.RateOverTime.begin
+        netem.impairments.rate_over_time.RateOverTime.seconds netem.impairments.trace.DelayTrace.at
+        netem.impairments.jamming.Zone.jammed
         netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
         netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
         netem.core.draws.DrawnAhead.at netem.medium.relay.Relay.decide netem.medium.relay.Relay.decide_on
