@@ -76,7 +76,7 @@ EXEMPT = {
         netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.likelihood.log_likelihood
         netem.impairments.trace.table netem.impairments.trace.Measured.over netem.impairments.likelihood.predicted
         netem.impairments.measured.delays netem.medium.recorded.carried world.formation.manoeuvre.narrowest
-        world.formation.manoeuvre.turned world.physics.disturbance.Disturbance.between
+        world.formation.manoeuvre.turned world.formation.manoeuvre.led_by world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis
