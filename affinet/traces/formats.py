@@ -69,7 +69,7 @@ def read(file: Path, name: str | None) -> tuple[str, LinkData]:
 def _found(lines: Lines) -> str:
     found = [name for name, one in FORMATS.items() if one.recognised(lines)]
     if len(found) > 1:
-        raise MeasuredError(f"it could be of format {' or '.join(found)}: say which")
+        raise MeasuredError(f"it could be of format {' or '.join(found)}: say which, as its format")
     if not found:
         return "table"  # which says what its columns must be
     return found[0]

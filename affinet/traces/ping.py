@@ -13,12 +13,13 @@ from analysis.models.arrays import Array
 from netem.impairments.measured import Lines, MeasuredError, shown
 
 _HEADER = re.compile(r"^PING\s+(\S+)")
-_SEQUENCE = re.compile(r"\b(?:icmp_)?seq[= ](\d+)")
+_SEQUENCE = re.compile(r"\b(?:icmp_)?seq[= ](\d{1,18})")
 _TOOK = re.compile(r"\btime([=<])(\S+)\s+ms")
 _STAMP = re.compile(r"^\[(\d+\.?\d*)\]")
-_SENT = re.compile(r"^(\d+) packets transmitted")
+_SENT = re.compile(r"^(\d{1,18}) packets transmitted")
 _ANSWER = re.compile(r"bytes from ")
 _WRAP = 65536  # numbers of messages have 16 bits
+_MOST = 10_000_000
 
 
 class _Log(NamedTuple):
@@ -92,11 +93,15 @@ def _log(lines: Lines) -> _Log:
             target = header[1]
         elif summary := _SENT.match(text):
             sent = int(summary[1])
+            if sent > _MOST:
+                raise MeasuredError(f"line {line}: {sent} packets were transmitted: at most {_MOST} are read")
             if took and sent < len(took):
                 raise MeasuredError(
                     f"line {line}: {sent} packets were transmitted and {len(took)} answered: of which log is it?"
                 )
         elif at := _SEQUENCE.search(text):
+            if int(at[1]) >= _WRAP:
+                raise MeasuredError(f"line {line}: icmp_seq {shown(at[1])}: ping counts to {_WRAP - 1} and begins anew")
             this = int(at[1]) + turns * _WRAP
             if newest - this > _WRAP // 2:
                 turns, this = turns + 1, this + _WRAP

@@ -225,6 +225,8 @@ WRONG = {
         (HEADER + answer(1, "fast"), "line 2: a number is due for a round trip in ms"),
         (PING + PING, "line 11: another ping begins: give each a file of its own"),
         (HEADER + answer(1, 1.0) + answer(1, 2.0), "line 3: icmp_seq 1 is answered again"),
+        (HEADER + answer(70000, 1.0), "line 2: icmp_seq '70000': ping counts to 65535"),
+        (HEADER + answer(1, 1.0) + "99999999999 packets transmitted\n", "line 3: 99999999999 packets were transmitted"),
         (HEADER + answer(1, 1.0) + answer(2, 1.0) + "1 packets transmitted, 1 received\n", "line 4: 1 packets were"),
         (HEADER + answer(1, 1.0, "[5.0] ") + answer(2, 1.0), "line 3: only some answers have a time .* use ping -D"),
         (HEADER + answer(1, 1.0, "[5.0] ") + answer(2, 1.0, "[4.0] "), "line 3: the times in brackets do not go up"),
@@ -327,7 +329,7 @@ def test_every_format_has_at_least_five_malformed_files():
 
 def test_a_file_of_two_formats_wants_to_be_told(read):
     text = "1 2 3 4\n2 3 5 6\n"
-    with pytest.raises(MeasuredError, match="it could be of format intervals or bonnmotion: say which"):
+    with pytest.raises(MeasuredError, match="it could be of format intervals or bonnmotion: say which, as its format"):
         read(text)
     assert read(text, "intervals")[1].nodes == ("1", "2", "3")
 
