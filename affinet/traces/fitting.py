@@ -180,8 +180,12 @@ def in_steps_of(fit: Fit, share: float) -> Fit:
     NotFitted
         Where there is none, as of a chain whose states change more often than they would by chance.
     """
-    if fit.model != "gilbert-elliott":
+    if fit.model == "bernoulli" or share == 1.0:
         return fit
+    if fit.model == "markov":
+        raise NotFitted(
+            "a chain of four states is of the steps it was fitted in: leave out --dt, or fit gilbert-elliott"
+        )
     p, r = fit.parameters["p"].value, fit.parameters["r"].value
     stays = 1.0 - p - r
     if stays <= 0.0:

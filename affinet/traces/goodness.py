@@ -17,7 +17,7 @@ LEVEL = 0.01
 _AT_ONCE = 19  # sequences that are simulated together
 _WINDOWS = 20
 _EDGES = np.array([1, 2, 3, 4, 6, 9, 14, 21, 32, 48, 72, 108, 162, 243, 500, 1000, 2000, 5000])
-_LONGEST = 200_000  # messages of a sequence that are looked at
+_MOST = 200_000  # messages that are looked at, the first ones
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,12 @@ def of(chain: Chain, sequences: Sequence[Mask], simulated: int = SIMULATED) -> G
     chain
         As it was fitted. Nothing is fitted anew to what it makes, so that a chain is refused less often than 1 in 100.
     sequences
-        Of messages, lost or not, shape (n,) each.
+        Of messages, lost or not, shape (n,) each; the first 200,000 messages count.
     simulated
         How many times.
     """
-    told = [one[:_LONGEST] for one in sequences]
+    before = np.cumsum([0, *(len(one) for one in sequences)])
+    told = [one[: _MOST - begins] for one, begins in zip(sequences, before.tolist(), strict=False) if begins < _MOST]
     seen = _figures([one[None] for one in told])
     made = [
         _figures([_made(chain, len(one), batch, number) for number, one in enumerate(told)])

@@ -63,6 +63,8 @@ def summaries(data: LinkData) -> list[LinkSummary]:
 def sequences(data: LinkData, step: float | None) -> list[Mask]:
     """What chains are fitted to: of each link whether messages were lost, or whether it was down, step by step.
 
+    Of two ways that are always up and down together one counts: the other says nothing new.
+
     Parameters
     ----------
     data
@@ -90,7 +92,12 @@ def sequences(data: LinkData, step: float | None) -> list[Mask]:
     time: Array = np.arange(0.0, data.ends - step / 2.0, step)
     if len(time) < 2:
         raise ValueError(f"it ends at {data.ends:g} s: give a --dt that is much less")
-    return [_held_at(_of_link(availability, src, dst), time) == 0.0 for src, dst in _pairs(data)]
+    found: dict[tuple[int, int], Mask] = {}
+    for src, dst in _pairs(data):
+        down = _held_at(_of_link(availability, src, dst), time) == 0.0
+        if (dst, src) not in found or (found[dst, src] != down).any():
+            found[src, dst] = down
+    return list(found.values())
 
 
 def _pairs(data: LinkData) -> Sequence[tuple[int, int]]:

@@ -5,6 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from affinet.cli import commands, options
 from affinet.cli.options import traces as words
@@ -109,6 +110,8 @@ def test_contacts_are_fitted_step_by_step(told, tmp_path):
     assert said["links"][0]["loss"] == pytest.approx(0.1)
     assert said["links"][0]["outages"] == {"number": 1, "mean": 1.0, "longest": 1.0}
     assert said["fit"]["parameters"]["r"]["value"] == 0.5  # down for two steps
+    assert said["fit"]["parameters"]["p"]["value"] == pytest.approx(1 / 17)  # both ways are told of, and one counts
+    assert said["fit"]["parameters"]["r"]["high"] == pytest.approx(stats.beta.ppf(0.975, 2, 1))
 
 
 def test_nodes_that_move_say_how_far_they_are_and_a_curve_what_passes(told, tmp_path):
