@@ -17,7 +17,7 @@ from rich.table import Table
 
 from affinet.cli.show import plain
 from affinet.planning import profiling, traces
-from affinet.scenario.profiles import TraceFile
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.traces import fitting, goodness, summary

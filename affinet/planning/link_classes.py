@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from affinet.planning import traces
-from affinet.scenario import profiles, selectors
+from affinet.scenario import profiles, reaches, selectors
 from affinet.scenario.air import NetworkSection
-from affinet.scenario.profiles import LinkProfile, TraceFile
+from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.wrong import ScenarioError, said_at
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
@@ -24,7 +25,7 @@ from netem.impairments.schedule import Schedule
 from world.formation.nominal import Formation
 
 SCHEDULES = (profiles.RoundRobin, profiles.Slotted, profiles.DutyCycle)
-REACHES = (profiles.Disk, profiles.Ramp, profiles.LogDistance)
+REACHES = (reaches.Disk, reaches.Ramp, reaches.LogDistance)
 
 _NEVER = 1e-12
 _NOTHING = np.empty(0)

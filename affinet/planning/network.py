@@ -12,10 +12,11 @@ import numpy as np
 from affinet.planning import limits, own_losses, recordings, traces
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
-from affinet.scenario import profiles
+from affinet.scenario import profiles, reaches, trace_files
 from affinet.scenario.air import NetworkSection
-from affinet.scenario.profiles import LinkProfile, TraceFile
+from affinet.scenario.profiles import LinkProfile
 from affinet.scenario.sections import Scenario, TimeSection
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.wrong import ScenarioError
 from affinet.traces.link_data import Quantity
 from agents.exchange import Channels
@@ -67,7 +68,7 @@ def plan(
     traced = [
         _trace(one, links, one.rows if ruled is None else one.rows & ruled, given.time)
         for one in groups
-        if one.losses(profiles.Traced)
+        if one.losses(trace_files.Traced)
     ]
     slowed = _over_time(heard, Quantity.DELAY, links, ruled, given.time)
     limited = _over_time(heard, Quantity.RATE, links, ruled, given.time)
@@ -166,7 +167,7 @@ def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer
 
 
 def _trace(one: LinkClass, links: Links, rows: Mask, time: TimeSection) -> tuple[Trace, list[Finding]]:
-    model = one.losses(profiles.Traced)
+    model = one.losses(trace_files.Traced)
     held, said = _followed(one, "", model, Quantity.AVAILABILITY, links, rows, time)
     return Trace(*held, one.sensing, one.comms), said
 
@@ -213,9 +214,9 @@ def _laws(one: LinkClass, dt: float) -> list[MessageDelay]:
 def _reach(one: LinkClass, dt: float) -> Reach:
     model = one.losses(REACHES)
     match model:
-        case profiles.Disk():
+        case reaches.Disk():
             shape = (reach.ReachLaw.RAMP, one.rows, model.range, model.range, 0.0, 0.0, 1)
-        case profiles.Ramp():
+        case reaches.Ramp():
             shape = (reach.ReachLaw.RAMP, one.rows, model.inner, model.outer, 0.0, 0.0, 1)
         case _:
             spell = max(1, round(model.coherence / dt))

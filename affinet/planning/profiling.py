@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from affinet.scenario.profiles import LinkProfile, TraceFile
+from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.wrong import ScenarioError
 from affinet.traces.fitting import Fit
 from affinet.traces.link_data import LinkData, Quantity

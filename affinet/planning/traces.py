@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from affinet.scenario import profiles
-from affinet.scenario.profiles import TraceFile
+from affinet.scenario import reaches
 from affinet.scenario.sections import TimeSection
+from affinet.scenario.trace_files import TraceFile
 from affinet.traces import curves, formats, movement
 from affinet.traces.curves import Curve
 from affinet.traces.link_data import INDIRECT, UNITS, LinkData, Quantity, Steps
@@ -105,11 +105,11 @@ def told(file: TraceFile, every: float) -> tuple[str, LinkData, list[str]]:
 def curve_of(said: object) -> Curve:
     """What a scenario says of a curve as a function."""
     match said:
-        case profiles.Disk():
+        case reaches.Disk():
             return curves.Ramp(said.range, said.range)
-        case profiles.Ramp():
+        case reaches.Ramp():
             return curves.Ramp(said.inner, said.outer)
-        case profiles.LogDistance():
+        case reaches.LogDistance():
             return curves.LogDistance(said.range, said.exponent, said.shadowing)
     assert isinstance(said, list)
     return curves.Points(said)

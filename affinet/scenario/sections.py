@@ -11,9 +11,9 @@ from affinet.scenario.air import NetworkSection
 from affinet.scenario.bodies import DynamicsSection, SensingSection
 from affinet.scenario.keys import key
 from affinet.scenario.outside import ExternalSection, RecordedSection
-from affinet.scenario.profiles import Section
 from affinet.scenario.programs import of_agents
 from affinet.scenario.real_time import RealTimeSection
+from affinet.scenario.section import Section
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.target import TargetSection

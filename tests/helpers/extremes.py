@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from inspect import get_annotations
 from typing import Any, get_args
 
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 
 SHORT = {"dt": 0.05, "duration": 0.25, "patience": 3.0}

@@ -11,7 +11,7 @@ from affinet.cli import commands, options
 from affinet.cli.options import traces as words
 from affinet.planning import making as planning
 from affinet.scenario import loading
-from affinet.scenario.profiles import FormatName
+from affinet.scenario.trace_files import FormatName
 from affinet.traces import fitting, formats
 
 CONTACTS = "0 1 2 up\n2 1 2 down\n3 1 2 up\n10 1 2 down\n"

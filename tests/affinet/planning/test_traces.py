@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from affinet.planning import traces
-from affinet.scenario.profiles import Traced
 from affinet.scenario.sections import TimeSection
+from affinet.scenario.trace_files import Traced
 from affinet.traces.link_data import Quantity
 from netem.core.links import Links
 from netem.impairments import trace

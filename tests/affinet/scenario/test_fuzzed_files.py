@@ -14,8 +14,8 @@ from affinet.planning import traces
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import files, loading
-from affinet.scenario.profiles import Traced
 from affinet.scenario.sections import TimeSection
+from affinet.scenario.trace_files import Traced
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import study
