@@ -37,6 +37,7 @@ _WORK: Mapping[str, tuple[str, str]] = {
     "report": ("reporting", "report"),
     "export": ("exporting", "write"),
     "fit": ("fitting", "fit"),
+    "trace": ("tracing", "trace"),
     "inject": ("injecting", "inject"),
     "study": ("studying", "fly_and_report"),
     "score": ("scoring", "fly_and_report"),

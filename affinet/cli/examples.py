@@ -123,6 +123,10 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet design random --agents 45 --dimension 3 --range 3 --seed 7 --out cloud.toml", "in space"),
     ),
     "fit": (Example("affinet fit runs/kept --order 2", "prints overrides for filters that predict inputs"),),
+    "trace": (
+        Example("affinet trace pings.txt", "losses, bursts and delays of a link"),
+        Example("affinet trace pings.txt --fit gilbert --profile field.toml", "a chain, and the profile of it"),
+    ),
     "inject": (
         Example("affinet inject runs/flying cut 1-2 --for 2", "while it flies over processes", alone=False),
         Example("affinet inject runs/flying heal", "ends what was injected", alone=False),

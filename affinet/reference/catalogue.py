@@ -14,7 +14,7 @@ from affinet.reference.docstrings import first_line, parameters_of
 from affinet.reference.entries import Entry, Parameter, of_model, plain
 from affinet.scenario import files, loading, profiles, verbs
 from affinet.scenario.events import Lasting
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line, shown
 from affinet.studies import checks, study

@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from affinet.scenario import files
 from affinet.scenario.explain import explained
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.source import Source
 from affinet.scenario.units import NotNegative, Positive
 from affinet.scenario.wrong import ScenarioError
