@@ -2,6 +2,7 @@
 
 python docs/claims_page.py                      write the pages
 python docs/claims_page.py NAME=DIRECTORY ...   take in full studies first, their verdicts and figures
+python docs/claims_page.py --sweeps             draw the figures of sweeps first, from the means that were kept
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from textwrap import fill
 
 from paper_claims import DOCS, OUTCOMES, PAPERS, Found, PaperClaim, outcome, paper_claims, verdicts
 
-from affinet.studies import record
+from affinet.studies import record, report
 from affinet.studies import study as studies
 from affinet.studies.batch import REPORT
 from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
@@ -266,8 +267,19 @@ def take(name: str, directory: Path) -> None:
             shutil.copy(figure, target)
 
 
+def draw_sweeps() -> None:
+    """Draw the figures of sweeps as the studies do, without flying."""
+    for name, study in ((name, studies.load(name)) for name in studies.shipped()):
+        full = record.full_study(name)
+        if full and study.along is not None and name != "bursts":  # whose picture draw_bursts.py draws
+            means = [case for case in full.cases if case.quantity == study.quantity]
+            report.draw_means(PICTURES / f"{name}.png", study, means)
+
+
 if __name__ == "__main__":
-    for given in sys.argv[1:]:
+    if sys.argv[1:] == ["--sweeps"]:
+        draw_sweeps()
+    for given in (one for one in sys.argv[1:] if one != "--sweeps"):
         study_name, _, folder = given.partition("=")
         take(study_name, Path(folder))
     for file, text in pages().items():
