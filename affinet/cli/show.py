@@ -242,6 +242,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         *([("lost by the transport", f"{lost}, and asked for again")] if (lost := messages["transport_lost"]) else []),
         *((f"wrong, of {who}", what) for who, what in by_sender(outcome.refused).items()),
         *(("fault", str(bite)) for bite in outcome.faults),
+        *(("jammed zone", str(jam)) for jam in outcome.zones),
         *([] if outcome.timing is None else _timing(outcome.timing)),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),

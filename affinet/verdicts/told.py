@@ -41,6 +41,7 @@ def rows(run: Evidence, most_faults: int = _MOST_FAULTS) -> list[tuple[str, str]
             f"{messages['offered']} offered, {messages['delivered']} delivered, {listed(dropped) or 'none lost'}",
         ),
         *faults,
+        *(("jammed zone", str(jam)) for jam in done.zones),
         *(("why", one_line(reason)) for reason in done.reasons),
         ("digest", str(done.digest)),
     ]

@@ -68,6 +68,7 @@ def _curves(run: Evidence) -> str:
 
 def _faults(run: Evidence) -> str:
     rows = [(str(number), str(bite)) for number, bite in enumerate(run.bites, start=1)]
+    rows += [("jammed zone", str(jam)) for jam in run.outcome.zones]
     return html.section("Faults, and what they touched", html.table(rows)) if rows else ""
 
 
