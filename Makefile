@@ -37,6 +37,7 @@ test-browser: $(READY) ## the web viewer in headless Chromium, in an environment
 
 docs: $(READY) ## the site of docs/, into site/: open site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "the site: file://$(CURDIR)/site/index.html"
 
 docs-serve: $(READY) ## the site in a browser, built again whenever a page is written
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs serve

@@ -1,6 +1,7 @@
 """The site of docs/ is built without a warning: every page in its place, every link and anchor leads somewhere."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -26,8 +27,21 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert 'href="decisions/index.html"' in first
     assert 'href="files/agents/estimators/none.py"' in first
     assert (tmp_path / "site" / "files" / "agents" / "estimators" / "none.py").exists()
+    assert [one for page in (tmp_path / "site").rglob("*.html") for one in from_elsewhere(page)] == []
     python = (tmp_path / "site" / "reference" / "python.html").read_text(encoding="utf-8")
     assert [name for name in affinet.__all__ if name[0] != "_" and f'id="affinet.{name}"' not in python] == []
+
+
+def from_elsewhere(page):
+    """What a page loads over the network."""
+    loaded = re.findall(r"<(?:script|link|img|iframe)\b[^>]*>", page.read_text(encoding="utf-8"))
+    return [one for one in loaded if re.search(r"""(?:src|href)=["'](?:https?:)?//""", one)]
+
+
+def test_what_is_loaded_over_the_network_is_found(tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text('<a href="https://zenoh.io">x</a><script src="https://unpkg.com/x"></script><link href="//a.b/c.css">')
+    assert from_elsewhere(page) == ['<script src="https://unpkg.com/x">', '<link href="//a.b/c.css">']
 
 
 @pytest.fixture
