@@ -40,6 +40,10 @@ _DECISIONS = {
     "does not hold": "[red]does not hold[/]",
     "undecided": "[yellow]undecided[/]",
 }
+_PASSED = (
+    "pass: every number is finite, every message accounted for, every fault touched something. "
+    "Whether the error is small enough, a --check says."
+)
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
 
 
@@ -251,6 +255,8 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         table.add_row(name, plain(value))
     console = Console()
     console.print(table)
+    if outcome.verdict.startswith("pass"):
+        console.print(plain(_PASSED), style="dim")
     for reason in outcome.reasons:
         console.print(plain(reason), soft_wrap=True)
 
