@@ -16,6 +16,7 @@ from rich.text import Text
 from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
+from affinet.verdicts import told
 from affinet.verdicts.outcome import Outcome
 from affinet.verdicts.refused import by_sender
 from affinet.verdicts.timing import DelayError, Lateness, Timing
@@ -40,10 +41,6 @@ _DECISIONS = {
     "does not hold": "[red]does not hold[/]",
     "undecided": "[yellow]undecided[/]",
 }
-_PASSED = (
-    "pass: every number is finite, every message accounted for, every fault touched something. "
-    "Whether the error is small enough, a --check says."
-)
 _VERDICTS = {"pass": "[green]pass[/]", "fail": "[red]fail[/]", "vacuous": "[yellow]vacuous[/]"}
 
 
@@ -256,7 +253,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
     console = Console()
     console.print(table)
     if outcome.verdict.startswith("pass"):
-        console.print(plain(_PASSED), style="dim")
+        console.print(plain(told.OF_PASS), style="dim")
     for reason in outcome.reasons:
         console.print(plain(reason), soft_wrap=True)
 

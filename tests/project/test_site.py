@@ -40,7 +40,9 @@ def from_elsewhere(page):
 
 def test_what_is_loaded_over_the_network_is_found(tmp_path):
     page = tmp_path / "page.html"
-    page.write_text('<a href="https://zenoh.io">x</a><script src="https://unpkg.com/x"></script><link href="//a.b/c.css">')
+    page.write_text(
+        '<a href="https://zenoh.io">x</a><script src="https://unpkg.com/x"></script><link href="//a.b/c.css">'
+    )
     assert from_elsewhere(page) == ['<script src="https://unpkg.com/x">', '<link href="//a.b/c.css">']
 
 
