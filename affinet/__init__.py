@@ -20,16 +20,15 @@ if TYPE_CHECKING:
     from affinet.scenario.sections import Scenario as Scenario
     from affinet.scenario.wrong import ScenarioError as ScenarioError
     from affinet.testing import strategies as strategies
+    from affinet.testing.many import FlownSeeds as FlownSeeds
+    from affinet.testing.many import OverSeeds as OverSeeds
     from affinet.verdicts.checkers import agreement as agreement
-    from affinet.verdicts.checkers import always as always
     from affinet.verdicts.checkers import below as below
     from affinet.verdicts.checkers import bounded as bounded
     from affinet.verdicts.checkers import collision_free as collision_free
     from affinet.verdicts.checkers import consistent as consistent
     from affinet.verdicts.checkers import converged as converged
     from affinet.verdicts.checkers import energy as energy
-    from affinet.verdicts.checkers import error_below as error_below
-    from affinet.verdicts.checkers import eventually as eventually
     from affinet.verdicts.checkers import localized as localized
     from affinet.verdicts.checkers import never_heard_across_a_cut as never_heard_across_a_cut
     from affinet.verdicts.checkers import recovers as recovers
@@ -41,6 +40,12 @@ if TYPE_CHECKING:
     from affinet.verdicts.flown import FlownRun as FlownRun
     from affinet.verdicts.pursued import agreed as agreed
     from affinet.verdicts.pursued import found as found
+    from affinet.verdicts.quantities import Quantity as Quantity
+    from affinet.verdicts.quantities import quantity as quantity
+    from affinet.verdicts.signals import Signal as Signal
+    from affinet.verdicts.temporal import always as always
+    from affinet.verdicts.temporal import eventually as eventually
+    from affinet.verdicts.temporal import until as until
     from agents.brief import Brief as Brief
     from agents.brief import Gap as Gap
     from agents.brief import Own as Own
@@ -81,20 +86,14 @@ _NAMES: dict[tuple[str, str], tuple[str, ...]] = {
     ("affinet", "planning.plan"): ("PlanError",),
     ("affinet", "scenario.sections"): ("Scenario",),
     ("affinet", "scenario.wrong"): ("ScenarioError",),
+    ("affinet", "testing.many"): ("FlownSeeds", "OverSeeds"),
     ("affinet", "verdicts.checkers"): (
-        *(
-            "agreement",
-            "always",
-            "below",
-            "bounded",
-            "collision_free",
-            "consistent",
-            "converged",
-            "energy",
-            "error_below",
-        ),
-        *("eventually", "localized", "never_heard_across_a_cut", "recovers", "smooth"),
+        *("agreement", "below", "bounded", "collision_free", "consistent", "converged", "energy"),
+        *("localized", "never_heard_across_a_cut", "recovers", "smooth"),
     ),
+    ("affinet", "verdicts.quantities"): ("Quantity", "quantity"),
+    ("affinet", "verdicts.signals"): ("Signal",),
+    ("affinet", "verdicts.temporal"): ("always", "eventually", "until"),
     ("affinet", "verdicts.pursued"): ("agreed", "found"),
     ("affinet", "verdicts.checking"): ("Checker", "CheckResult"),
     ("affinet", "verdicts.evidence"): ("Evidence",),

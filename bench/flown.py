@@ -46,11 +46,12 @@ def profile(links: Links, channels: Sequence[str] = ONE, **impairments: Any) -> 
         "dt": DT,
         "coupled": True,
         "least_delay": 0,
-        **dict.fromkeys(("chains", "traces", "schedules", "reaches", "zones", "own", "delays"), ()),
+        **dict.fromkeys(("chains", "traces", "schedules", "reaches", "zones", "own", "delays", "delay_traces"), ()),
         "listed": np.empty((0, 4), dtype=np.int64),
         **dict.fromkeys(("duplicate", "reorder", "bias"), none),
         "corrupt": np.zeros((len(links), 4)),
         "rate": None,
+        "rate_trace": None,
         "message_bits": np.full(len(channels), 512.0),
     }
     return Profile(**(perfect | impairments))

@@ -108,11 +108,25 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
             "affinet study mine.toml --out studies/mine --jobs 1", "your own (`affinet new study mine`)", "--quick"
         ),
     ),
+    "score": (
+        Example(
+            "affinet score ga-rkf --quick", "in minutes, against others; a page in scores/ga-rkf-quick/", alone=False
+        ),
+        Example(
+            "affinet score my_filter:MyFilter --against rkf,ga-rkf --out scores/mine",
+            "your own, in full: what has flown there does not fly again",
+            alone=False,
+        ),
+    ),
     "design": (
         Example("affinet design grid --agents 50 --range 2.25", "writes designed-grid.toml"),
         Example("affinet design random --agents 45 --dimension 3 --range 3 --seed 7 --out cloud.toml", "in space"),
     ),
     "fit": (Example("affinet fit runs/kept --order 2", "prints overrides for filters that predict inputs"),),
+    "trace": (
+        Example("affinet trace pings.txt", "losses, bursts and delays of a link"),
+        Example("affinet trace pings.txt --fit gilbert --profile field.toml", "a chain, and the profile of it"),
+    ),
     "inject": (
         Example("affinet inject runs/flying cut 1-2 --for 2", "while it flies over processes", alone=False),
         Example("affinet inject runs/flying heal", "ends what was injected", alone=False),

@@ -24,7 +24,8 @@ from affinet.studies.sweeping import Setting
 from affinet.verdicts import invariants
 
 _VERDICTS = ("pass", "vacuous", "fail")
-_OF_ONE_RUN = ("out", "view", "serve", "runtime")
+_OF_ONE_RUN = ("out", "view", "serve")
+_TOLD = 5  # settings of which it is said what did not pass
 
 
 def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -> bool:
@@ -39,9 +40,11 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     """
     if parsed.seeds is not None and parsed.seed is not None:
         raise ScenarioError("--seed and --seeds: give the one or the other")
-    if given := [name for name in _OF_ONE_RUN if getattr(parsed, name)]:
+    given = [name for name in _OF_ONE_RUN if getattr(parsed, name)]
+    if given or parsed.runtime == "processes":
         raise ScenarioError(
-            f"--{given[0]} is of one run, and --seeds, --sweep and --check fly many in this process: leave it out"
+            f"--{(*given, 'runtime processes')[0]} is of one run, "
+            "and --seeds, --sweep and --check fly many in this process: leave it out"
         )
     checker = None if parsed.check is None else invariants.parse(parsed.check)
     sweeps = [sweeping.values_of(sweep) for sweep in parsed.sweep]
@@ -79,6 +82,7 @@ def _plain(found: Sequence[Setting], seeds: range | None) -> dict[str, object]:
                 "high": _finite(setting.mean.high),
                 "values": [_finite(value) for value in setting.values.tolist()],
                 "verdicts": dict(setting.verdicts),
+                "first": None if setting.first is None else setting.first._asdict(),
                 "alone": setting.alone,
             }
             for setting in found
@@ -99,6 +103,12 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
         means.Row(one.labels, one.mean.found, one.mean.low, one.mean.high, _verdicts(one.verdicts)) for one in found
     ]
     means.show(console, rows, unit, intervals=runs > 1)
+    others = [(setting.labels, setting.first) for setting in found if setting.first is not None]
+    for labels, first in others[:_TOLD]:
+        where = ", ".join([f"seed {first.seed}", *(f"{key}={value}" for key, value in labels.items())])
+        console.print(plain(one_line(f"{where}: {first.verdict}: {first.says}")), soft_wrap=True)
+    if len(others) > _TOLD:
+        console.print(plain(f"... and {len(others) - _TOLD} settings more; --json has them all"))
 
 
 def _verdicts(counted: Mapping[str, int]) -> str:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from affinet.planning import graphs, paths
 from affinet.planning.lateness import Lateness
 from affinet.scenario import bodies, matrices, selectors
-from affinet.scenario.sections import Scenario, TimeSection
+from affinet.scenario.sections import GraphFields, Scenario, TimeSection
 from affinet.scenario.target import TargetSection, Waypoint
 from affinet.scenario.wrong import ScenarioError
 from agents.brief import Brief
@@ -19,6 +21,7 @@ from analysis.models.affine import Manoeuvre
 from analysis.models.arrays import Array
 from analysis.models.pursuit import Target
 from netem.core.links import Links
+from netem.impairments.measured import MeasuredError
 from netem.loading.given import protect
 from world.formation import manoeuvre, swarms
 from world.formation.nominal import Formation
@@ -50,7 +53,10 @@ def formation_of(given: Scenario) -> Formation:
         When an edge or a leader is nobody, or weights are of other edges.
     """
     section = given.formation
-    if section.preset:
+    if section.file is not None:
+        read = _graph(Path(section.file), section.fields or GraphFields())
+        nodes, edges, leaders = read.nominal, read.edges, read.leaders
+    elif section.preset:
         preset = swarms.preset(section.preset)
         nodes, edges, leaders = preset.nominal, preset.edges, preset.leaders
     else:
@@ -62,6 +68,15 @@ def formation_of(given: Scenario) -> Formation:
         if strangers := sorted({agent for agent in numbers if not 1 <= agent <= len(nodes)}):
             raise ScenarioError(f"formation.{key}: no agents {strangers}; agents are 1 to {len(nodes)}")
     return Formation(section.scale * nodes, edges, leaders, _weights(given, len(edges)))
+
+
+def _graph(file: Path, fields: GraphFields) -> graphs.Graph:
+    try:
+        return graphs.read(file, fields)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"formation.file: {file}: no such file") from error
+    except (OSError, MeasuredError) as error:
+        raise ScenarioError(f"formation.file: {file}: {error}") from error
 
 
 def _weights(given: Scenario, edges: int) -> Array | None:
@@ -89,7 +104,7 @@ def world_of(given: Scenario, formation: Formation) -> World:
         body=_body(given, formation.dimension),
         formation=formation,
         links=Links.both_ways(formation.agents, formation.edges),
-        manoeuvre=_manoeuvre(given, formation.dimension),
+        manoeuvre=_manoeuvre(given, formation),
         sensor=bodies.sensor(given.sensing, formation.dimension),
         disturbance=_disturbance(given, formation.dimension),
         pursuit=_pursuit(given, formation),
@@ -167,7 +182,17 @@ def _course(path: Sequence[Waypoint], order: int, time: TimeSection, dimension: 
     return manoeuvre.course(seconds, times, np.array(points), order)
 
 
-def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
+def _from_file(file: Path, formation: Formation, seconds: Array, dt: float) -> Manoeuvre:
+    try:
+        return paths.manoeuvre_of(file, formation, seconds, dt)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"manoeuvre.file: {file}: no such file") from error
+    except (OSError, MeasuredError) as error:
+        raise ScenarioError(f"manoeuvre.file: {file}: {error}") from error
+
+
+def _manoeuvre(given: Scenario, formation: Formation) -> Manoeuvre:
+    dimension = formation.dimension
     seconds: Array = np.arange(given.time.ticks + 1, dtype=np.float64) * given.time.dt
     section = given.manoeuvre
     for number, wall in enumerate(section.walls, start=1):
@@ -181,6 +206,8 @@ def _manoeuvre(given: Scenario, dimension: int) -> Manoeuvre:
                 f"manoeuvre.preset: {section.preset!r} is flown in {flown_in} dimensions, not in {dimension}; give keyframes"
             )
         return flown(seconds)
+    if section.file is not None:
+        return _from_file(Path(section.file), formation, seconds, given.time.dt)
     frames = keyframes_of(given, dimension)
     _refuse_within_a_tick("manoeuvre.keyframes", frames.times, given.time.dt)
     return manoeuvre.keyframes(seconds, *frames)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from affinet.planning.link_classes import SCHEDULES, LinkClass
-from affinet.scenario import profiles
+from affinet.scenario import profiles, reaches, trace_files
 from analysis.models.finding import Finding
 from netem.core.links import Links
 from netem.impairments import delay, schedule
@@ -59,10 +59,10 @@ def _mean_delay(one: LinkClass, dt: float, least_delay: int) -> tuple[float, flo
 _SAYS: Mapping[type[Any], Callable[[Any], str]] = {
     profiles.Own: lambda model: f"and what {model.model} loses",
     profiles.Listed: lambda model: f"drops messages {model.messages[:6]}{' ...' if len(model.messages) > 6 else ''}",
-    profiles.Traced: lambda model: f"and what the trace {model.file} says",
-    profiles.Disk: lambda model: f"nothing beyond {model.range:g} m",
-    profiles.Ramp: lambda model: f"all within {model.inner:g} m, nothing beyond {model.outer:g} m",
-    profiles.LogDistance: lambda model: f"half of the rest at {model.range:g} m",
+    trace_files.Traced: lambda model: f"and what the trace {model.file} says",
+    reaches.Disk: lambda model: f"nothing beyond {model.range:g} m",
+    reaches.Ramp: lambda model: f"all within {model.inner:g} m, nothing beyond {model.outer:g} m",
+    reaches.LogDistance: lambda model: f"half of the rest at {model.range:g} m",
     profiles.RoundRobin: lambda _: "each agent hears one neighbour at a time",
     profiles.Slotted: lambda _: "each agent speaks in its own slot",
 }

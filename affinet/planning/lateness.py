@@ -76,13 +76,21 @@ def _of_class(one: LinkClass, given: Scenario) -> Late:
     waits = {
         "delay": _longest(one),
         "loss": sum(float(part.extra_delay[part.loss < 1.0].max(initial=0.0)) for part, _ in one.chains),
-        "rate": 8.0 * one.profile.rate.queue / one.profile.rate.rate if one.profile.rate else 0.0,
+        "rate": _queued(one),
     }
     stale = any(corruption.kind == "stale" for corruption in one.profile.corrupt or [])
     parts = [*(name for name, seconds in waits.items() if seconds), *(["corrupt"] if stale else [])]
     if parts:
         where.append(f"profile {one.name!r} ({', '.join(parts)})")
     return Late(" and ".join(where), max(_ticks(sum(waits.values()) + one.delay_ticks * dt, dt), least) + stale)
+
+
+def _queued(one: LinkClass) -> float:
+    """The longest that a message waits in its queue, in seconds; where rates change, for as long as they may be 0."""
+    limit = one.profile.rate
+    if limit is None:
+        return 0.0
+    return np.inf if limit.rate is None else 8.0 * limit.queue / limit.rate
 
 
 def _longest(one: LinkClass) -> float:

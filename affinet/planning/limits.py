@@ -150,10 +150,10 @@ def delays(
         if (model := profile.delay) is not None:
             for name in ("mean", "jitter"):
                 delay(f"{key}.delay.{name}", getattr(model, name) or 0.0, time)
-            if model.model == "table":
+            if len(one.measured):
                 for seconds in (one.measured.min(), one.measured.max()):
-                    delay(f"{key}.delay.table", float(seconds), time)
-        if profile.rate is not None:
+                    delay(f"{key}.delay.{model.model}", float(seconds), time)
+        if profile.rate is not None and profile.rate.rate is not None:
             least = float(message_bits[1:].max()) / time.duration
             if profile.rate.rate < least:
                 raise ScenarioError(

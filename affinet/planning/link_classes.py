@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from affinet.scenario import profiles, selectors
+from affinet.planning import traces
+from affinet.scenario import profiles, reaches, selectors
 from affinet.scenario.air import NetworkSection
 from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.wrong import ScenarioError, said_at
 from analysis.models.arrays import Array, Mask
 from netem.core.links import Links
@@ -23,7 +25,7 @@ from netem.impairments.schedule import Schedule
 from world.formation.nominal import Formation
 
 SCHEDULES = (profiles.RoundRobin, profiles.Slotted, profiles.DutyCycle)
-REACHES = (profiles.Disk, profiles.Ramp, profiles.LogDistance)
+REACHES = (reaches.Disk, reaches.Ramp, reaches.LogDistance)
 
 _NEVER = 1e-12
 _NOTHING = np.empty(0)
@@ -79,7 +81,7 @@ class LinkClass:
             )
         if (model := self.profile.delay) is not None:
             spread, kept = model.jitter or 0.0, model.order == "kept"
-            law = delay.DelayLaw(model.model)
+            law = delay.DelayLaw.TABLE if model.trace else delay.DelayLaw(model.model)
             laws.append(MessageDelay(law, self.rows, model.mean or 0.0, spread, self.measured, model.correlation, kept))
         return laws
 
@@ -142,6 +144,8 @@ def classes(network: NetworkSection, formation: Formation, links: Links) -> list
 
 def _measured(name: str, profile: LinkProfile) -> Array:
     table = None if profile.delay is None else profile.delay.table
+    if profile.delay is not None and profile.delay.trace is not None:
+        return _traced(name, profile.delay.trace)
     if not isinstance(table, str):
         return _NOTHING if table is None else np.sort(np.array(table))
     try:
@@ -150,6 +154,16 @@ def _measured(name: str, profile: LinkProfile) -> Array:
         raise ScenarioError(f"network.profiles.{name}: delays {table}: no such file") from error
     except (OSError, ValueError) as error:
         raise ScenarioError(f"network.profiles.{name}: delays {table}: {error}") from error
+
+
+def _traced(name: str, file: TraceFile) -> Array:
+    """The delays that a file says, whenever they held."""
+    try:
+        return np.sort(traces.said_delays(file))
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{name}.delay: trace {file.file}: no such file") from error
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{name}.delay: trace {file.file}: {error}") from error
 
 
 def _possible(one: LinkClass) -> LinkClass:

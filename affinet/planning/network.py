@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from affinet.planning import limits, own_losses, recordings
+from affinet.planning import limits, own_losses, recordings, traces
 from affinet.planning.echo import echo
 from affinet.planning.link_classes import REACHES, SCHEDULES, LinkClass, classes, select
-from affinet.scenario import profiles
+from affinet.scenario import profiles, reaches, trace_files
 from affinet.scenario.air import NetworkSection
 from affinet.scenario.profiles import LinkProfile
 from affinet.scenario.sections import Scenario, TimeSection
+from affinet.scenario.trace_files import TraceFile
 from affinet.scenario.wrong import ScenarioError
+from affinet.traces.link_data import Quantity
 from agents.exchange import Channels
 from analysis.models.arrays import Array, Integers, Mask
 from analysis.models.finding import Finding
@@ -24,12 +27,17 @@ from netem.core.links import Links
 from netem.impairments import reach, trace
 from netem.impairments.chain import ChainLayer, steady
 from netem.impairments.corrupt import Mark
+from netem.impairments.delay import DelayLaw, MessageDelay
 from netem.impairments.jamming import Zone
 from netem.impairments.profile import Profile
 from netem.impairments.rate import Rate
+from netem.impairments.rate_over_time import RateOverTime
 from netem.impairments.reach import Reach
-from netem.impairments.trace import MeasuredAvailability, Trace
+from netem.impairments.trace import DelayTrace, Trace
 from world.formation.nominal import Formation
+
+_Held = tuple[Integers, Array]  # when it changes, and what it is, by link
+_ByClass = Mapping[int, tuple[_Held, list[Finding]]]
 
 _ENVELOPE_BYTES, _NUMBER_BYTES, _TRUTH_BYTES = 32, 8, 1
 
@@ -60,8 +68,11 @@ def plan(
     traced = [
         _trace(one, links, one.rows if ruled is None else one.rows & ruled, given.time)
         for one in groups
-        if one.losses(profiles.Traced)
+        if one.losses(trace_files.Traced)
     ]
+    slowed = _over_time(heard, Quantity.DELAY, links, ruled, given.time)
+    limited = _over_time(heard, Quantity.RATE, links, ruled, given.time)
+    rate = _rate(heard, links, message_bits)
     profile = Profile(
         dt=dt,
         coupled=network.coupled,
@@ -73,17 +84,19 @@ def plan(
         zones=_zones(network, formation, links),
         own=tuple(loss for one in groups for loss in own_losses.of_class(one, given.own_modules)),
         listed=_listed(groups),
-        delays=tuple(law for one in heard for law in one.delays(dt)),
+        delays=tuple(law for one in heard for law in _laws(one, dt)),
+        delay_traces=tuple(DelayTrace(*held) for held, _ in slowed.values()),
         duplicate=_each(heard, links, lambda profile: profile.duplicate or 0.0),
         reorder=_each(heard, links, lambda profile: profile.reorder or 0.0),
         corrupt=np.stack([_each(heard, links, partial(_chance, kind)) for kind in list(Mark)[1:]], axis=-1),
         bias=_each(heard, links, _bias),
-        rate=_rate(heard, links, message_bits),
+        rate=None if limited else rate,
+        rate_trace=_rate_over_time(heard, rate, limited, dt) if rate and limited else None,
         message_bits=message_bits,
     )
     own_losses.try_out(profile.own, links, dt, formation.nominal, coupled=network.coupled)
     notes = [Finding("air", "note", f"{name}: {note}") for name, own in network.profiles.items() for note in own.notes]
-    notes += [note for _, said in traced for note in said]
+    notes += [note for _, said in (*traced, *slowed.values(), *limited.values()) for note in said]
     return profile, (*(echo(one, links, dt, profile.least_delay) for one in groups), *notes)
 
 
@@ -154,37 +167,56 @@ def _chain_layers(classes: Sequence[LinkClass], links: Links) -> list[ChainLayer
 
 
 def _trace(one: LinkClass, links: Links, rows: Mask, time: TimeSection) -> tuple[Trace, list[Finding]]:
-    file = Path(one.losses(profiles.Traced).file)
-    try:
-        if file.is_dir():
-            measured, notes = recordings.trace(file, links, rows, time, sensing=one.sensing)
-        else:
-            measured = trace.from_csv(file, links)
-            notes = _on_measured(measured, rows, time)
-        held = trace.table(measured, links, rows, time.dt, time.ticks)
-    except FileNotFoundError as error:
-        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: no such file") from error
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"network.profiles.{one.name}: trace {file}: {error}") from error
-    said = [Finding("trace", "note", f"profile {one.name!r}: {file.name}: {note}") for note in notes]
+    model = one.losses(trace_files.Traced)
+    held, said = _followed(one, "", model, Quantity.AVAILABILITY, links, rows, time)
     return Trace(*held, one.sensing, one.comms), said
 
 
-def _on_measured(measured: MeasuredAvailability, rows: Mask, time: TimeSection) -> list[str]:
-    moments, notes = measured.time[rows[measured.link]], []
-    if len(moments) and (last := float(moments.max())) < time.duration - time.dt:
-        notes.append(f"its last row is of {last:g} s, and each value holds to the end of the run ({time.duration:g} s)")
-    if measured.splits_ticks(time.dt, time.ticks):
-        notes.append(f"it changes within ticks of {time.dt:g} s: each tick has its mean over time")
-    return notes
+def _over_time(
+    heard: Iterable[LinkClass], what: Quantity, links: Links, ruled: Mask | None, time: TimeSection
+) -> _ByClass:
+    """Delays or rates of the classes that follow a file in them, by the place of the class."""
+    found = {}
+    for place, one in enumerate(heard):
+        said = one.profile.delay if what is Quantity.DELAY else one.profile.rate
+        if said is not None and said.trace is not None:
+            rows = one.rows if ruled is None else one.rows & ruled
+            found[place] = _followed(one, f".{what}", said.trace, what, links, rows, time)
+    return found
+
+
+def _followed(
+    one: LinkClass, key: str, file: TraceFile, what: Quantity, links: Links, rows: Mask, time: TimeSection
+) -> tuple[_Held, list[Finding]]:
+    path = Path(file.file)
+    otherwise = {Quantity.DELAY: 0.0, Quantity.RATE: np.inf}.get(what, 1.0)
+    try:
+        if path.is_dir() and what is Quantity.AVAILABILITY:
+            measured, notes = recordings.trace(path, links, rows, time, sensing=one.sensing)
+        else:
+            measured, notes = traces.measured(file, what, links, rows, time)
+        held = trace.table(measured, links, rows, time.dt, time.ticks, what, otherwise)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"network.profiles.{one.name}{key}: trace {path}: no such file") from error
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"network.profiles.{one.name}{key}: trace {path}: {error}") from error
+    return held, [Finding("trace", "note", f"profile {one.name!r}: {path.name}: {note}") for note in notes]
+
+
+def _laws(one: LinkClass, dt: float) -> list[MessageDelay]:
+    """What its messages wait; of a trace only whether they keep their order, as time says the rest."""
+    laws = one.delays(dt)
+    if one.profile.delay is None or one.profile.delay.trace is None:
+        return laws
+    return [*laws[:-1], replace(laws[-1], law=DelayLaw.CONSTANT)]
 
 
 def _reach(one: LinkClass, dt: float) -> Reach:
     model = one.losses(REACHES)
     match model:
-        case profiles.Disk():
+        case reaches.Disk():
             shape = (reach.ReachLaw.RAMP, one.rows, model.range, model.range, 0.0, 0.0, 1)
-        case profiles.Ramp():
+        case reaches.Ramp():
             shape = (reach.ReachLaw.RAMP, one.rows, model.inner, model.outer, 0.0, 0.0, 1)
         case _:
             spell = max(1, round(model.coherence / dt))
@@ -247,8 +279,17 @@ def _rate(classes: Sequence[LinkClass], links: Links, message_bits: Array) -> Ra
     def of(name: str, without: float) -> Array:
         figures = np.full(len(links), without)
         for one in classes:
-            if one.profile.rate:
-                figures[one.rows] = getattr(one.profile.rate, name)
+            if one.profile.rate and (said := getattr(one.profile.rate, name)) is not None:
+                figures[one.rows] = said
         return figures
 
     return Rate(of("rate", np.inf), 8.0 * of("burst", 0.0), 8.0 * of("queue", np.inf))
+
+
+def _rate_over_time(classes: Sequence[LinkClass], rate: Rate, limited: _ByClass, dt: float) -> RateOverTime:
+    """The limits of all links, of which those of some classes change over time."""
+    ticks = np.unique(np.concatenate([changes for (changes, _), _ in limited.values()]))
+    rates = np.tile(rate.rate, (len(ticks), 1))
+    for place, ((changes, held), _) in limited.items():
+        rates = np.where(classes[place].rows, held[np.searchsorted(changes, ticks, side="right") - 1], rates)
+    return RateOverTime(dt, ticks, rates, rate.burst, rate.queue)

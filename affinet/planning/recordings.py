@@ -15,7 +15,7 @@ from affinet.scenario.wrong import ScenarioError
 from analysis.models.arrays import Mask
 from netem.core.links import Links
 from netem.core.listing import listed
-from netem.impairments.trace import MeasuredAvailability
+from netem.impairments.trace import Measured
 from netem.medium.medium import JOURNAL
 
 if TYPE_CHECKING:
@@ -40,9 +40,7 @@ def refuse_to_judge(before: Scenario, given: Scenario) -> None:
         raise ScenarioError(f"formation: the journal {what} {_pairs(strangers)}: leave the links as they were")
 
 
-def trace(
-    run: Path, links: Links, rows: Mask, time: TimeSection, *, sensing: bool
-) -> tuple[MeasuredAvailability, list[str]]:
+def trace(run: Path, links: Links, rows: Mask, time: TimeSection, *, sensing: bool) -> tuple[Measured, list[str]]:
     """The availability that an earlier run met, and what is to be said of applying it here.
 
     Parameters
@@ -77,11 +75,11 @@ def trace(
     return _changes(carried, before.time.dt), _notes(before, carried, links, rows, time)
 
 
-def _changes(carried: Carried, dt: float) -> MeasuredAvailability:
+def _changes(carried: Carried, dt: float) -> Measured:
     share = carried.share
     changes = np.concatenate([np.ones_like(share[:1], dtype=bool), share[1:] != share[:-1]])
     tick, link = np.nonzero(changes)
-    return MeasuredAvailability(np.asarray(tick * dt, dtype=np.float64), link, share[tick, link])
+    return Measured(np.asarray(tick * dt, dtype=np.float64), link, share[tick, link])
 
 
 def _notes(before: Scenario, carried: Carried, links: Links, rows: Mask, time: TimeSection) -> list[str]:

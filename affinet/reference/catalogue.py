@@ -14,11 +14,10 @@ from affinet.reference.docstrings import first_line, parameters_of
 from affinet.reference.entries import Entry, Parameter, of_model, plain
 from affinet.scenario import files, loading, profiles, verbs
 from affinet.scenario.events import Lasting
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line, shown
 from affinet.studies import checks, study
-from affinet.verdicts import checkers
 from affinet.verdicts.checking import Checker
 from affinet.verdicts.invariants import NAMED
 from netem.loading.calling import NoSuchAlgorithm, load
@@ -32,8 +31,7 @@ _TELLING = {
     "network": ("availability", "profile"),
 }
 _MOST = 200  # characters of a default
-# Those that can be named in words, and those that take more than numbers.
-_CHECKERS: Sequence[Callable[..., Checker]] = (*NAMED.values(), checkers.below, checkers.always, checkers.eventually)
+_CHECKERS: Sequence[Callable[..., Checker]] = tuple(NAMED.values())
 
 
 def scenarios() -> Iterator[Entry]:

@@ -91,12 +91,12 @@ def together(flights: Sequence[Flight]) -> Plan:
 
 def _refuse(profile: Profile) -> None:
     for what, held in (
-        ("a trace", profile.traces),
+        ("a trace", profile.traces or profile.delay_traces),
         ("a schedule", profile.schedules),
         ("loss by distance", profile.reaches),
         ("a jammed zone", profile.zones),
         ("a list of messages", len(profile.listed)),
-        ("a rate limit", profile.rate),
+        ("a rate limit", profile.limits),
     ):
         if held:
             raise NotABatch(f"an air with {what} is not flown side by side; fly the runs one by one")

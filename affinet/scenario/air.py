@@ -8,7 +8,8 @@ from pydantic import model_validator
 
 from affinet.scenario.events import Links
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import LinkProfile, Section
+from affinet.scenario.profiles import LinkProfile
+from affinet.scenario.section import Section
 from affinet.scenario.units import Finite, Positive, Probability, Ticks
 
 

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from affinet.scenario.keys import key
 from affinet.scenario.matrices import covariance
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.units import Bearing, Below1, Matrix, NotNegative, Positive, ShareOfDistance, Steps
 from analysis.models.sensor import Sensor
 from world.physics.bodies import BodyModel

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, mod
 
 from affinet.scenario import selectors
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.units import Finite, NotNegative, Positive, Steps
 from netem.faults.fault import Fault, Pairs
 

@@ -16,6 +16,12 @@ EXAMPLES: Mapping[str, Any] = {
     "description": "what it is about",
     "also": ["nees"],
     "formation.preset": "zhao7",
+    "formation.file": "swarm.graphml",
+    "formation.fields.x": "px",
+    "formation.fields.y": "py",
+    "formation.fields.z": "pz",
+    "formation.fields.leader": "anchor",
+    "manoeuvre.file": "path.csv",
     "formation.nodes": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]],
     "formation.edges": ["1-2", "2-3"],
     "formation.leaders": [1, 2, 3],
@@ -50,9 +56,24 @@ EXAMPLES: Mapping[str, Any] = {
     "network.profiles.*.like": "wifi_busy",
     "network.profiles.*.netem": "delay 100ms loss 1%",
     "network.profiles.*.loss.file": "trace.csv",
+    "network.profiles.*.loss.format": "ping",
+    "network.profiles.*.loss.agents": {"uav1": 1, "uav2": 2},
+    "network.profiles.*.loss.curve": [[-90.0, 0.0], [-70.0, 1.0]],
     "network.profiles.*.corrupt": [{"kind": "nan", "p": 0.1}],
     "network.profiles.*.delay": {"model": "constant", "mean": 0.05},
     "network.profiles.*.delay.table": [0.01, 0.05],
+    **{
+        f"network.profiles.*.{table}.trace{key}": said
+        for table in ("delay", "rate")
+        for key, said in (
+            ("", {"file": "links.csv"}),
+            (".file", "links.csv"),
+            (".format", "table"),
+            (".agents", {"uav1": 1, "uav2": 2}),
+            (".curve", [[-90.0, 0.0], [-70.0, 1.0]]),
+        )
+    },
+    "network.profiles.*.rate": {"rate": 1e6},
     "network.links.links": "1->2",
     "network.links.profile": "wifi_busy",
     "network.zones.links": "all",

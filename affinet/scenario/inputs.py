@@ -223,6 +223,9 @@ def _placed(said: Any, place: Callable[[str], str]) -> Any:
     """A scenario, or a part of it, with its paths put elsewhere; what is malformed stays for others to complain of."""
     if _table(said, "recorded"):
         said = said | {"recorded": _with_path(said["recorded"], "flight", place)}
+    for name in ("formation", "manoeuvre"):
+        if _table(said, name):
+            said = said | {name: _with_path(said[name], "file", place)}
     profiles = _table(_table(said, "network"), "profiles")
     if not profiles:
         return said
@@ -238,6 +241,9 @@ def _profile_placed(profile: Any, place: Callable[[str], str]) -> Any:
         moved["loss"] = [_with_path(loss, "file", place) for loss in losses]
     if "delay" in profile:
         moved["delay"] = _with_path(profile["delay"], "table", place)
+    for key in ("delay", "rate"):
+        if isinstance(table := moved.get(key), dict) and "trace" in table:
+            moved[key] = table | {"trace": _with_path(table["trace"], "file", place)}
     return moved
 
 

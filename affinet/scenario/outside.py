@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
 from affinet.scenario.programs import words
+from affinet.scenario.section import Section
 
 
 def _command(line: str) -> str:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     Field,
     PlainValidator,
@@ -19,13 +18,15 @@ from pydantic import (
 )
 
 from affinet.scenario.keys import key
+from affinet.scenario.reaches import Disk, LogDistance, Ramp
+from affinet.scenario.section import Section
+from affinet.scenario.trace_files import Traced, TraceFile
 from affinet.scenario.units import (
     AtLeast1,
     Below1,
     BitsPerSecond,
     Finite,
     NotNegative,
-    Positive,
     Probability,
     Steps,
     Ticks,
@@ -39,12 +40,6 @@ IMPAIRMENTS = "affinet.impairments"  # the group of entry points
 Step = Literal["time", "packet"]
 
 _ENDLESS = 1e300  # s: beyond, a whole number is no float
-
-
-class Section(BaseModel):
-    """A table of a scenario."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Bernoulli(Section):
@@ -110,44 +105,6 @@ class Listed(Section):
 
     model: Literal["list"]
     messages: Annotated[list[Ticks], Field(min_length=1)] = key(..., "their numbers")
-
-
-class Traced(Section):
-    """Availability from a CSV file (time,src,dst,availability), or from the journal of an earlier run (its directory)."""
-
-    model: Literal["trace"]
-    file: str = key(..., "CSV file, or the directory of a run")
-
-
-class Disk(Section):
-    """Everything within `range` metres, nothing beyond."""
-
-    model: Literal["disk"]
-    range: Positive = key(..., "how far messages reach", "m")
-
-
-class Ramp(Section):
-    """Everything up to `inner` metres, nothing from `outer` on, in proportion between."""
-
-    model: Literal["ramp"]
-    inner: NotNegative = key(..., "up to where everything passes", "m")
-    outer: Positive = key(..., "from where on nothing does", "m")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Ramp:
-        if self.inner > self.outer:
-            raise ValueError(f"inner {self.inner:g} m lies beyond outer {self.outer:g} m")
-        return self
-
-
-class LogDistance(Section):
-    """Log-distance path loss with shadowing: half of the messages pass at `range` metres."""
-
-    model: Literal["log-distance"]
-    range: Positive = key(..., "where half of the messages pass", "m")
-    exponent: Positive = key(3.0, "of the path loss")
-    shadowing: NotNegative = key(4.0, "its standard deviation", "dB")
-    coherence: NotNegative = key(0.0, "over which shadowing stays alike", "s")
 
 
 class RoundRobin(Section):
@@ -238,10 +195,10 @@ def _delays(given: Any) -> list[float] | str | None:
 class DelayModel(Section):
     """One-way delay in seconds; `jitter` is a half-width (uniform) or a standard deviation (normal, pareto).
 
-    `table` holds measured delays, or names a file of them.
+    `table` holds measured delays, or names a file of them; `trace` is a file that says which held when.
     """
 
-    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table"] = key(
+    model: Literal["constant", "uniform", "normal", "exponential", "pareto", "table", "trace"] = key(
         ..., "how delays are distributed"
     )
     mean: NotNegative | None = key(None, "of a delay, one way", "s")
@@ -249,13 +206,16 @@ class DelayModel(Section):
     table: Annotated[
         list[float] | str | None, PlainValidator(_delays, json_schema_input_type=list[NotNegative] | str | None)
     ] = key(None, "measured delays, each as probable as the others, or a file of them", "s")
+    trace: TraceFile | None = key(None, "a file of link data that says delays over time")
     correlation: Below1 = key(0.0, "from tick to tick")
     order: Literal["free", "kept"] = key("free", "whether messages may overtake each other")
 
     @model_validator(mode="after")
     def _whole(self) -> DelayModel:
-        needs = {"table": {"table"}, "constant": {"mean"}, "exponential": {"mean"}}.get(self.model, {"mean", "jitter"})
-        given = {name for name in ("mean", "jitter", "table") if getattr(self, name) is not None}
+        needs = {"table": {"table"}, "trace": {"trace"}, "constant": {"mean"}, "exponential": {"mean"}}.get(
+            self.model, {"mean", "jitter"}
+        )
+        given = {name for name in ("mean", "jitter", "table", "trace") if getattr(self, name) is not None}
         if given != needs:
             raise ValueError(f"the model {self.model!r} is given by {' and '.join(sorted(needs))}")
         if self.model == "pareto" and not (self.mean and self.jitter):
@@ -280,11 +240,18 @@ class Corruption(Section):
 
 
 class RateLimit(Section):
-    """A token bucket: rate in bits per second, burst and queue in bytes."""
+    """A token bucket: rate in bits per second, or a file that says it over time; burst and queue in bytes."""
 
-    rate: BitsPerSecond = key(..., "per directed link", "bit/s")
+    rate: BitsPerSecond | None = key(None, "per directed link", "bit/s")
+    trace: TraceFile | None = key(None, "a file of link data that says rates over time, in place of one rate")
     queue: Steps = key(10_000, "what may wait", "B")
     burst: Ticks = key(0, "what may pass at once", "B")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.rate is None) == (self.trace is None):
+            raise ValueError("give a rate, or a trace of it")
+        return self
 
 
 class LinkProfile(Section):

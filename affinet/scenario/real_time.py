@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from affinet.scenario.events import Whom
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.units import Positive, Rate
 
 Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]

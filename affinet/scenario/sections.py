@@ -11,9 +11,9 @@ from affinet.scenario.air import NetworkSection
 from affinet.scenario.bodies import DynamicsSection, SensingSection
 from affinet.scenario.keys import key
 from affinet.scenario.outside import ExternalSection, RecordedSection
-from affinet.scenario.profiles import Section
 from affinet.scenario.programs import of_agents
 from affinet.scenario.real_time import RealTimeSection
+from affinet.scenario.section import Section
 from affinet.scenario.selectors import edge
 from affinet.scenario.source import IN_CODE, Source
 from affinet.scenario.target import TargetSection
@@ -39,8 +39,17 @@ def _edge(text: str) -> str:
 Edge = Annotated[str, AfterValidator(_edge)]
 
 
+class GraphFields(Section):
+    """What a file of a graph calls its fields."""
+
+    x: str = key("x", "of a node: its first coordinate", "m")
+    y: str = key("y", "its second", "m")
+    z: str = key("z", "its third, in space", "m")
+    leader: str = key("leader", "whether it leads: true or false, 1 or 0")
+
+
 class FormationSection(Section):
-    """Who flies: a preset, or nodes, edges and leaders. Positions in metres, agents numbered from 1.
+    """Who flies: a preset, or a file, or nodes, edges and leaders. Positions in metres, agents numbered from 1.
 
     `weights` of one's own take the place of the stress that is solved for: of each edge i-j one number, or what i gives j and
     what j gives i.
@@ -49,6 +58,8 @@ class FormationSection(Section):
     preset: str | None = key(
         None, "a formation by name, in place of nodes, edges and leaders: " + ", ".join(swarms.NAMES)
     )
+    file: str | None = key(None, "GraphML, or JSON as networkx writes it, in place of nodes, edges and leaders")
+    fields: GraphFields | None = key(None, "what the file calls its fields, where that is not x, y, z and leader")
     nodes: Matrix | None = key(None, "nominal positions, two coordinates each, or three", "m")
     edges: list[Edge] | None = key(None, 'undirected, like "1-2"; wanted with nodes')
     leaders: list[int] | None = key(None, "agents that fly the manoeuvre; wanted with nodes, a preset has its own")
@@ -66,13 +77,19 @@ class FormationSection(Section):
 
     @model_validator(mode="after")
     def _whole(self) -> FormationSection:
+        if self.file is not None:
+            if self.preset is not None or self.nodes is not None or self.edges is not None:
+                raise ValueError("give a file, or a preset, or nodes and edges, not two of them")
+            return self
+        if self.fields is not None:
+            raise ValueError("fields are of a file: give one, or leave them out")
         if self.preset is not None:
             if self.preset not in swarms.NAMES:
                 raise ValueError(f"no preset {self.preset!r}; {among(self.preset, swarms.NAMES)}")
             if self.nodes is not None or self.edges is not None:
                 raise ValueError("give a preset, or nodes and edges, not both")
         elif self.nodes is None or self.edges is None or self.leaders is None:
-            raise ValueError("give a preset, or nodes, edges and leaders")
+            raise ValueError("give a preset, or nodes, edges and leaders, or a file of them")
         elif len({len(node) for node in self.nodes}) != 1 or len(self.nodes[0]) not in (2, 3):
             raise ValueError("nodes need two coordinates each, or three each")
         return self
@@ -93,18 +110,21 @@ class Keyframe(Section):
 
 
 class ManoeuvreSection(Section):
-    """What the leaders fly: a preset, or keyframes joined by monotone cubics."""
+    """What the leaders fly: a preset, or keyframes or the paths of a file, joined by monotone cubics."""
 
     preset: Literal["hover", "corridor", "ravine"] | None = key(None, "a manoeuvre by name, in place of keyframes")
     keyframes: list[Keyframe] = key(list, "affine maps at times, joined by monotone cubics; at rest before and after")
+    file: str | None = key(
+        None, "CSV of a path of the formation (time,x,y), or of each leader (time,leader,x,y), in place of keyframes"
+    )
     walls: list[Annotated[Matrix, Field(min_length=2)]] = key(
         list, "lines through points that recordings and pictures show; nothing collides with them", "m"
     )
 
     @model_validator(mode="after")
     def _whole(self) -> ManoeuvreSection:
-        if (self.preset is None) == (not self.keyframes):
-            raise ValueError("give a preset ('hover', 'corridor', 'ravine'), or keyframes")
+        if [self.preset is not None, bool(self.keyframes), self.file is not None].count(True) != 1:
+            raise ValueError("give a preset ('hover', 'corridor', 'ravine'), or keyframes, or a file")
         if self.keyframes and len(self.keyframes) < 2:
             raise ValueError("give at least two keyframes")
         refuse_unordered("keyframe times", [frame.time for frame in self.keyframes])

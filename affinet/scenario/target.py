@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.units import Finite, NotNegative, Positive, Probability, Steps, refuse_unordered
 
 _ROUNDING = 1e-9

@@ -24,7 +24,7 @@ from affinet.scenario import files
 from affinet.scenario import loading as scenarios
 from affinet.scenario.explain import explained, named_in
 from affinet.scenario.keys import key
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 from affinet.scenario.source import Source
 from affinet.scenario.units import Finite, NotNegative

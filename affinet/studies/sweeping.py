@@ -9,6 +9,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,14 @@ Labelled = tuple[Mapping[str, str], Plan]
 _FIGURES = {"localization": "localization_error", "agreed": "target_error"}
 
 
+class NotPassed(NamedTuple):
+    """A run that came to another verdict than a pass: its seed, the verdict, and why."""
+
+    seed: int
+    verdict: str
+    says: str
+
+
 @dataclass(frozen=True)
 class Setting:
     """What came of the runs of one setting.
@@ -52,6 +61,8 @@ class Setting:
         Its mean over each run, shape (R,).
     verdicts
         How many runs came to each verdict.
+    first
+        The first run that did not pass, if one did not.
     alone
         Why its runs flew one by one; None of those that flew side by side, or of a single one.
     """
@@ -60,6 +71,7 @@ class Setting:
     quantity: str
     values: Array
     verdicts: Counter[str]
+    first: NotPassed | None
     alone: str | None
 
     @property
@@ -173,8 +185,11 @@ def _of_runs(result: study.Result) -> Setting:
     quantity = _quantity(result.plan)
     error = result.runs.mean_error
     values = error if quantity == "error" else np.nanmean(result.runs.quantities[quantity], axis=1)
-    verdicts = Counter("pass" if finite else "fail" for finite in np.isfinite(error).tolist())
-    return Setting(result.labels, quantity, values, verdicts, None)
+    finite = np.isfinite(error)
+    verdicts = Counter("pass" if one else "fail" for one in finite.tolist())
+    seed = result.plan.scenario.seed + int(np.argmin(finite))
+    first = None if finite.all() else NotPassed(seed, "fail", "the swarm diverged")
+    return Setting(result.labels, quantity, values, verdicts, first, None)
 
 
 def _looked_at(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
@@ -196,11 +211,16 @@ def _told(flown: Iterable[Evidence], done: int, runs: int, watch: Callable[[floa
 def _of_evidence(
     labels: Mapping[str, str], plan: Plan, flown: Iterable[Evidence], checker: Checker | None, why: str | None
 ) -> Setting:
-    quantity, values, verdicts = _quantity(plan), list[float](), Counter[str]()
+    quantity, values, verdicts, first = _quantity(plan), list[float](), Counter[str](), None
     for run in flown:
+        findings = [] if checker is None else [checker(run)]
+        verdict = summed_up(run, findings)
+        verdicts[verdict] += 1
         values.append(_figure(run, quantity))
-        verdicts[summed_up(run, [] if checker is None else [checker(run)])] += 1
-    return Setting(labels, quantity, np.array(values), verdicts, why)
+        if first is None and verdict in ("fail", "vacuous"):
+            says = [*run.outcome.reasons, *(str(one) for one in findings if one.verdict == verdict)]
+            first = NotPassed(run.plan.scenario.seed, verdict, "; ".join(says))
+    return Setting(labels, quantity, np.array(values), verdicts, first, why)
 
 
 def _figure(flown: Evidence, quantity: str) -> float:

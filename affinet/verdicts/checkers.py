@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,81 +11,18 @@ from affinet.scenario.words import among
 from affinet.verdicts.checking import Checker, CheckResult, above_zero, every, failed, moment, span_of, times
 from affinet.verdicts.evidence import Evidence
 from affinet.verdicts.metrics import METRICS, of_run
+from affinet.verdicts.quantities import quantity
+from affinet.verdicts.temporal import always
 from analysis.metrics import consistency, localization
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core import channels
 from netem.faults.fault import Fault, Verb
-from netem.loading.calling import Calling
-from netem.loading.returned import WrongReturn, shown
 from netem.medium.verdict import Verdict
 from world.books.localized import FirstMeasurements
 from world.physics import sensors
 
 _CORRELATION_TIMES = 40.0  # in a run that says something: four to a batch, as short series find theirs too short
 _KEPT_BACK = (Verdict.CUT, Verdict.PARTITION)
-
-Signal = Callable[[Evidence], Mask]
-
-
-def error_below(level: float) -> Signal:
-    """Whether the tracking error is below a level, in square metres, in each tick."""
-    above_zero("error_below", level=level)
-    return lambda evidence: evidence.error < level
-
-
-def always(signal: Signal, *, since: float = 0.0, until: float | None = None, name: str = "always") -> Checker:
-    """A signal (T,) holds in every tick from `since` to `until`, in seconds.
-
-    Parameters
-    ----------
-    signal
-        What should hold: of a run, in each tick, shape (T,).
-    since
-        From when on, in seconds.
-    until
-        Up to when, in seconds; None to the end of the run.
-    name
-        Under which it is reported.
-    """
-    times(name, since=since, until=until)
-
-    def check(evidence: Evidence) -> CheckResult:
-        span = span_of(evidence, since, until)
-        holds = _truths(name, signal, evidence)[span.start : span.stop]
-        return every(
-            name, evidence, span, holds, lambda tick: f"it does not hold; the error is {evidence.error[tick]:.4g} m²"
-        )
-
-    return Checker(name, check)
-
-
-def eventually(signal: Signal, *, since: float = 0.0, within: float | None = None, name: str = "eventually") -> Checker:
-    """A signal (T,) holds in some tick from `since` on, `within` so many seconds.
-
-    Parameters
-    ----------
-    signal
-        What should hold: of a run, in each tick, shape (T,).
-    since
-        From when on, in seconds.
-    within
-        For how long it is waited for, in seconds; None to the end of the run.
-    name
-        Under which it is reported.
-    """
-    times(name, since=since, within=within)
-
-    def check(evidence: Evidence) -> CheckResult:
-        span = span_of(evidence, since, None if within is None else since + within)
-        holds = _truths(name, signal, evidence)[span.start : span.stop]
-        if not len(holds):
-            return CheckResult(name, "vacuous", None, "the run ended before")
-        if holds.any():
-            tick = span.start + int(np.argmax(holds))
-            return CheckResult(name, "pass", None, f"from {moment(evidence, tick)} on")
-        return CheckResult(name, "fail", span.stop - 1, f"never, up to {moment(evidence, span.stop - 1)}")
-
-    return Checker(name, check)
 
 
 def bounded(level: float) -> Checker:
@@ -98,7 +35,7 @@ def bounded(level: float) -> Checker:
     """
     name = f"bounded({level:g})"
     above_zero(name, level=level)
-    return always(error_below(level), name=name)
+    return always(quantity("error") < level, name=name)
 
 
 def converged(level: float, by: float) -> Checker:
@@ -114,7 +51,7 @@ def converged(level: float, by: float) -> Checker:
     name = f"converged({level:g}, by={by:g})"
     above_zero(name, level=level)
     times(name, by=by)
-    return always(error_below(level), since=by, name=name)
+    return always(quantity("error") < level, since=by, name=name)
 
 
 def recovers(level: float, within: float) -> Checker:
@@ -431,14 +368,6 @@ def summed_up(evidence: Evidence, findings: Sequence[CheckResult]) -> str:
     """The verdict of a test: a failure outweighs what proved nothing, and that outweighs a pass."""
     verdicts = [evidence.outcome.verdict, *(finding.verdict for finding in findings)]
     return next((verdict for verdict in ("fail", "vacuous") if verdict in verdicts), evidence.outcome.verdict)
-
-
-def _truths(name: str, signal: Signal, evidence: Evidence) -> Mask:
-    with Calling(signal, name):
-        holds = signal(evidence)
-        if not isinstance(holds, np.ndarray) or holds.dtype != np.bool_ or holds.shape != (evidence.ticks,):
-            raise WrongReturn(f"a signal must be bool (T,) = ({evidence.ticks},), got {shown(holds)}")
-    return holds
 
 
 def _others_hold(faults: Sequence[Fault], fault: Fault, tick: int) -> bool:

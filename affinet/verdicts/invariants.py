@@ -1,4 +1,4 @@
-"""Checkers by the words that name them: "bounded(5) & recovers(0.1, within=5)"."""
+"""Checkers by the words that name them: "bounded(5) & recovers(0.1, within=5)", "always((error < 0.3) | (age > 2))"."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from collections.abc import Callable
 
 from affinet.scenario.words import hint, one_line
 from affinet.scenario.wrong import ScenarioError
-from affinet.verdicts import checkers, pursued
+from affinet.verdicts import checkers, pursued, temporal
 from affinet.verdicts.checking import Checker
+from affinet.verdicts.quantities import Quantity, quantity
+from affinet.verdicts.signals import Signal
 
 NAMED: dict[str, Callable[..., Checker]] = {
     made.__name__: made
@@ -26,7 +28,18 @@ NAMED: dict[str, Callable[..., Checker]] = {
         checkers.smooth,
         pursued.found,
         pursued.agreed,
+        checkers.below,
+        temporal.always,
+        temporal.eventually,
+        temporal.until,
     )
+}
+_OF_SIGNALS = {"implies": 1, "until": 1, "eventually": 0, "always": 0}  # and how many of their arguments are signals
+_COMPARED: dict[type[ast.cmpop], Callable[[Quantity, float], Signal]] = {
+    ast.Lt: Quantity.__lt__,
+    ast.LtE: Quantity.__le__,
+    ast.Gt: Quantity.__gt__,
+    ast.GtE: Quantity.__ge__,
 }
 
 
@@ -56,12 +69,42 @@ def _built(node: ast.expr) -> Checker:
         case ast.UnaryOp(ast.Invert(), operand):
             return ~_built(operand)
         case ast.Call(ast.Name(name), given, named) if name in NAMED:
-            return NAMED[name](*map(_number, given), **{str(one.arg): _number(one.value) for one in named})
+            return NAMED[name](*map(_argument, given), **{str(one.arg): _number(one.value) for one in named})
         case ast.Call(ast.Name(name)) | ast.Name(name) if name not in NAMED:
             raise ValueError(f"{name} is no checker; {hint(name, NAMED)}".rstrip("; "))
         case ast.Name(name):
             raise ValueError(f"{name} is written with what it wants: {name}{_parameters(NAMED[name])}")
     raise ValueError(f"{ast.unparse(node)} is no checker")
+
+
+def _argument(node: ast.expr) -> float | str | Signal:
+    """A number; the name of a metric, in quotes; or a signal."""
+    match node:
+        case ast.Constant(str() as name):
+            return name
+        case ast.Constant() | ast.UnaryOp(ast.USub() | ast.UAdd()):
+            return _number(node)
+    return _signal(node)
+
+
+def _signal(node: ast.expr) -> Signal:
+    match node:
+        case ast.BinOp(left, ast.BitAnd(), right):
+            return _signal(left) & _signal(right)
+        case ast.BinOp(left, ast.BitOr(), right):
+            return _signal(left) | _signal(right)
+        case ast.UnaryOp(ast.Invert(), operand):
+            return ~_signal(operand)
+        case ast.Compare(ast.Name(name), [sign], [level]) if type(sign) in _COMPARED:
+            return _COMPARED[type(sign)](quantity(name), _number(level))
+        case ast.Call(ast.Attribute(one, method), given, named) if method in _OF_SIGNALS:
+            signals, numbers = given[: _OF_SIGNALS[method]], given[_OF_SIGNALS[method] :]
+            words = {str(word.arg): _number(word.value) for word in named}
+            made: Signal = getattr(_signal(one), method)(*map(_signal, signals), *map(_number, numbers), **words)
+            return made
+    raise ValueError(
+        f"{ast.unparse(node)} is no signal: compare a quantity with a number, in brackets, like (error < 0.3)"
+    )
 
 
 def _number(node: ast.expr) -> float:

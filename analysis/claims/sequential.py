@@ -11,7 +11,7 @@ from typing import NamedTuple
 from analysis.claims import intervals
 from analysis.claims.intervals import Interval
 
-_LOOKS = 4
+_FRACTIONS = (2, 4, 8)  # of the runs, after which one looks before the end
 
 
 class Look(NamedTuple):
@@ -31,8 +31,8 @@ def looks(most: int, confidence: float) -> list[Look]:
     confidence
         With which the interval at which one stops holds the true share.
     """
-    numbers = sorted({-(-most // 2**earlier) for earlier in range(_LOOKS)})
-    parts = [2.0 ** -(len(numbers) - place) for place in range(len(numbers))]
+    numbers = sorted({most, *(-(-most // fraction) for fraction in _FRACTIONS)})
+    parts = [1.0 / fraction for fraction in (*_FRACTIONS, 2 * _FRACTIONS[-1])[len(numbers) - 1 :: -1]]
     parts[0] *= 2.0  # what is left, so that all of it is spent
     return [Look(runs, 1.0 - (1.0 - confidence) * part / 2.0) for runs, part in zip(numbers, parts, strict=True)]
 

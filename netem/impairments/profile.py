@@ -10,9 +10,10 @@ from netem.impairments.delay import MessageDelay
 from netem.impairments.jamming import Zone
 from netem.impairments.own import OwnLoss
 from netem.impairments.rate import Rate
+from netem.impairments.rate_over_time import RateOverTime
 from netem.impairments.reach import Reach
 from netem.impairments.schedule import Schedule
-from netem.impairments.trace import Trace
+from netem.impairments.trace import DelayTrace, Trace
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,14 @@ class Profile:
     listed
         Messages that are dropped, by number: rows of (link row, how many were offered before it, whether on sensing, whether
         on communication), shape (m, 4).
-    delays
+    delays, delay_traces
         What a message waits, in sum.
     duplicate, reorder
         Probabilities that a message arrives twice, and that its `delays` are left out, shape (L,).
     corrupt, bias
         Probabilities of each kind of corruption, shape (L, 4), and what a bias adds, shape (L,).
-    rate
-        Limits of rate and queue, if any.
+    rate, rate_trace
+        Limits of rate and queue, if any; those that change over time in place of those that do not.
     message_bits
         Size of a message, by channel, shape (C,).
     """
@@ -62,12 +63,19 @@ class Profile:
     own: tuple[OwnLoss, ...]
     listed: Integers
     delays: tuple[MessageDelay, ...]
+    delay_traces: tuple[DelayTrace, ...]
     duplicate: Array
     reorder: Array
     corrupt: Array
     bias: Array
     rate: Rate | None
+    rate_trace: RateOverTime | None
     message_bits: Array
+
+    @property
+    def limits(self) -> Rate | RateOverTime | None:
+        """Limits of rate and queue, if any."""
+        return self.rate_trace or self.rate
 
     @property
     def spatial(self) -> bool:

@@ -33,6 +33,10 @@ class Rate:
     burst: Array
     queue: Array
 
+    def at(self, tick: int) -> Rate:  # noqa: ARG002
+        """The limits in a tick: always these."""
+        return self
+
     def begin(self) -> Array:
         """Full buckets, empty queues: debt in bits, shape (L,); negative while tokens are left."""
         return -self.burst

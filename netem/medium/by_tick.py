@@ -152,13 +152,15 @@ class ImpairmentsByTick:
         return [(trace.lost(ticks, draw), self.on(trace.sensing, trace.comms)) for trace in traces]
 
     def _delays(self, ticks: Integers, extra_s: Array) -> Array:
-        if not self._profile.delays:
+        if not (self._profile.delays or self._profile.delay_traces):
             return extra_s
         draws = self.draw(Purpose.DELAY, ticks, 2)
         total = np.zeros(draws.shape[:-1])
         for n, law in enumerate(self._profile.delays):
             share = self._swelling(n, law.correlation, draws[..., 0]) if law.correlation else draws[..., 0]
             total += np.where(law.rows, law.quantile(share), 0.0)
+        for trace in self._profile.delay_traces:
+            total += trace.at(ticks)[:, None]
         return extra_s + np.where(draws[..., 1] < self._profile.reorder, 0.0, total)
 
     def _ticks(self, seconds: Array) -> Integers:
@@ -182,6 +184,8 @@ class ImpairmentsByTick:
         seconds = np.zeros(draws.shape[:-1])
         for law in self._profile.delays:
             seconds += np.where(law.rows, law.quantile(draws[..., 1]), 0.0)
+        for trace in self._profile.delay_traces:
+            seconds += trace.at(ticks)[:, None]
         return draws[..., 0] < self._profile.duplicate, seconds + extra_s
 
     def _marks(self, ticks: Integers) -> Marks:

@@ -94,12 +94,12 @@ class LinkModel:
         layers = [self.profile.chains[n] for n in self._packet_layers]
         draws = self._by_tick.draw(Purpose.CHAIN_START, np.zeros(1, dtype=np.int64), self._packet_lanes)[0]
         states = tuple(layer.begin(draws[..., layer.lane]) for layer in layers)
-        return Memory(self.profile.rate.begin() if self.profile.rate else np.zeros(self._shape[1]), states)
+        return Memory(self.profile.limits.begin() if self.profile.limits else np.zeros(self._shape[1]), states)
 
-    def rest(self, memory: Memory) -> Memory:
+    def rest(self, memory: Memory, tick: int) -> Memory:
         """What it remembers after a tick in which it ruled no link."""
-        rate = self.profile.rate
-        return memory._replace(debt=rate.rest(memory.debt, self.profile.dt)) if rate else memory
+        rate = self.profile.limits
+        return memory._replace(debt=rate.at(tick).rest(memory.debt, self.profile.dt)) if rate else memory
 
     def judge(
         self,
@@ -129,8 +129,9 @@ class LinkModel:
             held, extra_s = also_held(held, lost, _LOST), slower_s if delay_s is None else slower_s + delay_s
         for kind, where in self._layers(state, tick, impairments, position):
             held = also_held(held, where, kind)
-        debt, rate = memory.debt, self.profile.rate
-        if rate:
+        debt = memory.debt
+        if self.profile.limits:
+            rate = self.profile.limits.at(tick)
             passing = offered & (stronger(imposed, held) == PASSED)
             debt, overflow, queued_s = rate.admit(rate.rest(debt, self.profile.dt), self._bits, passing)
             held, extra_s = also_held(held, overflow, _OVERFLOW), queued_s if extra_s is None else extra_s + queued_s

@@ -200,7 +200,7 @@ class Medium:
         own, *others = self._link_models
         if not under.degrades:
             memory, verdicts, waits = own.judge(state, state.memories[0], tick, offered, position, imposed, delay_s)
-            rested = (model.rest(memory) for model, memory in zip(others, state.memories[1:], strict=True))
+            rested = (model.rest(memory, tick) for model, memory in zip(others, state.memories[1:], strict=True))
             return (memory, *rested), verdicts, waits
         judged = [
             model.judge(state, memory, tick, offered & (now.profile == number), position, imposed, delay_s)

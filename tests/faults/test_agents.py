@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from affinet import agreement, always, bounded, collision_free, error_below, recovers
+from affinet import agreement, always, bounded, collision_free, quantity, recovers
 
+ERROR = quantity("error")
 COARSE = "time.dt=0.05"
 FILTER_ALONE = "agents.estimator=rkf"
 
@@ -14,8 +15,8 @@ def test_the_shape_outlasts_the_agent_that_keeps_it_rigid(swarm):
     """The one whose loss breaks rigidity will be lost some day: the others must hold the shape until it is back."""
     air = ("partition", COARSE, "time.duration=18.5", "timeline=[]")
     lost, meanwhile = {"agents": ["critical"], "at": 8, "until": 14}, {"since": 8, "until": 13.9}
-    swarm(*air).fault("depart", **lost).fly().check(always(error_below(1), **meanwhile), recovers(0.2, within=4))
-    swarm(*air, FILTER_ALONE).fault("depart", **lost).fly().check(~always(error_below(5), **meanwhile))
+    swarm(*air).fault("depart", **lost).fly().check(always(ERROR < 1, **meanwhile), recovers(0.2, within=4))
+    swarm(*air, FILTER_ALONE).fault("depart", **lost).fly().check(~always(ERROR < 5, **meanwhile))
 
 
 def test_a_killed_agent_that_forgot_everything_finds_its_place_again(swarm):
@@ -44,7 +45,7 @@ def test_agents_that_stall_catch_up_without_what_they_were_told_meanwhile(swarm)
 
 def test_a_liar_moves_those_who_believe_and_not_those_who_measure(swarm):
     """A compromised agent tells a map three times too large: the filters see that nobody agrees, and go on."""
-    lie, shaken = {"agents": [4], "matrix": [[3.0, 0.0], [0.0, 3.0]], "at": 8, "until": 14}, error_below(1.5)
+    lie, shaken = {"agents": [4], "matrix": [[3.0, 0.0], [0.0, 3.0]], "at": 8, "until": 14}, ERROR < 1.5
     wary = swarm("corridor", COARSE, "time.duration=15").fault("lie", **lie).fly()
     wary.check(~agreement(1.0, by=3), always(shaken, since=8))
     gullible = swarm("corridor", COARSE, "time.duration=15", "agents.estimator=conral").fault("lie", **lie).fly()

@@ -2,16 +2,9 @@
 
 import pytest
 
-from affinet import (
-    agreement,
-    always,
-    bounded,
-    converged,
-    error_below,
-    never_heard_across_a_cut,
-    recovers,
-)
+from affinet import agreement, always, bounded, converged, never_heard_across_a_cut, quantity, recovers
 
+ERROR = quantity("error")
 COARSE = "time.dt=0.05"
 FILTER_ALONE = "agents.estimator=rkf"
 
@@ -22,7 +15,7 @@ def test_a_leader_that_is_not_heard_costs_more_than_a_leader_that_does_not_hear(
     mute = air.fault("cut", links=["2->4"], at=8, until=11).fly()
     mute.check(never_heard_across_a_cut(), recovers(0.2, within=4.5), bounded(4))
     deaf = air.fault("cut", links=["4->2"], at=8, until=11).fly()
-    deaf.check(never_heard_across_a_cut(), always(error_below(0.2), since=8))
+    deaf.check(never_heard_across_a_cut(), always(ERROR < 0.2, since=8))
 
 
 @pytest.mark.affinet_seeds(1, 2, 3)
@@ -57,7 +50,7 @@ def test_maps_that_come_late_in_the_turn_raise_the_alarm_and_not_the_error(swarm
     only_maps_travel = ("partition", COARSE, "time.duration=25", "timeline=[]", "agents.law=constant-velocity")
     prompt = swarm(*only_maps_travel).fly().check(agreement(0.5, by=18))
     late = swarm(*only_maps_travel).fault("delay", links=["all"], delay=1.0, at=18, until=24).fly()
-    late.check(~agreement(0.5, by=18), always(error_below(2 * prompt.error[prompt.tick(18) :].max()), since=18))
+    late.check(~agreement(0.5, by=18), always(2 * prompt.error[prompt.tick(18) :].max() > ERROR, since=18))
 
 
 def test_a_split_that_waits_for_calm_strikes_when_all_is_well(swarm):
@@ -67,4 +60,4 @@ def test_a_split_that_waits_for_calm_strikes_when_all_is_well(swarm):
     run = air.fault("partition", groups="leaders", when=calm, lasts=3).fly()
     struck = run.tick(run.bites[0].at)
     assert (run.error[struck - 20 : struck] < 0.05).all()
-    run.check(~always(error_below(0.15), since=8), bounded(1.5), converged(0.3, by=15))
+    run.check(~always(ERROR < 0.15, since=8), bounded(1.5), converged(0.3, by=15))

@@ -18,9 +18,10 @@ from netem.impairments.jamming import Zone
 from netem.impairments.loss import bernoulli
 from netem.impairments.profile import Profile
 from netem.impairments.rate import Rate
+from netem.impairments.rate_over_time import RateOverTime
 from netem.impairments.reach import Reach
 from netem.impairments.schedule import Schedule
-from netem.impairments.trace import Trace
+from netem.impairments.trace import DelayTrace, Trace
 from netem.medium.in_flight import Delivery, MediumState, Verdicts
 from netem.medium.medium import Medium
 
@@ -43,11 +44,13 @@ def quiet_profile(links, channels, **changes):
         own=(),
         listed=np.empty((0, 4), dtype=np.int64),
         delays=(),
+        delay_traces=(),
         duplicate=np.zeros(size),
         reorder=np.zeros(size),
         corrupt=np.zeros((size, 4)),
         bias=np.zeros(size),
         rate=None,
+        rate_trace=None,
         message_bits=np.full(len(channels), BITS),
     )
     return replace(quiet, **changes)
@@ -116,11 +119,13 @@ IMPAIRMENTS = (
     "zones",
     "listed",
     "delays",
+    "delay traces",
     "ordered",
     "duplicate",
     "reorder",
     "corrupt",
     "rate",
+    "rate over time",
 )
 
 
@@ -161,6 +166,10 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
         changes["listed"] = np.array(drops, dtype=np.int64).reshape(-1, 4)
     if "delays" in has:
         changes["delays"] = _delays(mix, links)
+    if "delay traces" in has:
+        changed = np.array([0, 5, 11])
+        slower = np.stack([each(mix, f"slower {at}", links, lambda rng: DT * rng.integers(3)) for at in changed])
+        changes["delay_traces"] = (DelayTrace(changed, slower),)
     if "ordered" in has:
         queued = MessageDelay(DelayLaw.UNIFORM, _on(mix, "ordered", links), 0.4, 0.4, np.empty(0), 0.0, ordered=True)
         changes["delays"] = (*changes.get("delays", ()), queued)
@@ -173,6 +182,11 @@ def mixture(mix, has, links, channels, *, coupled=True, least_delay=0):
         rates = each(mix, "rate", links, lambda rng: rng.choice([np.inf, 1.2 * BITS / DT]))
         queue = np.where(np.isinf(rates), np.inf, 2 * BITS)
         changes["rate"] = Rate(rates, burst=np.full(len(links), BITS), queue=queue)
+    if "rate over time" in has:
+        changed = np.array([0, 4, 9])
+        rates = np.stack([each(mix, f"rate {at}", links, lambda rng: BITS / DT * rng.integers(3)) for at in changed])
+        burst, queue = np.full(len(links), BITS), np.full(len(links), 2 * BITS)
+        changes["rate_trace"] = RateOverTime(DT, changed, rates, burst, queue)
     return replace(whole, **changes)
 
 

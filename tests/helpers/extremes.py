@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from inspect import get_annotations
 from typing import Any, get_args
 
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 
 SHORT = {"dt": 0.05, "duration": 0.25, "patience": 3.0}
@@ -24,6 +24,10 @@ _LOSSES: dict[str, dict[str, Any]] = {
     "slotted": {"hold": 1},
     "duty-cycle": {"period": 4, "on": 3},
 }
+# Of profiles that no link has: no file is read.
+_TRACED = {"model": "trace", "file": "field.txt", "agents": {"a": 1, "b": 2}, "begins": 1.0, "interval": 0.5}
+_BY_CURVE = {"model": "trace", "file": "field.txt", "first": 0, "curve": [[-90.0, 0.0], [-70.0, 1.0]]}
+_WAITS = {"delay": {"model": "trace", "trace": {"file": "d.csv"}}, "rate": {"trace": {"file": "r.csv", "first": 0}}}
 _DELAYS: dict[str, dict[str, Any]] = {
     "constant": {"mean": 0.1},
     "uniform": {"mean": 0.1, "jitter": 0.05},
@@ -112,6 +116,10 @@ BASES: dict[str, dict[str, Any]] = {
             ],
             "zones": [{"centre": [0.0, 0.0], "radius": 1.0, "share": 0.5}],
         },
+    },
+    "traces": {
+        **_FLOWN,
+        "network": {"profiles": {"one": {"loss": [_TRACED]}, "other": {"loss": [_BY_CURVE]}, "waits": _WAITS}},
     },
     "timeline": {**_FLOWN, "network": {"profiles": {"rest": _PROFILES["rest"]}}, "timeline": _FAULTS},
     "covariances": {

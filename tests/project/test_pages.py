@@ -22,6 +22,7 @@ ELSEWHERE = {
     "installing.md": {},
     "launch.md": {},
     "laws.md": {},
+    "traces.md": {},
     "tutorial.md": {},
 }
 

@@ -157,6 +157,23 @@ def course(seconds: Array, times: Sequence[float], points: Array, order: int) ->
     return np.stack([way(within), *derivatives], axis=1)
 
 
+def led_by(nominal: Array, flown: Array) -> tuple[Manoeuvre, Array]:
+    """The affine map of every tick by which leaders come nearest to where they fly, and how far off they are, (T, K).
+
+    Parameters
+    ----------
+    nominal
+        Of K leaders that span the space, shape (K, D), in metres.
+    flown
+        Where they fly, shape (T, K, D).
+    """
+    with_one = np.concatenate([nominal, np.ones((len(nominal), 1))], axis=1)
+    fitted = product(np.linalg.pinv(with_one), flown)
+    off = flown - product(with_one, fitted)
+    theta = np.swapaxes(fitted[:, :-1], -1, -2)
+    return Manoeuvre(np.ascontiguousarray(theta), fitted[:, -1]), np.sqrt((off * off).sum(axis=-1))
+
+
 def narrowest(times: Sequence[float], theta: Array) -> Array:
     """How narrow a formation gets from each keyframe to the next, shape (F - 1,), as a share of its width at the narrower end.
 

@@ -14,6 +14,7 @@ LAYOUTS = ("grid", "random")  # of world.formation.layouts, which is more than a
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add them."""
     _add_study(commands)
+    _add_score(commands)
     _add_hunt(commands)
     _add_conformance(commands)
     _add_design(commands)
@@ -43,6 +44,41 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     where.add_argument(
         "--dask", metavar="ADDRESS", help="on the workers of the Dask scheduler there, like tcp://host:8786"
     )
+
+
+def _add_score(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    score = commands.add_parser(
+        "score",
+        help="what an estimator or a law is worth over a network, against the others, and how sure one may be",
+        description="Fly it through tasks and airs beside the others, with the same draws; compare, find where swarms are "
+        "lost, and say so in words. Exit status 0 whatever comes out.",
+    )
+    score.add_argument("name", metavar="NAME", help="an estimator: of those there are, or module:Class of your own")
+    score.add_argument("--law", action="store_true", help="NAME is a law")
+    score.add_argument(
+        "--against",
+        type=lambda text: text.split(","),
+        default=[],
+        metavar="NAME,...",
+        help="others to compare with (default: those of the card)",
+    )
+    score.add_argument(
+        "--card",
+        default="edges",
+        metavar="CARD",
+        help=f"tasks and airs: a TOML file, or one of: {', '.join(files.shipped('scorecards'))} (default: %(default)s)",
+    )
+    score.add_argument("--quick", action="store_true", help="a coarse version, in minutes")
+    score.add_argument(
+        "--out", type=values.path, metavar="DIR", help="default: scores/NAME; what has flown there does not fly again"
+    )
+    score.add_argument(
+        "--jobs",
+        type=values.count,
+        metavar="N",
+        help="in so many processes (default: as many as processors; 1: this one)",
+    )
+    score.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 
 
 def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from affinet.cli import helping
-from affinet.cli.options import beginning, flown, machines, many, scenarios
+from affinet.cli.options import beginning, flown, machines, many, scenarios, traces
 from affinet.cli.options.parser import Parser
 
 
@@ -15,7 +15,7 @@ def parser() -> Parser:
     whole = Parser(prog="affinet", description=helping.PURPOSE, epilog=helping.MORE)
     whole.add_argument("--version", action=_Version, nargs=0, help="show the version, and exit")
     commands = whole.add_subparsers(dest="command", metavar="COMMAND")
-    for module in (scenarios, flown, many, machines, beginning):
+    for module in (scenarios, flown, many, traces, machines, beginning):
         module.add(commands)
     helping.end_with_examples(whole)
     return whole

@@ -9,7 +9,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from affinet.scenario import files
 from affinet.scenario.explain import explained, named_in
-from affinet.scenario.profiles import Section
+from affinet.scenario.section import Section
 from affinet.scenario.source import Source
 from affinet.scenario.wrong import ScenarioError
 from netem.wire import endpoints

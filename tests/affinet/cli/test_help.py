@@ -15,6 +15,7 @@ pytestmark = PROCESSES
 
 ALL = [example for examples in EXAMPLES.values() for example in examples]
 RUN = [example for example in ALL if example.alone]
+PINGS = "".join(f"64 bytes from b: icmp_seq={number} time=4 ms\n" for number in range(1, 100) if number % 11 > 1)
 
 
 def typed(example, more=""):
@@ -37,6 +38,7 @@ def test_an_example_does_what_it_says(example, kept, tmp_path, monkeypatch, capf
     (tmp_path / "runs" / "kept").symlink_to(kept)
     if "mine.toml" in example.line:
         assert main(["new", "study", "mine"]) == 0
+    (tmp_path / "pings.txt").write_text(PINGS)
     assert main(typed(example, example.short)) == example.status, capfd.readouterr().err
     assert capfd.readouterr().out
 

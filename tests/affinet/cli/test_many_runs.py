@@ -96,8 +96,15 @@ def test_a_check_is_part_of_the_verdict(capsys):
     assert said["settings"][0]["verdicts"].get("pass", 0) == passed
     assert status == (0 if passed == 3 else 1)
     assert err == ""
-    status, said, _ = told(capsys, *words, "--check", "bounded(1e-6)")
+    status, said, _ = told(capsys, *words, "--check", "bounded(1e-6)", "--runtime", "inprocess")
     assert (status, said["settings"][0]["verdicts"]) == (1, {"fail": 3})
+    first = said["settings"][0]["first"]
+    assert (first["seed"], first["verdict"]) == (1, "fail")
+    assert first["says"].startswith("bounded(1e-06): fail: at 0 s (tick 0) it does not hold; the error is ")
+    assert main([*words, "--check", "~eventually(error < 1e9)", "--sweep", "network.availability=0.5,1"]) == 1
+    *_, line, last = capsys.readouterr().out.splitlines()
+    assert line.startswith("seed 1, network.availability=0.5: fail: ~eventually((error < 1e+09)): fail: ")
+    assert last.startswith("seed 1, network.availability=1: fail: ")
 
 
 def test_a_swarm_that_leaves_the_numbers_fails(capsys, tmp_path, monkeypatch):
@@ -135,7 +142,7 @@ def test_what_matters_of_others_is_in_place_of_the_tracking_error(scenario, quan
         ),
         (("--seeds", "1-2", "--seed", "3"), "--seed and --seeds: give the one or the other"),
         (("--seeds", "1-2", "--out", "x"), "--out is of one run, and --seeds, --sweep and --check fly many"),
-        (("--seeds", "1-2", "--runtime", "processes"), "--runtime is of one run"),
+        (("--seeds", "1-2", "--runtime", "processes"), "--runtime processes is of one run"),
         (("--seeds", "1-2", "--serve"), "--serve is of one run"),
         (("--check", "bounded"), "invariant 'bounded': bounded is written with what it wants"),
     ],

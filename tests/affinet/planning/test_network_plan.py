@@ -11,6 +11,8 @@ from affinet.runtimes.rehearsing import rehearse
 from affinet.runtimes.run import fly
 from affinet.scenario import loading, profiles, selectors
 from affinet.scenario.wrong import ScenarioError
+from netem.faults.timeline import Timeline
+from netem.medium.medium import Medium
 from netem.medium.verdict import Verdict
 
 CALM = ("network.availability=1.0", "time.duration=1")
@@ -200,3 +202,59 @@ def test_a_resolved_scenario_flies_the_same_air(tmp_path):
     assert fly(again, "inprocess", tmp_path / "again", lambda *_: None).digest == first.digest
     told = json.loads((tmp_path / "first" / loading.FILE).read_text())
     assert told["network"]["profile"] == "x"
+
+
+def over_time(tmp_path, what, values):
+    """A table in which links from agent 4 are worth the second of two values from 0.5 s on."""
+    links = plan_of("corridor").world.links
+    rows = [f"{at},{src},{dst},{values[at > 0 and src == 4]}" for src, dst in links.index for at in (0, 0.5)]
+    (tmp_path / "links.csv").write_text(f"time,src,dst,{what}\n" + "\n".join(rows) + "\n")
+    return tmp_path / "links.csv", links
+
+
+def test_delays_over_time_are_flown(tmp_path):
+    file, links = over_time(tmp_path, "delay", (0.02, 0.05))
+    profile = f'network.profiles.t.delay={{model="trace",trace={{file="{file}"}}}}'
+    made = planned(profile, 'network.profile="t"')
+    (slower,) = made.profiles[0].delay_traces
+    assert slower.ticks.tolist() == [0, 50]
+    verdicts = rehearse(made).arrays["verdicts"]
+    assert (verdicts[:, 1:] == Verdict.DELAYED).all()
+    told = [finding.says for finding in made.findings if finding.check == "air"]
+    assert any("mean delay 0.02" in one for one in told)
+    medium = Medium(1, ("sense", "a", "b", "c"), made.profiles, Timeline(links, ()))
+    air, waits = medium.begin(), []
+    for tick in range(60):
+        air, ruled = medium.judge(air, tick, np.ones((4, len(links)), dtype=bool), None)
+        air, _ = medium.deliver(air, tick, ruled)
+        waits.append(ruled.due[1] - tick)
+    assert (np.array(waits)[:50] == 2).all()
+    assert (np.array(waits)[50:] == np.where(links.src == 4, 5, 2)).all()
+
+
+def test_rates_over_time_are_flown(tmp_path):
+    file, links = over_time(tmp_path, "rate", (1e9, 1e4))
+    made = planned(
+        f'network.profiles.t.rate={{trace={{file="{file}"}},queue=100000,burst=1000}}', 'network.profile="t"'
+    )
+    verdicts = rehearse(made).arrays["verdicts"]
+    assert (verdicts[:50] == Verdict.DELIVERED).all()
+    slow = verdicts[70:, 1:, links.src == 4]  # when what may pass at once has
+    assert (slow != Verdict.DELIVERED).all()
+    assert (verdicts[:, :, links.src != 4] == Verdict.DELIVERED).all()
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        ('network.profiles.t.delay={{model="trace",trace={{file="{}"}}}}', "and no delay: name one that does"),
+        ('network.profiles.t.rate={{trace={{file="{}"}}}}', "and no rate: name one that does"),
+        ('network.profiles.t.rate={{trace={{file="none.csv"}},rate=1e6}}', "give a rate, or a trace of it"),
+        ("network.profiles.t.rate={{queue=1000}}", "give a rate, or a trace of it"),
+        ('network.profiles.t.delay={{model="trace"}}', "the model 'trace' is given by trace"),
+        ('network.profiles.t.delay={{model="trace",trace={{file="none.csv"}}}}', "none.csv: no such file"),
+    ],
+)
+def test_what_is_wrong_in_delays_and_rates_over_time_is_said(override, says, tmp_path):
+    (tmp_path / "trace.csv").write_text(HEADER + "0,1,2,1\n")
+    assert says in complaint(override.format(tmp_path / "trace.csv"), 'network.profile="t"')

@@ -10,15 +10,20 @@ from flying import plan_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from affinet.planning import traces
 from affinet.planning.plan import PlanError
 from affinet.runtimes.run import fly
 from affinet.scenario import files, loading
+from affinet.scenario.sections import TimeSection
+from affinet.scenario.trace_files import Traced
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import study
+from affinet.traces.link_data import Quantity
 from affinet.verdicts import reading
 from netem.core.links import Links
 from netem.impairments import trace
+from netem.impairments.measured import MeasuredError
 from netem.impairments.trace import TraceError
 from netem.medium import journal, recorded
 from netem.medium.journal import JournalError
@@ -51,8 +56,9 @@ def reads_study(path):
 
 
 def reads_trace(path):
-    measured = trace.from_csv(path, LINKS)
-    trace.table(measured, LINKS, LINKS.src > 0, 0.05, 20)
+    every, time = LINKS.src > 0, TimeSection(dt=0.05, duration=1.0)
+    given, _ = traces.measured(Traced(model="trace", file=str(path)), Quantity.AVAILABILITY, LINKS, every, time)
+    trace.table(given, LINKS, every, 0.05, 20)
 
 
 def reads_journal(path):
@@ -132,7 +138,7 @@ def without_bytes(plain):
 def is_taken(reads, path):
     try:
         reads(path)
-    except (ScenarioError, PlanError, TraceError, JournalError, Damaged, UserCodeError) as error:
+    except (ScenarioError, PlanError, MeasuredError, TraceError, JournalError, Damaged, UserCodeError) as error:
         said = one_line(str(error))
         assert 0 < len(said) < 2000
         return False

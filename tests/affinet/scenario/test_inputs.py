@@ -240,6 +240,48 @@ def test_files_of_one_name_do_not_collide(tmp_path):
     assert files == ["inputs/trace.csv", "inputs/trace-2.csv", "inputs/trace-3.csv", "inputs/inputs-2.json"]
 
 
+def test_files_of_formation_path_delays_and_rates_are_copied_and_fly_again(tmp_path):
+    before = planning.make(loading.load("corridor", ["time.dt=0.05", "time.duration=0.5"])).world
+    home = tmp_path / "home"
+    home.mkdir()
+    nodes = [
+        {"id": n, "x": x, "y": y, "leader": n in before.formation.leaders}
+        for n, (x, y) in enumerate(before.formation.nominal.tolist(), start=1)
+    ]
+    links = [{"source": one, "target": other} for one, other in before.formation.edges]
+    (home / "swarm.json").write_text(json.dumps({"nodes": nodes, "links": links}))
+    (home / "path.csv").write_text("time,x,y\n0,0,0\n0.5,1,0\n")
+    rows = [f"0,{src},{dst},0.1,1e5" for src, dst in before.links.index]
+    (home / "links.csv").write_text("time,src,dst,delay,rate\n" + "\n".join(rows) + "\n")
+    (home / "file.toml").write_text("""
+[formation]
+file = "swarm.json"
+[manoeuvre]
+file = "path.csv"
+[time]
+dt = 0.05
+duration = 0.5
+[sensing]
+sigma = 0.1
+[agents]
+estimator = "none"
+law = "static"
+[network]
+profile = "t"
+[network.profiles.t]
+delay = { model = "trace", trace = { file = "links.csv" } }
+rate = { trace = { file = "links.csv" } }
+[record]
+enabled = false
+""")
+    first = fly(planning.make(loading.load(str(home / "file.toml"))), "inprocess", tmp_path / "run", lambda *_: None)
+    shutil.rmtree(home)
+    again = planning.again(tmp_path / "run", (), verdicts=False)
+    assert fly(again, "inprocess", tmp_path / "again", lambda *_: None).digest == first.digest
+    kept = json.loads((tmp_path / "run" / "inputs" / "inputs.json").read_text())["originals"]
+    assert sorted(kept) == ["links.csv", "path.csv", "swarm.json"]
+
+
 def test_an_earlier_run_that_is_the_air_of_another_is_copied(tmp_path):
     lossy = loading.load("corridor", ["time.dt=0.05", "time.duration=0.5", "record.enabled=false"])
     fly(planning.make(lossy), "inprocess", tmp_path / "before", lambda *_: None)

@@ -20,11 +20,6 @@ CUT = {"verb": "cut", "at": 1.0, "until": 2.0, "links": ["2->4"]}  # ticks 20 to
 NO_DELAY = ("network.availability=1.0",)
 
 
-def all_but(*ticks):
-    """A signal that holds in every tick but these."""
-    return lambda run: ~np.isin(np.arange(run.ticks), ticks)
-
-
 def verdict(found):
     of_its_own = found.verdict == "fail" and "because of" not in found.says
     assert not of_its_own or f" s (tick {found.tick})" in found.says  # where one looks first in a recording
@@ -36,17 +31,10 @@ def verdict(found):
     [
         (lambda: checkers.bounded(np.nan), "bounded(nan): level is nan: give a finite number above 0"),
         (lambda: checkers.bounded(np.inf), "bounded(inf): level is inf: give a finite number above 0"),
-        (lambda: checkers.error_below(np.inf), "error_below: level is inf: give a finite number above 0"),
         (lambda: checkers.energy(np.inf), "energy(inf): level is inf: give a finite number above 0"),
         (lambda: checkers.collision_free(-1), "collision_free(-1): distance is -1: give a finite number above 0"),
         (lambda: checkers.converged(1.0, by=-5), "converged(1, by=-5): by is -5: give finite seconds, at least 0"),
         (lambda: checkers.recovers(1.0, within=-1), "recovers(1, within=-1): within is -1: give finite seconds"),
-        (lambda: checkers.always(all_but(), since=np.nan), "always: since is nan: give finite seconds, at least 0"),
-        (lambda: checkers.always(all_but(), until=np.inf), "always: until is inf: give finite seconds, at least 0"),
-        (
-            lambda: checkers.eventually(all_but(), within=-1),
-            "eventually: within is -1: give finite seconds, at least 0",
-        ),
         (lambda: checkers.smooth(2), "smooth(2): share is one of the steps, at least 0 and below 1"),
         (lambda: checkers.smooth(np.nan), "smooth(nan): share is one of the steps, at least 0 and below 1"),
     ],
@@ -58,40 +46,6 @@ def test_a_checker_that_could_say_nothing_is_not_made(made, says):
 
 def with_error(run, error):
     return tampered(run, error=np.broadcast_to(np.asarray(error, dtype=np.float64), (TICKS,)))
-
-
-def test_always_passes_where_the_signal_holds_throughout():
-    assert verdict(checkers.always(all_but())(evidence())) == ("pass", None)
-
-
-def test_always_fails_at_the_first_tick_without_the_signal():
-    assert verdict(checkers.always(all_but(17, 30))(evidence())) == ("fail", 17)
-
-
-@pytest.mark.parametrize(("since", "until", "tick"), [(0.9, None, 30), (0.0, 0.8, None), (0.0, 0.85, 17)])
-def test_always_looks_at_its_span_only_both_ends_included(since, until, tick):
-    found = checkers.always(all_but(17, 30), since=since, until=until)(evidence())
-    assert verdict(found) == ("pass" if tick is None else "fail", tick)
-
-
-def test_always_is_vacuous_when_the_run_ends_before_it_begins():
-    assert verdict(checkers.always(all_but(), since=4.0)(evidence())) == ("vacuous", None)
-
-
-def test_eventually_passes_and_says_from_when():
-    found = checkers.eventually(lambda run: np.arange(run.ticks) >= 17)(evidence())
-    assert verdict(found) == ("pass", None)
-    assert "0.85 s (tick 17)" in found.says
-
-
-@pytest.mark.parametrize(("within", "last"), [(None, 79), (1.0, 30)])
-def test_eventually_fails_at_the_last_tick_it_had(within, last):
-    found = checkers.eventually(lambda run: np.arange(run.ticks) < 10, since=0.5, within=within)(evidence())
-    assert verdict(found) == ("fail", last)
-
-
-def test_eventually_is_vacuous_when_the_run_ends_before_it_begins():
-    assert verdict(checkers.eventually(all_but(), since=4.0)(evidence())) == ("vacuous", None)
 
 
 def test_bounded_passes_for_a_run_that_stays_below_the_level():

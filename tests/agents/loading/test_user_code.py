@@ -21,8 +21,8 @@ from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.testing.swarm import Broken, SwarmRuns
-from affinet.verdicts.checkers import always, eventually
 from affinet.verdicts.checking import Checker
+from affinet.verdicts.temporal import always, eventually
 from netem.processes.user_code import UserCodeError
 from world.books.history import ARRAYS, load
 
@@ -781,11 +781,11 @@ CHECKERS = [
     (Checker("mine", raising), "mine: KeyError: 'no such' ("),
     (Checker("mine", lambda _: None), "mine: must return a CheckResult, got None ("),  # type: ignore[return-value]
     (Checker("mine", raising) & Checker("other", raising), "mine: KeyError: 'no such' ("),
-    (always(raising), "always: KeyError: 'no such' ("),
+    (always(raising), "raising: KeyError: 'no such' ("),
     # Before: AttributeErrors of ours, or a pass for a signal of another length.
-    (always(lambda run: run.error), "always: a signal must be bool (T,) = (20,), got float64 (20,) ("),  # type: ignore[return-value]
-    (always(lambda run: (run.error < 1)[:5]), "always: a signal must be bool (T,) = (20,), got bool (5,) ("),
-    (eventually(lambda _: True, name="once"), "once: a signal must be bool (T,) = (20,), got a bool ("),  # type: ignore[return-value]
+    (always(lambda run: run.error), "<lambda>: a signal must be bool (T,) = (20,), got float64 (20,) ("),  # type: ignore[return-value]
+    (always(lambda run: (run.error < 1)[:5]), "<lambda>: a signal must be bool (T,) = (20,), got bool (5,) ("),
+    (eventually(lambda _: True, name="once"), "<lambda>: a signal must be bool (T,) = (20,), got a bool ("),  # type: ignore[return-value]
 ]
 
 

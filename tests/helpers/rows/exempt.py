@@ -18,7 +18,9 @@ EXEMPT = {
         netem.medium.link_model.LinkModel.draw netem.medium.medium.Verdicted.verdicts
         netem.medium.medium.Medium.begin netem.medium.medium.Medium.judge netem.medium.medium.Medium.deliver
         netem.medium.medium.Medium.bit_draws netem.medium.medium.Medium.bias netem.impairments.rate.Rate.begin
-        netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.jamming.Zone.jammed
+        netem.impairments.rate.Rate.rest netem.impairments.rate.Rate.admit netem.impairments.rate_over_time.RateOverTime.begin
+        netem.impairments.rate_over_time.RateOverTime.seconds netem.impairments.trace.DelayTrace.at
+        netem.impairments.jamming.Zone.jammed
         netem.faults.trigger.Trigger.fires netem.faults.timeline.Timeline.due netem.faults.timeline.Timeline.clock
         netem.medium.by_tick.ImpairmentsByTick.at netem.medium.by_tick.ImpairmentsByTick.draw
         netem.core.draws.DrawnAhead.at netem.medium.relay.Relay.decide netem.medium.relay.Relay.decide_on
@@ -71,10 +73,10 @@ EXEMPT = {
     ONCE: """
         world.brief.DriverBrief.of
         netem.impairments.chain.Chain.stationary netem.impairments.chain.Chain.burst_lengths
-        netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.trace.from_csv
-        netem.impairments.trace.table netem.impairments.trace.MeasuredAvailability.over
+        netem.impairments.chain.ChainLayer.of netem.impairments.netem_string.read netem.impairments.likelihood.log_likelihood
+        netem.impairments.trace.table netem.impairments.trace.Measured.over netem.impairments.likelihood.predicted
         netem.impairments.measured.delays netem.medium.recorded.carried world.formation.manoeuvre.narrowest
-        world.formation.manoeuvre.turned world.physics.disturbance.Disturbance.between
+        world.formation.manoeuvre.turned world.formation.manoeuvre.led_by world.physics.disturbance.Disturbance.between
         world.formation.stress.incidence world.formation.stress.laplacian world.formation.stress.equilibrium
         world.formation.stress.solve world.formation.stress.stabilises world.formation.stress.own
         world.formation.cliques.within world.formation.cliques.cliques world.formation.cliques.affine_basis

@@ -32,7 +32,7 @@ from netem.medium.verdict import Verdict
 
 CHANNELS = ("sense", "input", "theta")
 TICKS = 24
-RATE = frozenset({"rate"})
+RATE = frozenset({"rate", "rate over time"})
 CASES = cases(TICKS, without=RATE)
 FIELDS = ("kind", "due", "mark", "copy_due")
 KIND, DUE, MARK, _ = range(4)

@@ -427,7 +427,7 @@ def test_a_degraded_link_has_the_verdicts_of_the_other_profile_for_as_long_as_it
 
 
 def test_a_link_that_is_degraded_to_its_own_profile_does_not_change_by_a_bit_where_nothing_remembers():
-    by_time = [name for name in IMPAIRMENTS if name not in ("chains", "chains of one class", "rate")]
+    by_time = [name for name in IMPAIRMENTS if name not in ("chains", "chains of one class", "rate", "rate over time")]
     own, position = mixture(3, by_time, LINKS, CHANNELS, coupled=False), roaming(3, 5, TICKS)
     flights = [whole(fly(medium(own, faults, degraded=[own]), always(TICKS), position)) for faults in ([], [DEGRADED])]
     np.testing.assert_array_equal(*flights)

@@ -1,0 +1,109 @@
+"""`affinet score`: what an estimator or a law is worth over a network, against the others."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import progress as bar
+from rich.console import Console
+
+from affinet.cli.progress import Bar
+from affinet.cli.show import plain
+from affinet.cli.status import PASS
+from affinet.planning.plan import PlanError
+from affinet.runtimes.interruption import ended_by_signals
+from affinet.scenario import files
+from affinet.scenario.words import one_line
+from affinet.scenario.wrong import ScenarioError
+from affinet.score import card as cards
+from affinet.score import flying, judging, measures, page, record, scoring
+from affinet.score.flying import Cell
+from affinet.score.scoring import Kept, Piece
+from affinet.studies import identity, pool
+from affinet.studies.identity import Module
+
+PAGE = "score.html"
+
+
+def fly_and_report(parsed: argparse.Namespace) -> int:
+    """Fly a score, and leave its page and its file.
+
+    Raises
+    ------
+    ScenarioError, UserCodeError, OSError
+        When it cannot fly, or its directory is another's.
+    """
+    card = cards.load(parsed.card)
+    card = card.quickly() if parsed.quick else card
+    key = "agents.law" if parsed.law else "agents.estimator"
+    who = scoring.entrants(card, parsed.name, parsed.against, laws=parsed.law)
+    folder = files.working_directory()
+    todo = list(scoring.pieces(card, who, key, folder))
+    flies = _flies(todo, parsed.name)
+    out = _directory(parsed)
+    pieces = out / scoring.PIECES
+    pieces.mkdir(parents=True, exist_ok=True)
+    kept = Kept(pieces, {name: identity.digest(sorted(of.items())) for name, of in flies.items()})
+    with ended_by_signals(), _bar(parsed.name, len(todo)) as shown:
+        found = scoring.fly(
+            todo, pool.on_this_machine(parsed.jobs), kept, lambda done: shown.see(done, f"{done}/{len(todo)} pieces")
+        )
+    if kept.there:
+        print(one_line(f"{kept.there} of {len(todo)} pieces were there"), file=sys.stderr)  # noqa: T201
+    raw = scoring.together(card, who, todo, found)
+    score = judging.judge(raw)
+    said = record.plain(card, raw, score, flies[parsed.name], quick=parsed.quick)
+    record.write(out, said)
+    (out / PAGE).write_text(page.page(card, raw, score, quick=parsed.quick), encoding="utf-8")
+    if parsed.json:
+        print(json.dumps(said, allow_nan=False))  # noqa: T201
+    else:
+        console = Console()
+        for sentence in score.words:
+            console.print(plain(f"- {one_line(sentence)}"), soft_wrap=True)
+        console.print(plain(f"{out / PAGE} has all of it, {out / record.FILE} for programs"), soft_wrap=True)
+    return PASS
+
+
+def _bar(name: str, pieces: int) -> Bar:
+    return Bar(name, pieces, bar.BarColumn(), bar.TextColumn("{task.fields[says]}"), says="starting")
+
+
+def _directory(parsed: argparse.Namespace) -> Path:
+    """Where it goes on, or begins: pieces that are there, of the same code, do not fly again."""
+    out: Path = parsed.out or Path("scores") / (parsed.name.replace(":", "-") + ("-quick" if parsed.quick else ""))
+    file = out / record.FILE
+    if file.exists():
+        said = json.loads(file.read_text(encoding="utf-8"))
+        if (said["scored"], said["size"]) != (parsed.name, "quick" if parsed.quick else "full"):
+            raise FileExistsError(
+                f"{str(out)!r} holds the score of {said['scored']}; name another directory with --out"
+            )
+    return out
+
+
+def _flies(todo: Sequence[Piece], name: str) -> dict[str, dict[str, str]]:
+    """Of whose code the bits of each entrant come.
+
+    Raises
+    ------
+    ScenarioError
+        When the one that is scored suits no task, or a rival is none.
+    """
+    code = identity.digest([Path(str(module.__file__)).read_bytes() for module in (flying, measures)])
+    own, why = dict[str, set[Module]](), list[str]()
+    for piece in todo:
+        if piece.kind == "timed" and isinstance(piece.given, Cell):
+            of = own.setdefault(piece.entrant, set())
+            try:
+                of.update(identity.own_modules(piece.given.plans((1,))))
+            except (ScenarioError, PlanError) as error:
+                why += [str(error)] * (piece.entrant == name)
+    tasks = sum(piece.kind == "timed" and piece.entrant == name for piece in todo)
+    if len(why) == tasks:
+        raise ScenarioError(f"{name} suits none of the tasks: {why[0]}")
+    return {who: {**identity.here(sorted(of)), "the score": code} for who, of in own.items()}

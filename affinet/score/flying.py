@@ -1,0 +1,158 @@
+"""The flights of a score, piece by piece: each can be done by another process, and what comes of it is plain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from affinet.planning import making
+from affinet.planning.plan import Plan, PlanError
+from affinet.planning.programs import refuse_in_process
+from affinet.runtimes.rehearsing import rehearse, rehearse_all
+from affinet.scenario import loading
+from affinet.scenario.wrong import ScenarioError
+from affinet.score import measures
+from affinet.score.card import Task, Worsening
+from affinet.score.measures import Measured
+
+_STEPS = 6  # halvings of the range in which a break-down point lies
+_TIMED = 5  # flights whose time is taken
+
+
+class Entrant(NamedTuple):
+    """An estimator, or a law, by name, or as "module:Class" of a folder."""
+
+    key: str
+    name: str
+    folder: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An entrant in a task, through an air, with these seeds.
+
+    Parameters
+    ----------
+    task
+        What is flown.
+    air
+        Its name.
+    set
+        Overrides that make the air.
+    entrant
+        Who flies.
+    seeds
+        Of the draws.
+    folder
+        Which the scenario is relative to.
+    """
+
+    task: Task
+    air: str
+    set: tuple[str, ...]
+    entrant: Entrant
+    seeds: tuple[int, ...]
+    folder: str
+
+    def plans(self, seeds: Sequence[int], more: Sequence[str] = ()) -> list[Plan]:
+        """Of its runs.
+
+        Raises
+        ------
+        ScenarioError, PlanError
+            When the entrant does not suit the task.
+        """
+        own = f'{self.entrant.key}="{self.entrant.name}"'
+        name = self.task.scenario
+        scenario = str(Path(self.folder) / name) if name.endswith(".toml") else name
+        overrides = (*self.task.set, *self.set, *more, own, "record.enabled=false")
+        plans = [
+            making.make(loading.load(scenario, (*overrides, f"seed={seed}"), Path(self.entrant.folder)))
+            for seed in seeds
+        ]
+        for plan in plans[:1]:
+            refuse_in_process(plan)
+        return plans
+
+
+@dataclass(frozen=True)
+class Descent:
+    """An entrant in a task, for which something is made worse until each swarm is lost."""
+
+    cell: Cell
+    worsening: Worsening
+
+
+class Flown(NamedTuple):
+    """What came of a cell: of each run what is measured; or why the entrant does not suit the task."""
+
+    runs: dict[str, list[float]]
+    unsuited: str | None
+
+
+class Timed(NamedTuple):
+    """Of an entrant in a task: time of the processor in a tick, in seconds, and what each agent says in a second."""
+
+    tick_s: float
+    messages: float
+    bytes: float
+
+
+def cell(given: Cell) -> Flown:
+    """Fly a cell."""
+    try:
+        plans = given.plans(given.seeds)
+    except (ScenarioError, PlanError) as error:
+        return Flown({}, str(error))
+    found = [measures.of(run, given.task) for run in rehearse_all(plans)]
+    return Flown({name: [float(getattr(one, name)) for one in found] for name in Measured._fields}, None)
+
+
+def descent(given: Descent) -> list[float]:
+    """How bad it has to be for the swarm of each seed to be lost, by bisection; infinite where it is not lost at the worst.
+
+    Nothing of an entrant that does not suit the task.
+
+    Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
+    """
+    try:
+        given.cell.plans(given.cell.seeds[:1], given.worsening.at(given.worsening.most))
+    except (ScenarioError, PlanError):
+        return []  # the cells of the same task say why
+    seeds, worse = given.cell.seeds, given.worsening
+    low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
+    survived = ~_lost(given, seeds, high.tolist())
+    for _ in range(_STEPS):
+        middle = worse.between(low, high)
+        gone = _lost(given, seeds, middle.tolist())
+        low, high = np.where(gone, low, middle), np.where(gone, middle, high)
+    return [float(one) for one in np.where(survived, np.inf, worse.between(low, high))]
+
+
+def timed(given: Cell) -> Timed | None:
+    """Take the time of flights of one run of a cell; others on the machine make it longer, so the median counts.
+
+    None of an entrant that does not suit the task.
+    """
+    try:
+        (plan,) = given.plans(given.seeds[:1])
+    except (ScenarioError, PlanError):
+        return None
+    rehearse(plan)  # kernels are compiled
+    took = [rehearse(plan).outcome.wall_s for _ in range(_TIMED)]
+    said = measures.load_of(plan)
+    return Timed(median(took) / plan.world.ticks, said.messages, said.bytes)
+
+
+def _lost(given: Descent, seeds: Sequence[int], worse: Sequence[float]) -> Any:
+    plans = [
+        plan
+        for seed, bad in zip(seeds, worse, strict=True)
+        for plan in given.cell.plans([seed], given.worsening.at(bad))
+    ]
+    return np.array([measures.of(run, given.cell.task).lost for run in rehearse_all(plans)])

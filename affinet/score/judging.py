@@ -1,0 +1,229 @@
+"""What a score says of an entrant against each of the others, how sure it is, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from affinet.score.card import Task, Worsening
+from affinet.score.flying import Flown, Timed
+from analysis.claims import intervals, paired
+from analysis.claims.intervals import Interval
+from analysis.claims.paired import Comparison
+from analysis.models.arrays import Array
+
+CONFIDENCE = 0.95
+MATTERS = 1.1  # a factor of errors up to which one is as good as another
+_ASTRAY = 10.0  # times what loses a swarm: beyond that one error is as bad as another
+_TELLS_THE_TRUTH = (1 / 1.1, 1.1)  # of a normalised estimation error squared
+
+
+@dataclass(frozen=True)
+class Raw:
+    """All that was flown for a score.
+
+    Parameters
+    ----------
+    tasks, airs, worsenings
+        What was flown, through what, and what was made worse: names of airs.
+    entrants
+        Names, the one that is scored first.
+    cells, noisier
+        Of each task, air and entrant what came of it; and of each task and entrant with worse sensors, in the first air.
+    points
+        Of each task, worsening and entrant how bad it had to be for the swarm of each seed to be lost.
+    times
+        Of each task and entrant.
+    """
+
+    tasks: Sequence[Task]
+    airs: Sequence[str]
+    worsenings: Sequence[Worsening]
+    entrants: Sequence[str]
+    cells: Mapping[tuple[str, str, str], Flown]
+    noisier: Mapping[tuple[str, str], Flown]
+    points: Mapping[tuple[str, str, str], Sequence[float]]
+    times: Mapping[tuple[str, str], Timed]
+
+    @property
+    def scored(self) -> str:
+        """Who is scored."""
+        return self.entrants[0]
+
+    def flies(self, task: str, entrant: str) -> bool:
+        """Whether an entrant suits a task."""
+        return self.cells[task, self.airs[0], entrant].unsuited is None
+
+    def runs(self, task: str, air: str, entrant: str, what: str) -> Array:
+        """What was measured of each run, shape (R,)."""
+        return np.array(self.cells[task, air, entrant].runs[what])
+
+
+class Compared(NamedTuple):
+    """The one that is scored against a rival, in a task and an air: by which factor its errors are the other's."""
+
+    task: str
+    air: str
+    rival: str
+    factor: Interval
+    decision: Comparison
+
+
+class BreakDown(NamedTuple):
+    """How bad it has to be for half of the swarms to be lost, and how that compares for the one that is scored."""
+
+    task: str
+    worsening: str
+    entrant: str
+    median: Interval
+    decision: Comparison | None
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a score says.
+
+    Parameters
+    ----------
+    compared
+        With each rival, in each task and air.
+    break_downs
+        Of every entrant.
+    words
+        The verdict, sentence by sentence.
+    """
+
+    compared: tuple[Compared, ...]
+    break_downs: tuple[BreakDown, ...]
+    words: tuple[str, ...]
+
+
+def judge(raw: Raw) -> Score:
+    """Judge what was flown."""
+    compared, break_downs = tuple(_compared(raw)), tuple(_break_downs(raw))
+    words = [*_unsuited(raw), *_against(raw, compared), *_points(raw, break_downs), *_honest(raw), *_cost(raw)]
+    return Score(compared, break_downs, tuple(words))
+
+
+def _compared(raw: Raw) -> Iterator[Compared]:
+    pairs = [
+        (task, air, rival)
+        for task in raw.tasks
+        if raw.flies(task.name, raw.scored)
+        for air in raw.airs
+        for rival in raw.entrants[1:]
+        if raw.flies(task.name, rival)
+    ]
+    for task, air, rival in pairs:
+        one, other = (raw.runs(task.name, air, who, "error") for who in (raw.scored, rival))
+        factor = paired.ratio(one, other, _ASTRAY * task.lost, len(pairs), CONFIDENCE)
+        yield Compared(task.name, air, rival, factor, paired.compared(factor, MATTERS))
+
+
+def _break_downs(raw: Raw) -> Iterator[BreakDown]:
+    comparisons = sum(who != raw.scored for _, _, who in raw.points)
+    for (task, worsening, who), points in raw.points.items():
+        own = raw.points.get((task, worsening, raw.scored))
+        decision = (
+            None
+            if who == raw.scored or own is None
+            else paired.larger(np.array(own), np.array(points), comparisons, CONFIDENCE)
+        )
+        yield BreakDown(task, worsening, who, paired.median(np.array(points), CONFIDENCE), decision)
+
+
+def _unsuited(raw: Raw) -> Iterator[str]:
+    for task in raw.tasks:
+        if not raw.flies(task.name, raw.scored):
+            yield f"{task.name}: {raw.scored} does not suit it: {raw.cells[task.name, raw.airs[0], raw.scored].unsuited}"
+
+
+def _against(raw: Raw, compared: Sequence[Compared]) -> Iterator[str]:
+    for task in raw.tasks:
+        for rival in raw.entrants[1:]:
+            told = [one for one in compared if (one.task, one.rival) == (task.name, rival)]
+            if not told:
+                continue
+            parts = []
+            for decision in Comparison:
+                airs = [one.air for one in told if one.decision is decision]
+                if airs:
+                    parts.append(f"{decision} in {len(airs)} of {len(told)} airs ({', '.join(airs)})")
+            yield f"{task.name}, against {rival}: {'; '.join(parts)}"
+
+
+def _points(raw: Raw, break_downs: Sequence[BreakDown]) -> Iterator[str]:
+    of = {one.name: one for one in raw.worsenings}
+    for own in break_downs:
+        if own.entrant != raw.scored:
+            continue
+        worse = of[own.worsening]
+        others = [
+            f"with {one.entrant} at {point(one.median, worse.most)} ({one.decision})"
+            for one in break_downs
+            if (one.task, one.worsening) == (own.task, own.worsening) and one.entrant != raw.scored
+        ]
+        unit = f" {worse.unit}".rstrip()
+        against = f"; {', '.join(others)}" if others else ""
+        yield f"{own.task}, {own.worsening}: half of the swarms are lost at {point(own.median, worse.most)}{unit}{against}"
+
+
+def point(found: Interval, most: float) -> str:
+    """A break-down point with its interval, in words, where it was looked for up to `most`."""
+    beyond = f"beyond {most:g}"
+    if np.isinf(found.found):
+        return beyond
+    low = "0" if np.isinf(found.low) else f"{found.low:.3g}"
+    return f"{found.found:.3g} ({low} to {beyond if np.isinf(found.high) else f'{found.high:.3g}'})"
+
+
+def _honest(raw: Raw) -> Iterator[str]:
+    flown = [task for task in raw.tasks if raw.flies(task.name, raw.scored)]
+    tests = max(1, len(flown) * len(raw.airs))
+    for task in flown:
+        found = {
+            air: intervals.mean(raw.runs(task.name, air, raw.scored, "nees"), tests=tests, confidence=CONFIDENCE)
+            for air in raw.airs
+        }
+        sure = {air: one for air, one in found.items() if one.low > _TELLS_THE_TRUTH[1]}
+        if sure:
+            most = max(sure.items(), key=lambda item: item[1].found)
+            yield (
+                f"{task.name}: overconfident in {len(sure)} of {len(raw.airs)} airs ({', '.join(sure)}): squared errors are "
+                f"{most[1].found:.3g} times what its covariances say in {most[0]}"
+            )
+        if (task.name, raw.scored) in raw.noisier:
+            yield from _blind_to_sensors(raw, task)
+
+
+def _blind_to_sensors(raw: Raw, task: Task) -> Iterator[str]:
+    """Whoever measures estimates worse with worse sensors; who does not knows what nobody told it."""
+    worse = np.array(raw.noisier[task.name, raw.scored].runs["estimation"])
+    usual = raw.runs(task.name, raw.airs[0], raw.scored, "estimation")
+    if np.isnan(worse).any() or np.isnan(usual).any():
+        return
+    factor = paired.ratio(worse, usual, np.inf, len(raw.tasks), CONFIDENCE)
+    if factor.high < MATTERS:
+        yield (
+            f"{task.name}: its estimates do not depend on its sensors: with {', '.join(task.noisier)} their errors are "
+            f"{factor} times what they were; it knows what it has not measured"
+        )
+
+
+def _cost(raw: Raw) -> Iterator[str]:
+    for (task, who), own in raw.times.items():
+        if who != raw.scored:
+            continue
+        others = [
+            f"with {rival} {raw.times[task, rival].tick_s * 1e3:.2g} ms"
+            for rival in raw.entrants[1:]
+            if (task, rival) in raw.times
+        ]
+        against = f" ({', '.join(others)})" if others else ""
+        yield (
+            f"{task}: a tick of the whole swarm takes {own.tick_s * 1e3:.2g} ms of this machine{against}; each agent says "
+            f"{own.messages:.4g} messages, {own.bytes:.4g} bytes a second"
+        )

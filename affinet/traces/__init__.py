@@ -1,0 +1,1 @@
+"""Link data as people have them: what each format says, read with its meaning."""

@@ -1,0 +1,75 @@
+"""Movements of BonnMotion: a line for each node, `t x y t x y ...`; in space, `t x y z ...`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from affinet.traces.fields import numbers_only
+from affinet.traces.link_data import LinkData, Waypoints
+from analysis.models.arrays import Array
+from netem.impairments.measured import Lines, MeasuredError, shown
+
+
+def recognised(lines: Lines) -> bool:
+    """Whether it is such a file."""
+    rows = [numbers_only(text) for text in lines.texts[:50]]
+    return bool(rows) and all(row is not None and row for row in rows) and bool(_widths(lines))
+
+
+def read(lines: Lines) -> LinkData:
+    """The ways of the nodes: straight from place to place, each reached at its time.
+
+    Raises
+    ------
+    MeasuredError
+        When they are none.
+    """
+    if not lines.texts:
+        raise MeasuredError("line 1: no node in it: a line of times and places is due for each")
+    for line, text in zip(*lines, strict=True):
+        values = numbers_only(text)
+        if values is None or not np.isfinite(values).all():
+            raise MeasuredError(
+                f"line {line}: only numbers are due, t x y or t x y z, again and again; got {shown(text)}"
+            )
+        if len(values) % 3 and len(values) % 4:
+            raise MeasuredError(f"line {line}: {len(values)} numbers are no whole triples (t x y), nor t x y z")
+    widths = _widths(lines)
+    if not widths:
+        raise MeasuredError(_why_none(lines))
+    paths = [_path(text, widths[0]) for text in lines.texts]
+    in_space = "taken as t x y" if widths[0] == 3 else "taken as t x y z"
+    return LinkData(
+        nodes=tuple(str(number) for number in range(1, len(paths) + 1)),
+        ends=max(float(path.time[-1]) for path in paths),
+        paths=paths,
+        everybody=True,
+        assumed=(f"a node is called by the number of its line, from 1; a line is {in_space}, again and again",),
+    )
+
+
+def _table(text: str, width: int) -> Array | None:
+    values = numbers_only(text) or []
+    return None if len(values) % width else np.array(values).reshape(-1, width)
+
+
+def _widths(lines: Lines) -> list[int]:
+    """How many numbers a place has, 3 or 4, by which times go up on every line."""
+    return [width for width in (3, 4) if all(_goes_up(_table(text, width)) for text in lines.texts)]
+
+
+def _goes_up(table: Array | None) -> bool:
+    return table is not None and len(table) > 0 and table[0, 0] >= 0.0 and bool((np.diff(table[:, 0]) >= 0.0).all())
+
+
+def _why_none(lines: Lines) -> str:
+    for line, text in zip(*lines, strict=True):
+        if not any(_goes_up(_table(text, width)) for width in (3, 4)):
+            return f"line {line}: its times do not go up, neither as t x y nor as t x y z"
+    return "some lines are t x y and others t x y z: make them alike"
+
+
+def _path(text: str, width: int) -> Waypoints:
+    table = _table(text, width)
+    assert table is not None  # as it was looked at
+    return Waypoints(table[:, 0], table[:, 1:])
