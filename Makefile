@@ -2,6 +2,7 @@
 
 UV := UV_PYTHON_DOWNLOADS=never .venv/bin/uv
 BIN := .venv/bin
+PYTEST := $(BIN)/pytest --timeout 400 # a busy machine is no failure; what hangs is found all the same
 FLIES := .venv/.flies
 READY := .venv/.ready
 
@@ -16,10 +17,10 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | awk -F '  ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
 test: lint types imports ## everything that must hold, in minutes
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(PYTEST) -n 2 --dist loadgroup
 
 test-room: $(READY) ## a room's own tests, without flights over processes: make test-room ROOM=netem/medium
-	$(BIN)/pytest -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
+	$(PYTEST) -n 2 -m "not slow and not xdist_group" tests/$(ROOM)
 
 test-all: lint types imports test-browser ## and the slow proofs
 	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow" --timeout 1800
@@ -36,6 +37,7 @@ test-browser: $(READY) ## the web viewer in headless Chromium, in an environment
 
 docs: $(READY) ## the site of docs/, into site/: open site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "the site: file://$(CURDIR)/site/index.html"
 
 docs-serve: $(READY) ## the site in a browser, built again whenever a page is written
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs serve
@@ -64,19 +66,20 @@ bench: $(READY) ## speed against peers, and against the run kept last; fails whe
 	$(UV) sync --locked --quiet --inexact --group bench --compile-bytecode
 	$(BIN)/python bench/all.py
 
+# What somebody installed beside it, a project of their own, stays: --inexact.
 $(READY): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv
 	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
-	$(UV) sync --locked --quiet --compile-bytecode
+	$(UV) sync --locked --quiet --inexact --compile-bytecode
 	$(BIN)/python -m compileall -q affinet agents analysis netem world
 	$(BIN)/python packaging/compiled.py
 	touch $@ $(FLIES)
 
-# All that a flight needs, and no more: it is there in seconds, and kernels are compiled as they are called.
+# All that flights and the pages need, and no more: it is there in seconds, and kernels are compiled as they are called.
 $(FLIES): pyproject.toml uv.lock
 	test -x $(BIN)/python || python3 -m venv .venv
 	test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet uv
-	$(UV) sync --locked --quiet --no-dev --inexact
+	$(UV) sync --locked --quiet --no-dev --group pages --inexact
 	touch $@
 
 clean: ## without environments and runs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,6 +20,8 @@ _OF_THE_ROOT = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md"}
 _DECISIONS = "decisions/index.md"
 FILES = "files"  # where copies lie of what is linked to and is not in docs/
 _LINK = re.compile(r"(?<=\]\()(?!\w+:)[^)\s#]+")
+_HREF = re.compile(r'href="((?!\w+:)[^"#][^"]*)"')
+_LOG = logging.getLogger("mkdocs.hooks.building")  # a warning of which ends a strict build
 _GROUP = re.compile(r"^\| (.*) \| \|\n\|---\|---\|\n((?:\| .*\n)+)", re.MULTILINE)
 _REFERENCE = re.compile(r"\[(.*?)\]\(.*?\)")
 
@@ -42,6 +45,23 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         copied = File.generated(config, f"{FILES}/{linked.relative_to(root)}", abs_src_path=str(linked))
         files.append(copied)
     return files
+
+
+def on_page_content(html: str, page: Page, files: Files, **_: Any) -> str:
+    """Have links of notebooks lead to pages, as those of pages do; mkdocs rewrites and checks the latter alone."""
+    if not page.file.src_uri.endswith(".ipynb"):
+        return html
+    folder = Path(page.file.src_uri).parent
+
+    def led(link: re.Match[str]) -> str:
+        name, mark, anchor = link[1].partition("#")
+        target = files.get_file_from_path(os.path.normpath(folder / name))
+        if target is None:
+            _LOG.warning("%s contains a link '%s', but the target is not found", page.file.src_uri, name)
+            return link[0]
+        return f'href="{target.url_relative_to(page.file)}{mark}{anchor}"'
+
+    return _HREF.sub(led, html)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:

@@ -2,6 +2,7 @@
 
 python docs/claims_page.py                      write the pages
 python docs/claims_page.py NAME=DIRECTORY ...   take in full studies first, their verdicts and figures
+python docs/claims_page.py --sweeps             draw the figures of sweeps first, from the means that were kept
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from textwrap import fill
 
 from paper_claims import DOCS, OUTCOMES, PAPERS, Found, PaperClaim, outcome, paper_claims, verdicts
 
-from affinet.studies import record
+from affinet.studies import record, report
 from affinet.studies import study as studies
 from affinet.studies.batch import REPORT
 from affinet.studies.record import CaseMean, JudgedClaim, StudyRecord
@@ -48,17 +49,25 @@ def _overview(rows: Sequence[PaperClaim], named: dict[str, Study]) -> Sequence[s
     return [
         "# What becomes of the papers' claims",
         "",
-        "`python docs/claims_page.py` writes this page, and one for each paper, from `docs/claims.toml` and from the",
-        "`claims.json` of full studies, which are in `affinet/shipped/results/`. Whoever wants a verdict again flies the",
-        "study that is beside it: as many runs of the same draws, and the same bits. Intervals are of 99 % confidence; a",
-        "claim holds where all of its interval is inside what is asked, and is undecided where only a part is",
-        "([decision 22](decisions/0022-claims-hold-fail-or-are-undecided.md)). What is proved in a paper and computed",
-        "exactly is judged by tests, against the formulas, other implementations, or the definition.",
-        "",
-        *_tally(rows, named),
+        f"The [five papers](papers/index.md) whose algorithms affinet has make {len(rows)} claims: which estimator errs less,",
+        "by how much, under which losses. They were flown again, or computed; each holds, does not hold, or is undecided,",
+        "and a few are not judged, with the reason beside them:",
         "",
         *(f"- [Paper {paper}](claims/{paper}.md): {title}" for paper, title in PAPERS.items()),
         f"- [Studies of our own](claims/{OWN}.md)",
+        "",
+        *_tally(rows, named),
+        "",
+        "## How they are judged",
+        "",
+        "By many runs with seeds of their own, and intervals of 99 % confidence: a claim holds where all of its interval is",
+        "inside what is asked, and is undecided where only a part is",
+        "([decision 22](decisions/0022-claims-hold-fail-or-are-undecided.md)). What is proved in a paper and computed",
+        "exactly is judged by tests, against the formulas, other implementations, or the definition. Whoever wants a verdict",
+        "again flies the study that is beside it: as many runs of the same draws, and the same bits.",
+        "",
+        "`python docs/claims_page.py` writes this page, and one for each paper, from `docs/claims.toml` and from the",
+        "`claims.json` of full studies, which are in `affinet/shipped/results/`.",
     ]
 
 
@@ -165,10 +174,16 @@ def _row(one: PaperClaim, named: dict[str, Study]) -> str:
         by.append(f"`affinet study {one.study}`" + _more(one.study, one.paper))
     if one.tests:
         said.append("holds, by tests")
-        by += [f"`{test.partition('::')[2]}`" for test in one.tests]
+        by.append(_folded([test.partition("::")[2] for test in one.tests]))
     if one.why:
         said.append(one.why if said else f"not judged: {one.why}")
     return f"| {one.where} | {one.says} | {'<br>'.join(said)} | {'<br>'.join(by)} |"
+
+
+def _folded(tests: Sequence[str]) -> str:
+    """How many tests there are, which opens to their names."""
+    many = f"{len(tests)} test{'s' * (len(tests) > 1)}"
+    return f"<details><summary>{many}</summary>{'<br>'.join(f'`{test}`' for test in tests)}</details>"
 
 
 def _summed_up(says: str, cases: Sequence[Found]) -> Iterator[str]:
@@ -266,8 +281,19 @@ def take(name: str, directory: Path) -> None:
             shutil.copy(figure, target)
 
 
+def draw_sweeps() -> None:
+    """Draw the figures of sweeps as the studies do, without flying."""
+    for name, study in ((name, studies.load(name)) for name in studies.shipped()):
+        full = record.full_study(name)
+        if full and study.along is not None and name != "bursts":  # whose picture draw_bursts.py draws
+            means = [case for case in full.cases if case.quantity == study.quantity]
+            report.draw_means(PICTURES / f"{name}.png", study, means)
+
+
 if __name__ == "__main__":
-    for given in sys.argv[1:]:
+    if sys.argv[1:] == ["--sweeps"]:
+        draw_sweeps()
+    for given in (one for one in sys.argv[1:] if one != "--sweeps"):
         study_name, _, folder = given.partition("=")
         take(study_name, Path(folder))
     for file, text in pages().items():

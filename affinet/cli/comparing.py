@@ -6,6 +6,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -14,12 +15,14 @@ from affinet.cli.options.flown import OVERLAID
 from affinet.cli.show import plain
 from affinet.runtimes import directories
 from affinet.scenario.names import apart
-from affinet.scenario.words import one_line
+from affinet.scenario.words import one_line, shown
 from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import beside, measures, reading
 from affinet.verdicts.beside import Row
 from affinet.verdicts.evidence import Evidence
 from netem.processes.system_errors import about
+
+_DIGITS = 12  # by which a digest is known
 
 
 def compare(parsed: argparse.Namespace) -> None:
@@ -52,10 +55,30 @@ def compare(parsed: argparse.Namespace) -> None:
 
 def _print(names: Sequence[str], runs: Sequence[Evidence], partings: dict[str, str]) -> None:
     console = Console()
-    for title, rows in (("settings that differ", beside.settings(runs)), ("figures", beside.figures(runs))):
+    for title, rows in (
+        ("settings that differ", _shown(beside.settings(runs))),
+        ("figures", _written(beside.figures(runs))),
+    ):
         console.print(_table(title, names, rows) if rows else f"{title}: none")
     for name, parting in partings.items():
         console.print(plain(f"{name}: {parting}"), soft_wrap=True)
+
+
+def _shown(settings: Sequence[Row]) -> list[Row]:
+    return [(name, tuple("-" if value is None else shown(value) for value in values)) for name, values in settings]
+
+
+def _written(figures: Sequence[Row]) -> list[Row]:
+    """As people read them: `--json` has all of them."""
+    return [(name, tuple(_figure(name, value) for value in values)) for name, values in figures]
+
+
+def _figure(name: str, value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)[:_DIGITS] if name == "digest" else str(value)
 
 
 def _table(title: str, names: Sequence[str], rows: Sequence[Row]) -> Table:
@@ -63,7 +86,7 @@ def _table(title: str, names: Sequence[str], rows: Sequence[Row]) -> Table:
     for name in names:
         table.add_column(plain(name))
     for name, values in rows:
-        table.add_row(plain(name), *map(plain, values))
+        table.add_row(plain(name), *(plain(value) for value in values))
     return table
 
 

@@ -103,6 +103,7 @@ def _print(name: str, found: Sequence[Setting], runs: int) -> None:
         means.Row(one.labels, one.mean.found, one.mean.low, one.mean.high, _verdicts(one.verdicts)) for one in found
     ]
     means.show(console, rows, unit, intervals=runs > 1)
+    means.warn(console, found[0].quantity, rows)
     others = [(setting.labels, setting.first) for setting in found if setting.first is not None]
     for labels, first in others[:_TOLD]:
         where = ", ".join([f"seed {first.seed}", *(f"{key}={value}" for key, value in labels.items())])

@@ -12,9 +12,11 @@ from rich.table import Table
 from affinet.cli.show import plain
 from affinet.scenario.words import one_line
 from affinet.studies import record
-from affinet.studies.quantities import said
+from affinet.studies.batch import REPORT
+from affinet.studies.quantities import Quantity, said
 from affinet.studies.record import StudyRecord
 
+_SIGNED = {"fall"}  # quantities that may be negative
 _MOST_ROWS = 24  # of a study, which has them all in a file
 _WITHOUT_END = 10_000  # characters
 
@@ -49,6 +51,16 @@ def show(console: Console, rows: Sequence[Row], unit: str, *, intervals: bool) -
     console.print(table)
 
 
+def warn(console: Console, quantity: Quantity, rows: Sequence[Row]) -> None:
+    """Say what to think of a mean whose interval has numbers that the quantity cannot have."""
+    scattered = [row for row in rows if row.found is not None and row.low is not None and row.low < 0.0 <= row.found]
+    if scattered and quantity not in _SIGNED and not quantity.startswith(REPORT):
+        says = (
+            "of an interval that reaches below 0 few runs make the mean: fly more, or take the median (docs/studies.md)"
+        )
+        console.print(plain(says), soft_wrap=True)
+
+
 def of_study(judged: StudyRecord, out: Path) -> None:
     """Print what the cases of a study came to in what it draws, and say where the others are."""
     cases = [case for case in judged.cases if case.quantity == judged.cases[0].quantity]
@@ -58,6 +70,7 @@ def of_study(judged: StudyRecord, out: Path) -> None:
     says = f"{said(cases[0].quantity)[0]}, mean over {judged.runs} runs of each case"
     console.print(plain(f"{says}; {100 * judged.confidence:g} % interval by Student's t"), soft_wrap=True)
     show(console, rows, cases[0].unit, intervals=judged.runs > 1)
+    warn(console, cases[0].quantity, rows)
     beyond = [f"{len(cases) - len(rows)} cases more"] if len(cases) > len(rows) else []
     if beyond or others:
         console.print(plain(one_line(f"{out / record.FILE} has {', '.join([*beyond, *others])}")), soft_wrap=True)

@@ -16,6 +16,7 @@ from rich.text import Text
 from affinet.cli.progress import Bar, left
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
+from affinet.verdicts import told
 from affinet.verdicts.outcome import Outcome
 from affinet.verdicts.refused import by_sender
 from affinet.verdicts.timing import DelayError, Lateness, Timing
@@ -242,6 +243,7 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         *([("lost by the transport", f"{lost}, and asked for again")] if (lost := messages["transport_lost"]) else []),
         *((f"wrong, of {who}", what) for who, what in by_sender(outcome.refused).items()),
         *(("fault", str(bite)) for bite in outcome.faults),
+        *(("jammed zone", str(jam)) for jam in outcome.zones),
         *([] if outcome.timing is None else _timing(outcome.timing)),
         ("digest", str(outcome.digest)),
         ("directory", outcome.out),
@@ -250,6 +252,8 @@ def outcome(outcome: Outcome, plan: Plan) -> None:
         table.add_row(name, plain(value))
     console = Console()
     console.print(table)
+    if outcome.verdict.startswith("pass"):
+        console.print(plain(told.OF_PASS), style="dim")
     for reason in outcome.reasons:
         console.print(plain(reason), soft_wrap=True)
 

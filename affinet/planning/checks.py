@@ -160,7 +160,8 @@ def timeline(faults: Sequence[Fault], ticks: int, dt: float) -> list[Finding]:
         Finding(
             "timeline",
             "note",
-            f"'{fault.describe()}' at {fault.start * dt:g} s lies beyond the end of the run",
+            f"'{fault.describe()}' starts at {fault.start * dt:g} s, and the run ends at {ticks * dt:g} s: it will touch "
+            "nothing, and the run will be vacuous",
         )
         for fault in faults
         if fault.trigger is None and fault.start >= ticks

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import builtins
 import json
 import keyword
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.util import find_spec
@@ -22,6 +23,9 @@ _SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     schema.SCENARIO_FILE: schema.scenario,
     schema.STUDY_FILE: schema.study,
 }
+_TEMPLATE_OF = {"Filter": "estimator.py.template", "Law": "law.py.template"}
+_PYTEST = "python -m pytest"  # that of this environment, whichever is first on the path
+_INSTALL_PYTEST = "python -m pip install pytest"
 _SHIPPED = {"estimator": "ga-rkf", "law": "varying-velocity"}
 
 
@@ -56,7 +60,7 @@ def _algorithm(key: str, word: str) -> Scaffold:
         {"$module.py": f"{key}.py", "$module.toml": "scenario.toml", "test_$module.py": "test_flown.py"},
         _SHIPPED | {key: "$module:$Class", word: "$Class"},
         (schema.SCENARIO_FILE,),
-        ("pytest test_$module.py", "affinet run $module.toml"),
+        (f"{_PYTEST} test_$module.py", "affinet run $module.toml"),
         module=True,
     )
 
@@ -76,7 +80,7 @@ KINDS: Mapping[str, Scaffold] = {
         (schema.STUDY_FILE,),
         ("affinet study $module.toml --quick",),
     ),
-    "test": Scaffold({"test_$module.py": "test_faults.py"}, {}, (), ("pytest test_$module.py",)),
+    "test": Scaffold({"test_$module.py": "test_faults.py"}, {}, (), (f"{_PYTEST} test_$module.py",)),
     "project": Scaffold(
         {
             "$name/README.md": "project/README.md",
@@ -96,7 +100,7 @@ KINDS: Mapping[str, Scaffold] = {
             "scenario": "swarm.toml",
         },
         (f"$name/{schema.SCENARIO_FILE}", f"$name/{schema.STUDY_FILE}"),
-        ("cd $name", "pytest", "affinet run swarm.toml"),
+        ("cd $name", _PYTEST, "affinet run swarm.toml"),
         module=True,
     ),
 }
@@ -128,6 +132,7 @@ def make(kind: str, name: str, folder: Path) -> tuple[list[Path], list[str]]:
         raise FileExistsError(f"{str(taken[0])!r} is there already, and nothing was written; choose another name")
     if scaffold.module:
         _refuse_taken(words["module"])
+        _refuse_hidden(scaffold, words)
     for path, text in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         directories.new_file(path, text)
@@ -136,7 +141,13 @@ def make(kind: str, name: str, folder: Path) -> tuple[list[Path], list[str]]:
         if not path.exists():  # it is that of this affinet, or the user's own
             files[path] = json.dumps(_SCHEMAS[path.name](), indent=1) + "\n"
             directories.new_file(path, files[path])
-    return list(files), [Template(line).substitute(words) for line in scaffold.then]
+    return list(files), [Template(line).substitute(words) for line in _with_pytest(scaffold.then)]
+
+
+def _with_pytest(then: Sequence[str]) -> list[str]:
+    """What one does next, with pytest to be installed where it is called and is not there."""
+    missing = find_spec("pytest") is None and any(line.startswith(_PYTEST) for line in then)
+    return [_INSTALL_PYTEST, *then] if missing else list(then)
 
 
 def _words(name: str, kind: str) -> dict[str, str]:
@@ -151,6 +162,18 @@ def _refuse_taken(module: str) -> None:
         raise ScenarioError(f"{module} is a word of Python: choose another name, like my-{module}")
     if find_spec(module) is not None:
         raise ScenarioError(f"{module} is a module already: choose another name, like my-{module}")
+
+
+def _refuse_hidden(scaffold: Scaffold, words: Mapping[str, str]) -> None:
+    """Refuse a class that is a word of Python, or would hide a name that its own file uses."""
+    templates = resources.files("affinet.scaffold") / "templates"
+    for word in scaffold.says.keys() & {"Filter", "Law"}:
+        name = Template(scaffold.says[word]).substitute(words)
+        text = (templates / _TEMPLATE_OF[word]).read_text(encoding="utf-8")
+        if keyword.iskeyword(name) or hasattr(builtins, name) or re.search(rf"(?<![$\w]){name}\b", text):
+            raise ScenarioError(
+                f"its class would be {name}, which is taken: choose another name, like my-{words['name']}"
+            )
 
 
 def _texts(scaffold: Scaffold, words: Mapping[str, str]) -> Iterator[tuple[str, str]]:

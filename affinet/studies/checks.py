@@ -24,9 +24,10 @@ Planned = tuple["Case", Plan]
 
 # What a study can draw.
 FIGURES = {
-    "curves": "A quantity over time: panels by two axes, in each a curve for every label of a third.",
+    "curves": "A quantity over time: panels by two axes, in each a curve for every label of a third, in a band of one "
+    "standard deviation over the runs.",
     "map": "The mean of the tracking error as a colour: panels by one axis, rows and columns by two others.",
-    "sweep": "The mean of a quantity along an axis of numbers, with its interval: panels and curves by two others.",
+    "sweep": "The mean of a quantity along an axis of numbers, with its interval of 99 %: panels and curves by two others.",
     "indicator": "The convergence indicators psi beside the tracking error, over time, of one case.",
     "paths": "Where the agents of the first run of each case go, and what one of them flies.",
 }

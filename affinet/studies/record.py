@@ -115,7 +115,7 @@ def recorded(
             JudgedClaim(says=verdict.says, asked=asked(study, claim), decision=verdict.decision, found=verdict.found)
             for claim, verdict in zip(judging.all_spelled_out(study), verdicts, strict=True)
         ],
-        cases=[_mean(one, quantity, study.since) for one in results for quantity in quantities],
+        cases=[mean(one, quantity, study.since) for one in results for quantity in quantities],
     )
 
 
@@ -153,7 +153,8 @@ def _compared(study: Study) -> Iterator[Quantity]:
             yield claim.to_quantity
 
 
-def _mean(one: Result, quantity: Quantity, since: float) -> CaseMean:
+def mean(one: Result, quantity: Quantity, since: float) -> CaseMean:
+    """That of a case over its runs, each from `since` seconds on."""
     found = intervals.mean(over_time(one.runs, quantity, (since, None)))
     return CaseMean(labels=one.labels, quantity=quantity, unit=said(quantity)[1], **_numbers(found))
 

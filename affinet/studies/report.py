@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from affinet.studies import cells, record
 from affinet.studies.batch import REPORT
 from affinet.studies.judging import graph_rates
 from affinet.studies.quantities import Quantity, over_time, said
+from affinet.studies.record import CaseMean
 from affinet.studies.study import Result, Study
-from analysis.figures import curves, paths, target
+from analysis.figures import curves, paths, sweeps, target
 from analysis.figures.curves import Curve
 from analysis.figures.target import TargetRun
 from analysis.models.arrays import Array
@@ -97,13 +99,42 @@ def draw(out: Path, study: Study, results: list[Result]) -> None:
 
 
 def _draw_quantity(path: Path, study: Study, results: list[Result], quantity: Quantity) -> None:
-    axes, drawn = [axis.name for axis in study.axes], _curves(results, quantity, study.since)
-    bound = None if study.bound is None or quantity != study.quantity else (study.bound.at, study.bound.says)
     if study.along is None:
+        axes, drawn = [axis.name for axis in study.axes], _curves(results, quantity, study.since)
         changing = [replace(curve, changes=_changes(one.plan)) for curve, one in zip(drawn, results, strict=True)]
-        curves.curves(path, study.title, changing, axes, curves.said(*said(quantity)), bound)
+        curves.curves(path, study.title, changing, axes, _said(quantity), _bound(study, quantity))
     else:
-        curves.sweep(path, study.title, drawn, axes, study.along, curves.said(*said(quantity)), bound)
+        means = [record.mean(one, quantity, study.since) for one in results]
+        draw_means(path, study, means)
+
+
+def draw_means(path: Path, study: Study, means: Sequence[CaseMean]) -> None:
+    """Draw those of one quantity along the axis of a sweep, as they are in `claims.json` too.
+
+    Parameters
+    ----------
+    path
+        The file to draw.
+    study, means
+        The study, a sweep, and its means.
+    """
+    assert study.along is not None
+    axes, quantity = [axis.name for axis in study.axes], means[0].quantity
+    drawn = [sweeps.Mean(one.labels, *map(_number, (one.found, one.low, one.high))) for one in means]
+    sweeps.sweep(path, study.title, drawn, axes, study.along, _said(quantity), _bound(study, quantity))
+
+
+def _number(kept: float | None) -> float:
+    return np.nan if kept is None else kept
+
+
+def _said(quantity: Quantity) -> str:
+    what, unit = said(quantity)
+    return f"{what} ({unit})" if unit else what
+
+
+def _bound(study: Study, quantity: Quantity) -> tuple[float, str] | None:
+    return None if study.bound is None or quantity != study.quantity else (study.bound.at, study.bound.says)
 
 
 def _path(one: Result) -> paths.Flight:

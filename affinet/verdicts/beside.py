@@ -11,8 +11,7 @@ from affinet.verdicts.evidence import Evidence
 from world.books import history
 from world.books.history import Arrays
 
-Row = tuple[str, tuple[str, ...]]
-_UNSAID = "-"
+Row = tuple[str, tuple[Any, ...]]  # a name, and a plain value of each run; None is none
 _NOT_FLOWN = ("record.", "description")  # settings of which a flight knows nothing
 _QUOTE, _LONGEST = '"', 60
 
@@ -21,24 +20,28 @@ def settings(runs: Sequence[Evidence]) -> list[Row]:
     """The keys of scenarios in which runs differ, and what each says there."""
     said = [dict(_leaves(run.plan.scenario.model_dump(mode="json"))) for run in runs]
     keys = dict.fromkeys(key for one in said for key in one)
-    rows = [(key, tuple(shown(one[key]) if one.get(key) is not None else _UNSAID for one in said)) for key in keys]
-    return [(key, values) for key, values in rows if len(set(values)) > 1]
+    rows = [(key, tuple(one.get(key) for one in said)) for key in keys]
+    return [(key, values) for key, values in rows if any(value != values[0] for value in values)]
 
 
 def titles(runs: Sequence[Evidence], names: Sequence[str]) -> list[str]:
     """What tells runs apart above a picture: the settings of the flight that differ, and their names where that does not do."""
     rows = [(key.rpartition(".")[2], values) for key, values in settings(runs) if not key.startswith(_NOT_FLOWN)]
-    told = [", ".join(f"{key} {values[number].strip(_QUOTE)}" for key, values in rows) for number in range(len(runs))]
+    told = [", ".join(f"{key} {_told(values[number])}" for key, values in rows) for number in range(len(runs))]
     if not rows or len(set(told)) < len(told) or max(map(len, told)) > _LONGEST:
         return list(names)
     return told
+
+
+def _told(value: Any) -> str:
+    return "-" if value is None else shown(value).strip(_QUOTE)
 
 
 def figures(runs: Sequence[Evidence]) -> list[Row]:
     """What came of each."""
     each = [dict(_figures(run)) for run in runs]
     names = dict.fromkeys(name for one in each for name in one)
-    return [(name, tuple(one.get(name, _UNSAID) for one in each)) for name in names]
+    return [(name, tuple(one.get(name) for one in each)) for name in names]
 
 
 def parting(first: Evidence, other: Evidence) -> str:
@@ -61,21 +64,21 @@ def _over(run: Evidence, channels: Sequence[str]) -> Arrays:
     return {**run.arrays, **{name: run.arrays[name][:, chosen] for name in ("verdicts", "newest")}}
 
 
-def _figures(run: Evidence) -> Iterator[tuple[str, str]]:
+def _figures(run: Evidence) -> Iterator[tuple[str, Any]]:
     done = run.outcome
     yield "verdict", done.says
-    yield "ticks", str(run.ticks)
+    yield "ticks", run.ticks
     errors = done.errors or {"tracking error (m2)": done.tracking_error}
     for name, of in errors.items():
         called = name if name.endswith(")") else f"{name.replace('_', ' ')} (m)"
         for what, value in of.items():
-            yield f"{called}, {what}", _UNSAID if value is None else f"{value:.4g}"
+            yield f"{called}, {what}", value
     messages = done.messages
-    yield "messages delivered", f"{messages['delivered']} of {messages['offered']}"
+    yield from ((f"messages {what}", messages[what]) for what in ("offered", "delivered"))
     for reason, number in messages["dropped"].items():
-        yield f"dropped, {reason}", str(number)
-    yield "faults", str(len(done.faults))
-    yield "digest", str(done.digest)[:12]
+        yield f"dropped, {reason}", number
+    yield "faults", len(done.faults)
+    yield "digest", done.digest
 
 
 def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

@@ -20,6 +20,7 @@ from affinet.verdicts import measures
 from affinet.verdicts.bites import Bite, bites
 from affinet.verdicts.measures import Figures
 from affinet.verdicts.timing import Timing
+from affinet.verdicts.zones import Jam, jams
 from analysis.models.arrays import Mask
 from netem.faults.timeline import Timeline
 from netem.medium.ledger import NOTHING, Accounts, Ledger
@@ -44,9 +45,9 @@ class Outcome:
     `verdict` is a `RunVerdict`, or of a run that would pass if the transport between machines had lost nothing, "pass,
     transport lost 3"; `flown` says with what: estimator, law, seed and versions; `errors` has the figures that matter of agents
     that find out where they are, or pursue a target, in metres, which stand in place of the tracking error; `timeline` has the
-    faults where they came to lie, `faults` what each took hold of; `user_code` says that an estimator or a law is why the run
-    ended early; `refused` has the wrong messages of each agent, by whom they were refused, for what, and how many; `timing`
-    says how processes kept their time in a run in real time.
+    faults where they came to lie, `faults` and `zones` what each took hold of; `user_code` says that an estimator or a law is
+    why the run ended early; `refused` has the wrong messages of each agent, by whom they were refused, for what, and how many;
+    `timing` says how processes kept their time in a run in real time.
     """
 
     verdict: str
@@ -61,6 +62,7 @@ class Outcome:
     errors: dict[str, Figures]
     messages: dict[str, Any]
     faults: tuple[Bite, ...]
+    zones: tuple[Jam, ...]
     timeline: Timeline
     refused: tuple[dict[str, Any], ...]
     processes: tuple[dict[str, Any], ...]
@@ -73,7 +75,7 @@ class Outcome:
         if plain.pop("errors"):
             del plain["tracking_error"]
         plain |= self.errors
-        plain["faults"] = [bite.to_json() for bite in self.faults]
+        plain |= {name: [one.to_json() for one in getattr(self, name)] for name in ("faults", "zones")}
         if self.timing is not None:
             plain["timing"] = self.timing.to_json()
         plain["wall_s"] = round(self.wall_s, 3)
@@ -163,11 +165,13 @@ def judge(
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
     booked = accounts or NOTHING
     faults = [] if arrays is None else bites(plan, timeline, arrays)
+    zones = [] if arrays is None else jams(plan, arrays)
     wrong = [failure] if failure else []
     if not failure:
         wrong += _what_is_wrong(plan, arrays, booked, uninstructed)
     idle = [bite for bite in faults if not bite.touched]
     empty = [f"'{bite.fault.describe()}' touched no {bite.what} and proved nothing: {bite.why}" for bite in idle]
+    empty += [f"zone {jam.zone} jammed no message and proved nothing: {jam.why}" for jam in zones if not jam.jammed]
     empty += _untracked(plan, arrays)
     verdict: RunVerdict = "fail" if wrong else "vacuous" if empty else "pass"
     said = f"{verdict}, transport lost {lost}" if verdict == "pass" and lost else verdict
@@ -185,6 +189,7 @@ def judge(
         errors={} if arrays is None else measures.errors(plan, timeline, arrays),
         messages=_messages(booked, uninstructed, lost),
         faults=tuple(faults),
+        zones=tuple(zones),
         timeline=timeline,
         refused=tuple(refused),
         processes=tuple(processes),

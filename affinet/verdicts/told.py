@@ -14,6 +14,12 @@ def title(run: Evidence) -> str:
     return f"{one_line(run.plan.scenario.source.file)}, {run.outcome.says}"
 
 
+OF_PASS = (
+    "pass: every number is finite, every message accounted for, every fault touched something. "
+    "Whether the error is small enough, a --check says."
+)
+
+
 def rows(run: Evidence, most_faults: int = _MOST_FAULTS) -> list[tuple[str, str]]:
     """Its figures, each with its name.
 
@@ -41,6 +47,7 @@ def rows(run: Evidence, most_faults: int = _MOST_FAULTS) -> list[tuple[str, str]
             f"{messages['offered']} offered, {messages['delivered']} delivered, {listed(dropped) or 'none lost'}",
         ),
         *faults,
+        *(("jammed zone", str(jam)) for jam in done.zones),
         *(("why", one_line(reason)) for reason in done.reasons),
         ("digest", str(done.digest)),
     ]

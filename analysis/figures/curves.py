@@ -1,4 +1,4 @@
-"""Figures like those of the papers: mean and one standard deviation over the runs, logarithmic."""
+"""Figures like those of the papers: mean and one standard deviation over the runs, on a logarithmic axis."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from analysis.figures.axes import logarithmic, named_aside, titled
+from analysis.figures.axes import colours_of, finish, labels_of, titled
 from analysis.metrics.consistency import DRAWN, band
 from analysis.models.arrays import Array
 
@@ -20,9 +19,10 @@ mpl.rcParams.update(
     {"font.size": 8, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False, "text.parse_math": False}
 )
 _LOST, _FAR = 1.0, 100.0  # m²
-_DECADES = 30.0  # labels that reach farther stand on a logarithmic axis
+_BAND = (
+    "Lines: mean over the runs. Bands: one standard deviation of the runs; one that reaches 0 goes down to the edge."
+)
 _LEGEND = 1.4  # inches beside the panels
-_LOWEST = 0.05  # of the mean, for the lower end of a band
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,10 @@ def curves(
         A dashed line, and what it says.
     """
     across, down, each = axes
-    columns, rows = _labels(cases, across), _labels(cases, down)
+    columns, rows = labels_of(cases, across), labels_of(cases, down)
     figure = Figure(figsize=(_LEGEND + 3.4 * len(columns), 2.2 * len(rows)), layout="constrained", dpi=160)
     panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
-    colours = _colours(cases, each)
+    colours = colours_of(cases, each)
     for case in cases:
         panel = panels[rows.index(case.labels[down]), columns.index(case.labels[across])]
         _draw(panel, case, case.labels[each], colours[case.labels[each]])
@@ -81,7 +81,7 @@ def curves(
     if bound is not None:
         for panel in panels.ravel():
             panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
-    _finish(figure, panels, title, "time (s)", quantity, each)
+    finish(figure, panels, title, "time (s)", quantity, each, _BAND)
     figure.savefig(path)
 
 
@@ -108,7 +108,7 @@ def consistency(
     first = next(iter(normalised.values()))
     places = list(dict.fromkeys((case.labels[across], case.labels[down]) for case in first))
     figure = Figure(figsize=(_LEGEND + 3.4 * len(places), 2.2 * len(normalised)), layout="constrained", dpi=160)
-    colours = _colours(first, each)
+    colours = colours_of(first, each)
     panels = figure.subplots(len(normalised), len(places), sharex=True, sharey=True, squeeze=False)
     for row, (what, cases) in zip(panels, normalised.items(), strict=True):
         for case in cases:
@@ -119,7 +119,7 @@ def consistency(
             panel.set_title(f"{what}: {case.labels[across]}, {case.labels[down]}")
         for panel in row:
             panel.axhspan(*band(DRAWN, dimension, len(first[0].error)), color="grey", alpha=0.25, lw=0)
-    _finish(figure, panels, title, "time (s)", "mean", each)
+    finish(figure, panels, title, "time (s)", "mean", each)
     for panel in panels.ravel():
         panel.set_yscale("linear")
         panel.set_ylim(0.0, 3.0 * dimension)
@@ -159,47 +159,6 @@ def rates(path: Path, title: str, found: Array) -> None:
     figure.savefig(path)
 
 
-def said(what: str, unit: str) -> str:
-    """A quantity with its unit, if it has one."""
-    return f"{what} ({unit})" if unit else what
-
-
-def sweep(
-    path: Path,
-    title: str,
-    cases: Sequence[Curve],
-    axes: Sequence[str],
-    along: str,
-    quantity: str,
-    bound: tuple[float, str] | None = None,
-) -> None:
-    """A quantity over one axis: a panel for each label of the first other axis, a curve for each of the second."""
-    across, each = [name for name in axes if name != along]
-    columns = _labels(cases, across)
-    figure = Figure(figsize=(_LEGEND + 3.0 * len(columns), 3.0), layout="constrained", dpi=160)
-    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)
-    colours = _colours(cases, each)
-    for panel, column in zip(panels[0], columns, strict=True):
-        for label in _labels(cases, each):
-            chosen = [one for one in cases if one.labels[across] == column and one.labels[each] == label]
-            where = [float(one.labels[along]) for one in chosen]
-            runs = np.array([_finite(one.overall) for one in chosen])
-            if chosen:
-                mean, spread = runs.mean(axis=1), runs.std(axis=1)
-                low = np.minimum(spread, (1.0 - _LOWEST) * mean)
-                bars = {"yerr": (low, spread), "marker": "o", "ms": 3, "capsize": 2}
-                panel.errorbar(where, mean, label=label, color=colours[label], **bars)
-        panel.set_title(column)
-    labels = [float(label) for label in _labels(cases, along)]
-    for panel in panels[0]:
-        if min(labels) > 0.0 and max(labels) > _DECADES * min(labels):
-            logarithmic(panel, "x")
-        if bound is not None:
-            panel.axhline(bound[0], color="black", ls="--", lw=0.8, label=bound[1])
-    _finish(figure, panels, title, along, quantity, each)
-    figure.savefig(path)
-
-
 def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: Array, numbers: Sequence[int]) -> None:
     """Mean tracking error (R, T), and corrected indicators (T, F) of the followers with these numbers."""
     figure = Figure(figsize=(4.6, 3.0), layout="constrained", dpi=160)
@@ -207,7 +166,7 @@ def indicator(path: Path, title: str, seconds: Array, error: Array, corrected: A
     for place, number in enumerate(numbers):
         panel.plot(seconds, _positive(corrected[:, place]), lw=0.8, label=f"agent {number}")
     panel.plot(seconds, error.mean(axis=0), color="black", lw=1.2, label="tracking error")
-    _finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
+    finish(figure, np.array([[panel]]), title, "time (s)", "m²", None)
     figure.savefig(path)
 
 
@@ -224,7 +183,7 @@ def settings(path: Path, title: str, cases: Sequence[Curve], axes: Sequence[str]
         The curves, and the axes of the grid.
     """
     across, down, each = axes
-    panels, rows, columns = (_labels(cases, axis) for axis in (across, down, each))
+    panels, rows, columns = (labels_of(cases, axis) for axis in (across, down, each))
     size = (1.6 + 0.52 * len(columns) * len(panels), 1.3 + 0.26 * len(rows))
     figure = Figure(figsize=size, layout="constrained", dpi=160)
     for panel, label in zip(figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True):
@@ -255,32 +214,9 @@ def _draw(panel: Axes, case: Curve, label: str, colour: str) -> None:
     error = _finite(case.error)
     mean, deviation = error.mean(axis=0), error.std(axis=0)
     panel.plot(case.seconds, mean, lw=1.0, label=label, color=colour)
-    # A band that reaches zero has no lower end on a logarithmic axis.
-    low = np.maximum(mean - deviation, _LOWEST * mean)
     for second in case.changes:
         panel.axvline(second, color="black", ls=":", lw=0.6)
-    panel.fill_between(case.seconds, low, mean + deviation, color=colour, alpha=0.15, lw=0)
-
-
-def _finish(figure: Figure, panels: NDArray[np.object_], title: str, x: str, y: str, legend: str | None) -> None:
-    titled(figure, title)
-    for panel in panels.ravel():
-        logarithmic(panel, "y")
-    for panel in panels[-1]:
-        panel.set_xlabel(x)
-    named_aside(figure, y)
-    drawn = [panel.get_legend_handles_labels() for panel in panels.ravel()]
-    named = {label: handle for handles, labels in drawn for handle, label in zip(handles, labels, strict=True)}
-    figure.legend(named.values(), named.keys(), title=legend, fontsize=7, loc="outside right center")
-
-
-def _colours(cases: Sequence[Curve], axis: str) -> dict[str, str]:
-    """A colour for each label of an axis, the same in every panel."""
-    return {label: f"C{number}" for number, label in enumerate(_labels(cases, axis))}
-
-
-def _labels(cases: Sequence[Curve], axis: str) -> list[str]:
-    return list(dict.fromkeys(case.labels[axis] for case in cases))
+    panel.fill_between(case.seconds, mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
 
 
 def _finite(values: Array) -> Array:

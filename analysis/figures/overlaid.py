@@ -44,7 +44,7 @@ def draw(curves: Sequence[Curve], path: Path) -> None:
                 positive = np.where(curve.values > 0.0, curve.values, np.nan)
                 panel.plot(curve.seconds, positive, color=f"C{number % 10}", linewidth=1.0, label=curve.name)
         logarithmic(panel, "y")
-        panel.set_xlabel("s")
+        panel.set_xlabel("time (s)")
         panel.set_ylabel(quantity)
         panel.grid(visible=True, alpha=0.3)
         legend = panel.legend(frameon=False)

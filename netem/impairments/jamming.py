@@ -33,11 +33,11 @@ class Zone:
     comms: bool
 
     def jammed(self, receivers: Integers, position: Array) -> Mask:
-        """True on the links whose receiver, a row of positions (N, D), is inside, shape (L,), while the jammer is on.
+        """True on the links whose receiver, a row of positions (..., N, D), is inside, shape (..., L), while the jammer is on.
 
         One draw a tick serves the whole zone: its links share their verdict. In the zone, mean loss is `share`.
         """
         apart = position - self.centre
         inside = (apart * apart).sum(axis=-1) <= self.radius * self.radius
-        struck: Mask = inside[receivers] & self.rows
+        struck: Mask = inside[..., receivers] & self.rows
         return struck

@@ -12,12 +12,15 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from paths import DOCS
+from paths import DOCS, ROOT
 
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INDENTED = re.compile(r"(?:^|\n\n)((?:    .*(?:\n|$))+)")
 WIDTH = "100"
 # What whoever runs the tests has set up for these tests, and a reader has not.
 _NOT_A_READERS = ("DISPLAY", "WAYLAND_DISPLAY", "PYTEST_ADDOPTS")
@@ -72,6 +75,14 @@ def steps(text: str) -> list[Step]:
         elif match["kind"] == "python":
             found.append(Step(match["text"], match["printed"] or "", program=True))
     return found
+
+
+def blocks(text: str) -> Iterator[tuple[str, str]]:
+    """Language and text of every block of a page."""
+    for language, block in FENCED.findall(text):
+        yield language, block
+    for block in INDENTED.findall(FENCED.sub("", text)):
+        yield "", re.sub(r"^    ", "", block, flags=re.MULTILINE)
 
 
 def answered(text: str) -> list[tuple[str, str]]:

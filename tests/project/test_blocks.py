@@ -11,6 +11,7 @@ import shlex
 import tomllib
 
 import pytest
+from pages import PAGES, blocks
 from paths import DOCS, ROOT
 
 import affinet
@@ -19,18 +20,7 @@ from affinet.runtimes.machines.hosts import Hosts
 from affinet.scenario.sections import Scenario
 from affinet.studies import study
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
-FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-INDENTED = re.compile(r"(?:^|\n\n)((?:    .*(?:\n|$))+)")
 PARTS = {*Scenario.model_fields, *study.Study.model_fields, *Hosts.model_fields}
-
-
-def blocks(text):
-    """Language and text of every block of a page."""
-    for language, block in FENCED.findall(text):
-        yield language, block
-    for block in INDENTED.findall(FENCED.sub("", text)):
-        yield "", re.sub(r"^    ", "", block, flags=re.MULTILINE)
 
 
 def commands(language, block):

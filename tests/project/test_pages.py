@@ -36,6 +36,12 @@ def test_a_page_says_what_happens(name, tmp_path):
     assert {step.what for step in steps(text)} - {step.what for step in done} == set(elsewhere)
 
 
+@pytest.mark.parametrize(("name", "section"), [("network.md", "Jammed zones")])
+def test_a_section_says_what_happens(name, section, tmp_path):
+    _, _, text = page(name).partition(f"\n## {section}\n")
+    assert len(work_through(text.partition("\n## ")[0], tmp_path, {})) >= 3
+
+
 def typed(text):
     """Commands of affinet that stand on a page without an answer: in a line of their own, or in the text."""
     lines = re.findall(r"^    (affinet .*?)(?: +#.*)?$", text, re.MULTILINE)

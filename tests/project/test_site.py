@@ -1,12 +1,15 @@
 """The site of docs/ is built without a warning: every page in its place, every link and anchor leads somewhere."""
 
 import os
+import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import building
 import pytest
 import yaml
+from mkdocs.structure.files import File, Files
 from paths import DOCS, ROOT
 
 import affinet
@@ -26,8 +29,44 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert 'href="decisions/index.html"' in first
     assert 'href="files/agents/estimators/none.py"' in first
     assert (tmp_path / "site" / "files" / "agents" / "estimators" / "none.py").exists()
+    assert [one for page in (tmp_path / "site").rglob("*.html") for one in from_elsewhere(page)] == []
+    faults = (tmp_path / "site" / "notebooks" / "faults.html").read_text(encoding="utf-8")
+    assert 'href="../testing.html"' in faults
+    assert '.md"' not in faults
     python = (tmp_path / "site" / "reference" / "python.html").read_text(encoding="utf-8")
     assert [name for name in affinet.__all__ if name[0] != "_" and f'id="affinet.{name}"' not in python] == []
+
+
+def from_elsewhere(page):
+    """What a page loads over the network."""
+    loaded = re.findall(r"<(?:script|link|img|iframe)\b[^>]*>", page.read_text(encoding="utf-8"))
+    return [one for one in loaded if re.search(r"""(?:src|href)=["'](?:https?:)?//""", one)]
+
+
+def test_what_is_loaded_over_the_network_is_found(tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text(
+        '<a href="https://zenoh.io">x</a><script src="https://unpkg.com/x"></script><link href="//a.b/c.css">'
+    )
+    assert from_elsewhere(page) == ['<script src="https://unpkg.com/x">', '<link href="//a.b/c.css">']
+
+
+@pytest.mark.parametrize(
+    ("link", "leads", "warned"),
+    [
+        ("../testing.md#faults", "../testing.html#faults", 0),
+        ("../nowhere.md", "../nowhere.md", 1),
+        ("https://zenoh.io", "https://zenoh.io", 0),
+        ("#here", "#here", 0),
+    ],
+)
+def test_links_of_a_notebook_lead_to_pages_or_are_warned_of(link, leads, warned, caplog):
+    named = ("testing.md", "notebooks/faults.ipynb")
+    page, notebook = (File(name, "docs", "site", use_directory_urls=False) for name in named)
+    notebook.dest_uri = "notebooks/faults.html"
+    said = building.on_page_content(f'<a href="{link}">', SimpleNamespace(file=notebook), Files([page, notebook]))
+    assert said == f'<a href="{leads}">'
+    assert len(caplog.records) == warned
 
 
 @pytest.fixture

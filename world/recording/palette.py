@@ -8,10 +8,11 @@ LEADER, FOLLOWER = 0xF2B705FF, 0x3FA7F5FF
 DEAD, PAUSED, DEPARTED, VANISHED = 0xB23B3BFF, 0xB388FFFF, 0x8A8A8AFF, 0x00000000
 SENSING, COMMS, BOTH = 0x3DDC84FF, 0x3FA7F5FF, 0x8FE3FFFF
 PLAIN, FAINT, BAND = 0x9AA5B1FF, 0x8888AA60, 0x909090FF  # viewers may have a dark ground or a light one
+# Each can be told from a white ground, and from a black one.
 OF_VERDICT = {
     Verdict.SILENT: 0x00000000,
     Verdict.DELIVERED: 0x3DDC84FF,
-    Verdict.DELAYED: 0x9AD0FFFF,
+    Verdict.DELAYED: 0x86C2F7FF,
     Verdict.DEAD: 0xB23B3BFF,
     Verdict.PAUSED: 0xB388FFFF,
     Verdict.DEPARTED: 0x8A8A8AFF,
@@ -21,8 +22,8 @@ OF_VERDICT = {
     Verdict.DROPOUT: 0xFF80ABFF,
     Verdict.CLOSED: 0x6A6A7AFF,
     Verdict.RANGE: 0xA1887FFF,
-    Verdict.JAMMED: 0xFFEB3BFF,
-    Verdict.LISTED: 0xFFCC80FF,
+    Verdict.JAMMED: 0xB59B00FF,
+    Verdict.LISTED: 0xDDA15EFF,
     Verdict.LOST: 0xFF9F1CFF,
     Verdict.OVERFLOW: 0x26C6DAFF,
     Verdict.UNSAID: 0xF48FB1FF,

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from affinet.verdicts.page import ticks
 from analysis.models.arrays import Array
 
-_WIDE, _HIGH, _LEFT, _BELOW, _RIGHT, _TOP = 760.0, 190.0, 52.0, 22.0, 8.0, 10.0
+_WIDE, _HIGH = 1000.0, 200.0  # of what is drawn, which is stretched to the width of the page
 _FLOOR = 1e-15
 
 
@@ -38,13 +39,14 @@ def folded(title: str, *parts: str) -> str:
 
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Rows of text; the first of each says what it is of."""
+    """Rows of text; the first of each says what it is of. Without a head they are facts, whose text wraps."""
     top = f"<tr>{''.join(f'<th>{escape(one)}</th>' for one in head)}</tr>" if head else ""
     body = "".join(
         f"<tr><th>{escape(first)}</th>{''.join(f'<td>{escape(one)}</td>' for one in rest)}</tr>"
         for first, *rest in rows
     )
-    return f'<div class="wide"><table>{top}{body}</table></div>'
+    kind = "" if head else ' class="facts"'
+    return f'<div class="wide"><table{kind}>{top}{body}</table></div>'
 
 
 def key(named: Iterable[tuple[str, str]]) -> str:
@@ -66,26 +68,32 @@ def curves(caption: str, seconds: Array, named: Sequence[tuple[str, str, Array]]
         return ""
     low, high = float(there.min()), float(there.max())
     low, high = (low, high) if high > low else (low - 1.0, high + 1.0)
-    right, bottom, last = _WIDE - _RIGHT, _HIGH - _BELOW, max(float(seconds[-1]), 1e-9)
+    last = max(float(seconds[-1]), 1e-9)
     lines = []
     for _, colour, values in shown:
         finite = np.isfinite(values)
-        x = _LEFT + (right - _LEFT) * seconds[finite] / last
-        y = bottom - (bottom - _TOP) * (values[finite] - low) / (high - low)
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
-        lines.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.3"/>')
-    least, most = (f"{10.0**end:.2g}" if logarithmic else f"{end:.3g}" for end in (low, high))
+        points = zip(_WIDE * seconds[finite] / last, _HIGH * (high - values[finite]) / (high - low), strict=True)
+        drawn = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
+        lines.append(f'<polyline points="{drawn}" fill="none" stroke="{colour}" stroke-width="1.3"/>')
+    upright = ticks.decades(low, high) if logarithmic else ticks.of(low, high)
+    grid = "".join(f"M0,{_HIGH * (high - at) / (high - low):.1f}H{_WIDE:g}" for at, _ in upright)
     words = [
-        f'<text x="{_LEFT - 6}" y="{_TOP + 8}" text-anchor="end">{most}</text>',
-        f'<text x="{_LEFT - 6}" y="{bottom}" text-anchor="end">{least}</text>',
-        f'<text x="{_LEFT}" y="{_HIGH - 6}">0</text>',
-        f'<text x="{right}" y="{_HIGH - 6}" text-anchor="end">{last:g} s</text>',
+        f'<span class="y" style="bottom:{100.0 * (at - low) / (high - low):.2f}%">{says}</span>' for at, says in upright
     ]
-    frame = f'<path class="axis" fill="none" d="M{_LEFT},{_TOP}V{bottom}H{right}"/>'
-    cursor = f'<line class="cursor" data-span="{_LEFT} {right}" x1="{_LEFT}" x2="{_LEFT}" y1="{_TOP}" y2="{bottom}"/>'
-    drawn = f'<svg viewBox="0 0 {_WIDE:g} {_HIGH:g}">{frame}{"".join(lines)}{"".join(words)}{cursor}</svg>'
+    words += [
+        f'<span class="x" style="left:{100.0 * at / last:.2f}%">{says}</span>' for at, says in ticks.of(0.0, last)
+    ]
+    cursor = f'<line class="cursor" data-span="0 {_WIDE:g}" x1="0" x2="0" y1="0" y2="{_HIGH:g}"/>'
+    svg = (
+        f'<svg viewBox="0 0 {_WIDE:g} {_HIGH:g}" preserveAspectRatio="none"><path class="grid" d="{grid}"/>'
+        f'<path class="axis" d="M0,0V{_HIGH:g}H{_WIDE:g}"/>{"".join(lines)}{cursor}</svg>'
+    )
+    says = f"{caption}, on a logarithmic axis, over time (s)" if logarithmic else f"{caption}, over time (s)"
     named_colours = key([(name, colour) for name, colour, _ in named]) if len(named) > 1 else ""
-    return f'<figure><figcaption>{escape(caption)}</figcaption><div class="wide">{drawn}</div>{named_colours}</figure>'
+    return (
+        f"<figure><figcaption>{escape(says)}</figcaption>"
+        f'<div class="chart">{svg}{"".join(words)}</div>{named_colours}</figure>'
+    )
 
 
 def _decades(values: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
@@ -33,13 +34,26 @@ def page(run: Evidence, directory: Path) -> str:
         head,
         _scene(run),
         _curves(run),
-        html.section("What came of it", html.table(row for row in told.rows(run) if not row[0].startswith("fault"))),
+        html.section("What came of it", _says_of_pass(verdict), html.table(_rows(run))),
         _faults(run),
         _messages(run),
         html.section("Again", html.text(f"affinet replay {shlex.quote(str(directory))} --runtime inprocess")),
         html.folded("Settings", html.text(to_toml(run.plan.scenario))),
     ]
     return html.document(name, body, scene.of_run(run))
+
+
+def _says_of_pass(verdict: str) -> str:
+    return f"<p>{escape(told.OF_PASS)}</p>" if verdict == "pass" else ""
+
+
+def _rows(run: Evidence) -> Iterator[tuple[str, str]]:
+    """What came of it, but for what has a section of its own; and what the air is, links that differ by themselves."""
+    for name, says in told.rows(run):
+        if not name.startswith(("fault", "jammed zone")):
+            yield name, says
+        if name == "network":
+            yield from (("air", one.says) for one in run.plan.findings if (one.check, one.level) == ("air", "ok"))
 
 
 def _scene(run: Evidence) -> str:
@@ -68,6 +82,7 @@ def _curves(run: Evidence) -> str:
 
 def _faults(run: Evidence) -> str:
     rows = [(str(number), str(bite)) for number, bite in enumerate(run.bites, start=1)]
+    rows += [("jammed zone", str(jam)) for jam in run.outcome.zones]
     return html.section("Faults, and what they touched", html.table(rows)) if rows else ""
 
 

@@ -54,6 +54,11 @@
       pen.fillStyle = data.leaders[agent] ? data.gold : data.blue; pen.beginPath(); pen.arc(x, y, 5, 0, 7); pen.fill();
       pen.fillStyle = ink; pen.fillText(agent + 1, x, y - 8);
     }
+    const least = 60 / scale, ten = 10 ** Math.floor(Math.log10(least));
+    const long = ten * [1, 2, 5, 10].find((factor) => factor * ten >= least), end = 12 + long * scale;
+    pen.strokeStyle = pen.fillStyle = ink; pen.lineWidth = 1; pen.textAlign = "left"; pen.beginPath();
+    pen.moveTo(12, high - 14); pen.lineTo(12, high - 10); pen.lineTo(end, high - 10); pen.lineTo(end, high - 14); pen.stroke();
+    pen.fillText(`${Number(long.toPrecision(1))} m`, 16, high - 14);
     told.value = `${data.seconds[moment].toFixed(2)} s`;
     const share = moments > 1 ? data.seconds[moment] / data.seconds[moments - 1] : 0;
     for (const cursor of document.querySelectorAll("svg .cursor")) {

@@ -66,7 +66,7 @@ def test_runs_part_where_their_arrays_do(compared, runs):
 
 def test_estimators_that_speak_on_other_channels_are_compared_in_what_both_have(compared):
     said = compared("calm", "rkf")
-    assert said["settings"] == {"agents.estimator": ['"ga-rkf"', '"rkf"']}
+    assert said["settings"] == {"agents.estimator": ["ga-rkf", "rkf"]}
     assert said["parts"]["rkf"].startswith("tick 0: ")
     assert "theta" not in said["parts"]["rkf"]
 
@@ -80,9 +80,21 @@ def test_a_longer_run_parts_at_the_end_of_the_shorter(compared):
 def test_runs_of_other_formations_have_figures_alone(compared):
     said = compared("calm", "cut", "places")
     assert said["parts"]["places"].startswith("it is of another formation")
-    assert said["figures"]["tracking error (m2), mean"][2] == "-"
-    assert said["figures"]["localization error (m), final"][:2] == ["-", "-"]
+    assert said["figures"]["tracking error (m2), mean"][2] is None
+    assert said["figures"]["localization error (m), final"][:2] == [None, None]
     assert said["runs"] == ["calm", "cut", "places"]
+
+
+def test_values_are_whole_and_numbers_are_numbers(compared, runs):
+    said = compared("calm", "cut")
+    summaries = [json.loads((runs / name / "summary.json").read_text()) for name in ("calm", "cut")]
+    for name, key in (("tracking error (m2), mean", "mean"), ("tracking error (m2), final", "final")):
+        assert said["figures"][name] == [one["tracking_error"][key] for one in summaries]
+    assert said["figures"]["messages delivered"] == [one["messages"]["delivered"] for one in summaries]
+    assert said["figures"]["digest"] == [one["digest"] for one in summaries]
+    before, after = said["settings"]["timeline"]
+    assert before == []
+    assert (after[0]["verb"], after[0]["links"]) == ("cut", ["6->4"])
 
 
 def test_a_table_is_printed_and_a_picture_drawn(runs, tmp_path, capsys):

@@ -51,3 +51,18 @@ def test_other_quantities_of_a_study_are_named(tmp_path, capsys):
     assert last.endswith(
         "claims.json has rate by which the Procrustes error falls, change of a step from the one before"
     )
+
+
+@pytest.mark.parametrize(
+    ("quantity", "low", "warned"),
+    [
+        ("error", -1.0, True),
+        ("error", 0.5, False),
+        ("error", None, False),
+        ("fall", -1.0, False),
+        ("report:x", -1.0, False),
+    ],
+)
+def test_an_interval_below_nothing_is_warned_of(quantity, low, warned, capsys):
+    means.warn(Console(), quantity, [Row({"loss": "0.5"}, 1.0, low, 3.0)])
+    assert ("few runs make the mean" in capsys.readouterr().out) == warned

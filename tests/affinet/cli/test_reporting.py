@@ -14,10 +14,12 @@ from affinet.cli.commands import main
 from affinet.runtimes.run import fly
 from affinet.studies import page as study_page
 from affinet.studies import record
-from affinet.verdicts.page import html
+from affinet.verdicts import told
+from affinet.verdicts.page import html, ticks
 from analysis.claims.intervals import Decision
-from netem.medium.verdict import Verdict
+from netem.medium.verdict import COUNTED, Verdict
 from world.books.history import ARRAYS, load
+from world.recording import palette
 
 SHORT = ("time.dt=0.05", "time.duration=2", "record.enabled=false")
 FAULTS = 'timeline=[{verb="cut",at=1.0,until=1.5,links=["6->4"]},{verb="kill",at=1.2,agents=[7]}]'
@@ -173,4 +175,61 @@ def test_a_curve_of_one_value_and_one_of_none_are_drawn():
     seconds = np.array([0.0, 1.0])
     assert "polyline" in html.curves("flat", seconds, [("", "#000", np.ones(2))])
     assert html.curves("none", seconds, [("", "#000", np.full(2, np.nan))]) == ""
-    assert "1e+02" in html.curves("log", seconds, [("", "#000", np.array([1.0, 100.0]))], logarithmic=True)
+    drawn = html.curves("log", seconds, [("", "#000", np.array([1.0, 100.0]))], logarithmic=True)
+    assert "log, on a logarithmic axis, over time (s)" in drawn
+    assert re.findall(r'class="y" style="bottom:(.*?)%">(.*?)<', drawn)[::3] == [
+        ("0.00", "1"),
+        ("50.00", "10"),
+        ("100.00", "100"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "says"),
+    [(0.0, 1.0, "0 0.2 0.4 0.6 0.8 1"), (0.0, 7.99, "0 2 4 6"), (-3.0, 65.9, "0 20 40 60"), (1e-9, 1.1e-9, None)],
+)
+def test_an_axis_has_a_few_round_numbers(low, high, says):
+    found = ticks.of(low, high)
+    assert 3 <= len(found) <= 8
+    assert all(low - 1e-9 * (high - low) <= at <= high * (1 + 1e-9) for at, _ in found)
+    assert [float(said) for _, said in found] == pytest.approx([at for at, _ in found])
+    if says:
+        assert " ".join(said for _, said in found) == says
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "says"),
+    [(-3.0, 0.5, "0.001 0.01 0.1 1"), (-0.4, 0.8, "0.5 1 2 5"), (-15.0, 12.0, None), (0.31, 0.32, None)],
+)
+def test_a_logarithmic_axis_has_powers_of_ten(low, high, says):
+    found = ticks.decades(low, high)
+    assert 2 <= len(found) <= 8
+    assert all(low - 1e-6 <= at <= high + 1e-6 for at, _ in found)
+    if says:
+        assert " ".join(said for _, said in found) == says
+
+
+def test_the_air_is_told_with_what_differs_and_zones_have_a_line(tmp_path):
+    given = (
+        'network={availability=0.9,links=[{links="4-6",profile="jammed"}],zones=[{centre=[0,0],radius=9.0,share=0.5}]}'
+    )
+    fly(plan_of("corridor", *SHORT, given), "inprocess", tmp_path / "run", lambda *_: None)
+    assert main(["report", str(tmp_path / "run")]) == 0
+    text = unescape((tmp_path / "run" / "report.html").read_text(encoding="utf-8"))
+    assert "22 links, profile 'perfect': mean loss 0.1" in text
+    assert "2 links, profile 'jammed': mean loss 0.55, mean burst" in text
+    assert text.count("1, 9 m about (0, 0) jammed ") == 1
+    assert told.OF_PASS in text
+
+
+def brightness(colour):
+    channels = [(colour >> shift & 0xFF) / 255.0 for shift in (24, 16, 8)]
+    linear = [one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("verdict", COUNTED)
+def test_a_verdict_can_be_told_from_a_white_ground_and_from_a_dark_one(verdict):
+    bright = brightness(palette.OF_VERDICT[verdict])
+    assert 1.05 / (bright + 0.05) > 1.7
+    assert (bright + 0.05) / (brightness(0x14171BFF) + 0.05) > 2.5

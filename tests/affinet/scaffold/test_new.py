@@ -163,6 +163,10 @@ def test_a_schema_that_is_there_stays(folder):
         ("scenario", "../maze", "'../maze' is no name: "),
         ("estimator", "numpy", "numpy is a module already: choose another name, like my-numpy"),
         ("law", "lambda", "lambda is a word of Python: choose another name, like my-lambda"),
+        ("estimator", "none", "its class would be None, which is taken: choose another name, like my-none"),
+        ("estimator", "estimate", "its class would be Estimate, which is taken: choose another name, like my-estimate"),
+        ("law", "true", "its class would be True, which is taken: choose another name, like my-true"),
+        ("law", "false", "its class would be False, which is taken: choose another name, like my-false"),
         ("project", "json", "json is a module already: choose another name, like my-json"),
     ],
 )
@@ -171,6 +175,16 @@ def test_a_name_that_will_not_do_is_one_line(kind, name, says, folder, capsys):
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(says)
     assert list(folder.iterdir()) == []
+
+
+def test_pytest_is_asked_for_where_it_is_not(folder, monkeypatch):
+    _, then = making.make("project", "my-swarm", folder)
+    assert then == ["cd my-swarm", "python -m pytest", "affinet run swarm.toml"]
+    monkeypatch.setattr(making, "find_spec", lambda _: None)
+    _, then = making.make("test", "losses", folder)
+    assert then == ["python -m pip install pytest", "python -m pytest test_losses.py"]
+    _, then = making.make("scenario", "maze", folder)
+    assert not [line for line in then if "pytest" in line]
 
 
 def test_every_template_is_used():

@@ -18,7 +18,7 @@ from affinet.studies.executor import Here
 from affinet.studies.quantities import NAMES, over_time
 from analysis.claims import checks
 from analysis.claims.intervals import Decision
-from analysis.figures import curves, paths
+from analysis.figures import axes, curves, paths, sweeps
 from analysis.metrics.indicator import Bounds
 
 pytestmark = PROCESSES
@@ -538,7 +538,7 @@ def drawn(monkeypatch):
             super().__init__(**how)
             kept.append(self)
 
-    for module in (curves, paths):
+    for module in (curves, paths, sweeps):
         monkeypatch.setattr(module, "Figure", Kept)
     return kept
 
@@ -635,14 +635,68 @@ def test_paths_are_those_of_the_first_run_of_each_case_with_what_its_first_follo
     ids=str,
 )
 def test_a_sweep_over_decades_is_drawn_on_a_logarithmic_axis(labels, scale, tmp_path, drawn):
-    cases = [
-        curves.Curve({"W": W, "graph": "ring", "filter": "SOE"}, np.arange(3.0), np.ones((2, 3)), np.array([1.0, 2.0]))
-        for W in labels
-    ]
-    curves.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
+    cases = [sweeps.Mean({"W": W, "graph": "ring", "filter": "SOE"}, 1.5, 1.0, 2.0) for W in labels]
+    sweeps.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
     ((panel,),) = (figure.axes for figure in drawn)
     assert panel.get_xscale() == scale
     assert not any("$" in text for figure in drawn for text in written_in(figure))
+
+
+def test_the_bars_of_a_sweep_are_the_intervals_of_its_table(tmp_path, drawn):
+    path = tmp_path / "sweep.toml"
+    path.write_text(SWEEP)
+    swept = study.load(str(path))
+    peaks = np.linspace(1.0, 2.0, RUNS)[:, None]
+    results = [
+        made_up(case.labels, peak=peaks * 10.0 ** (number * np.arange(RUNS)[:, None]))
+        for number, case in enumerate(study.cases(swept, quick=True))
+    ]
+    reported(tmp_path / "out", swept, results)
+    kept = record.read(tmp_path / "out" / record.FILE)
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    (panel,) = figure.axes
+    drawn_ends = [sorted(bar[:, 1]) for bars in panel.containers for bar in bars[2][0].get_segments()]
+    np.testing.assert_allclose(sorted(drawn_ends), sorted([case.low, case.high] for case in kept.cases))
+    assert min(case.low for case in kept.cases) < 0.0 < panel.get_ylim()[0]  # it leaves at the lower edge
+    (note,) = (text for text in written_in(figure) if text.startswith("Bars:"))
+    assert " ".join(note.split()) == (
+        "Bars: 99 % interval of the mean over the runs (Student's t); one that reaches 0 goes down to the edge."
+    )
+
+
+def test_a_case_without_a_number_is_marked_and_one_of_a_run_has_no_bar(tmp_path, drawn):
+    labels = [{"W": W, "graph": "ring", "filter": "SOE"} for W in ("1", "2")]
+    cases = [sweeps.Mean(labels[0], 1.0, np.nan, np.nan), sweeps.Mean(labels[1], np.nan, np.nan, np.nan)]
+    sweeps.sweep(tmp_path / "sweep.png", "Title", cases, ["graph", "W", "filter"], "W", "error (m)")
+    ((panel,),) = (figure.axes for figure in drawn)
+    assert [line.get_xdata().tolist() for line in panel.lines if line.get_marker() == "x"] == [[2.0]]
+    assert "One run of each case: no interval; × at the top: no number, as runs diverged." in {
+        " ".join(text.split()) for text in written_in(drawn[0])
+    }
+
+
+def test_a_band_of_curves_says_what_it_is_and_leaves_below_where_it_reaches_nothing(tmp_path, drawn):
+    error = np.array([[1.0, 1.0, 1.0], [1.0, 9.0, 100.0]])
+    case = curves.Curve({"a": "1", "b": "2", "c": "3"}, np.arange(3.0), error, error[:, 0])
+    curves.curves(tmp_path / "figure.png", "Title", [case], ("a", "b", "c"), "error (m)")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    (panel,) = figure.axes
+    ends = panel.collections[0].get_paths()[0].vertices
+    assert ends[:, 1].min() == pytest.approx(50.5 - 49.5)
+    assert any(text.startswith("Lines: mean over the runs. Bands: one") for text in written_in(figure))
+
+
+def test_labels_of_a_logarithmic_axis_are_written_alike():
+    figure = curves.Figure()
+    panel = figure.subplots()
+    panel.plot([1, 2, 3], [0.02, 1.0, 30.0])
+    axes.logarithmic(panel, "y")
+    figure.draw_without_rendering()
+    said = {label.get_text() for label in panel.get_yticklabels()} - {""}
+    assert said >= {"0.1", "1", "10"}
+    assert not any("e" in text for text in said)
 
 
 def test_consistency_is_drawn_as_means_over_the_runs_in_the_band_of_one_edge_of_each(drawn, tmp_path):
