@@ -184,8 +184,8 @@ def _trace(verdicts: int, seed: int) -> Iterator[Row]:
     when = np.arange(changes) * (ticks // changes)
     due = rng.uniform(0.05, 0.95, size=(changes, len(links)))
     every, time = np.arange(len(links)), np.repeat(when * flown.DT, len(links))
-    measured = trace.MeasuredAvailability(time, np.tile(every, changes), due.ravel())
-    read = Trace(*trace.table(measured, links, every >= 0, flown.DT, ticks), True, True)
+    measured = trace.Measured(time, np.tile(every, changes), due.ravel())
+    read = Trace(*measured.over(len(links), flown.DT, ticks), True, True)
     lost = flown.fly(flown.medium(seed, links, traces=(read,)), ticks).kind[:, 0] == Verdict.LOST
     against = Against("trace", f"{changes} changes on each of {len(links)} links")
     hits = np.add.reduceat(~lost, when, axis=0)

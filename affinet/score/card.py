@@ -33,9 +33,13 @@ class Task(Section):
     recovered: Positive = key(..., "below which error it has recovered", "m")
     noisier: list[str] = key(list, "overrides that make its sensors worse: whoever measures has to do worse")
     rivals: list[str] = key(list, "estimators to compare with, where none are named")
-    quick_rivals: list[str] = key(list, "those of the quick form")
+    quick_rivals: list[str] = key(list, "those of the quick form, if others")
     laws: list[str] = key(list, "laws to compare with, where none are named")
     quick: bool = key(False, "whether it is flown in the quick form")
+
+    def quickly(self) -> Task:
+        """Against fewer, where it says so."""
+        return self.model_copy(update={"rivals": self.quick_rivals or self.rivals})
 
 
 class Air(Section):
@@ -112,7 +116,11 @@ class Scorecard(Section):
         return self.model_copy(
             update={
                 "seeds": self.quick_seeds,
-                "tasks": [task.model_copy(update={"rivals": task.quick_rivals}) for task in self.tasks if task.quick],
+                "tasks": [
+                    task.model_copy(update={"rivals": task.quick_rivals or task.rivals})
+                    for task in self.tasks
+                    if task.quick
+                ],
                 "airs": [air for air in self.airs if air.quick],
                 "worsenings": [one for one in self.worsenings if one.quick],
             }

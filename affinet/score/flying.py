@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
@@ -104,11 +104,16 @@ class Timed(NamedTuple):
 
 
 def cell(given: Cell) -> Flown:
-    """Fly a cell."""
-    try:
-        plans = given.plans(given.seeds)
-    except (ScenarioError, PlanError) as error:
-        return Flown({}, str(error))
+    """Fly a cell.
+
+    Raises
+    ------
+    ScenarioError, PlanError
+        When the task cannot be flown through this air, whoever flies.
+    """
+    if (unsuited := _unsuited(given)) is not None:
+        return Flown({}, unsuited)
+    plans = given.plans(given.seeds)
     found = [measures.of(run, given.task) for run in rehearse_all(plans)]
     return Flown({name: [float(getattr(one, name)) for one in found] for name in Measured._fields}, None)
 
@@ -120,9 +125,7 @@ def descent(given: Descent) -> list[float]:
 
     Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
     """
-    try:
-        given.cell.plans(given.cell.seeds[:1], given.worsening.at(given.worsening.most))
-    except (ScenarioError, PlanError):
+    if _unsuited(given.cell) is not None:
         return []  # the cells of the same task say why
     seeds, worse = given.cell.seeds, given.worsening
     low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
@@ -139,14 +142,22 @@ def timed(given: Cell) -> Timed | None:
 
     None of an entrant that does not suit the task.
     """
-    try:
-        (plan,) = given.plans(given.seeds[:1])
-    except (ScenarioError, PlanError):
+    if _unsuited(given) is not None:
         return None
+    (plan,) = given.plans(given.seeds[:1])
     rehearse(plan)  # kernels are compiled
     took = [rehearse(plan).outcome.wall_s for _ in range(_TIMED)]
     said = measures.load_of(plan)
     return Timed(median(took) / plan.world.ticks, said.messages, said.bytes)
+
+
+def _unsuited(given: Cell) -> str | None:
+    """Why the entrant does not suit the task, whatever the air; None where it does."""
+    try:
+        replace(given, set=()).plans(given.seeds[:1])
+    except (ScenarioError, PlanError) as error:
+        return str(error)
+    return None
 
 
 def _lost(given: Descent, seeds: Sequence[int], worse: Sequence[float]) -> Any:

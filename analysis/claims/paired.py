@@ -11,6 +11,8 @@ from analysis.claims import intervals
 from analysis.claims.intervals import Interval
 from analysis.models.arrays import Array
 
+_LEAST = 1e-12  # an error below is none, and has no logarithm
+
 
 class Comparison(StrEnum):
     """How one compares with another: the same where they differ by less than matters, undecided where it cannot be told."""
@@ -99,4 +101,4 @@ def larger(values: Array, others: Array, tests: int, confidence: float) -> Compa
 
 
 def _logs(values: Array, worst: float) -> Array:
-    return np.asarray(np.log(np.where(values < worst, values, worst)))
+    return np.asarray(np.log(np.clip(np.where(values < worst, values, worst), _LEAST, None)))
