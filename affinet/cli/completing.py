@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,13 @@ from affinet.cli.helping import commands_of
 from affinet.scenario import files
 from netem.loading.offers import offered
 
+# Where the script goes, in place of what shtab says of it: as docs/commands.md and the help do.
+_USAGE = re.compile(r"^# Usage:\n(?:#.*\n)+", re.MULTILINE)
+_PLACE = {
+    "bash": "affinet completion bash > ~/.local/share/bash-completion/completions/affinet",
+    "zsh": 'affinet completion zsh > "${fpath[1]}/_affinet"',
+    "fish": "affinet completion fish > ~/.config/fish/completions/affinet.fish",
+}
 Completed = Mapping[str, Any]  # as shtab has it: a function by shell, and what defines it under "preamble"
 
 
@@ -28,7 +36,7 @@ def script(shell: str, whole: argparse.ArgumentParser) -> str:
         for action in parser._actions:
             if action.choices is None and action.dest in known:
                 vars(action)["complete"] = known[action.dest]
-    return shtab.complete(whole, shell)
+    return _USAGE.sub(f"# {_PLACE[shell]}\n", shtab.complete(whole, shell), count=1)
 
 
 def _estimators() -> Completed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -53,7 +54,9 @@ def show(console: Console, rows: Sequence[Row], unit: str, *, intervals: bool) -
 
 def warn(console: Console, quantity: Quantity, rows: Sequence[Row]) -> None:
     """Say what to think of a mean whose interval has numbers that the quantity cannot have."""
-    scattered = [row for row in rows if row.found is not None and row.low is not None and row.low < 0.0 <= row.found]
+    scattered = [
+        row for row in rows if row.found is not None and row.low is not None and -math.inf < row.low < 0.0 <= row.found
+    ]
     if scattered and quantity not in _SIGNED and not quantity.startswith(REPORT):
         says = (
             "of an interval that reaches below 0 few runs make the mean: fly more, or take the median (docs/studies.md)"

@@ -186,11 +186,12 @@ def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
         for entry in counterexample.scenario.timeline:
             said = entry.model_dump(mode="json", exclude_none=True)
             console.print(plain(f"  {said.pop('verb')} {said}"))
-    table = Table("tried", "how often", title=f"{coverage.schedules} schedules, {coverage.vacuous} could not tell")
+    table = Table("tried", "how often")
     for counted in (coverage.verbs, coverage.selectors):
         for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
             table.add_row(plain(name), str(number))
         table.add_section()
+    console.print(f"{coverage.schedules} schedules, {coverage.vacuous} could not tell", highlight=False)
     console.print(table)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,8 @@ from affinet.scenario.wrong import ScenarioError
 from netem.core.parts import parts
 from world.recording.file import RECORDING
 
+_SOURCE = re.compile(r" at \S+\.rs:\d+:")  # where the viewer's makers had it fail, which is nothing to a user
+
 
 def watch(parsed: argparse.Namespace) -> None:
     """Show what was flown until the viewer is closed, or the page no longer wanted.
@@ -40,11 +43,15 @@ def watch(parsed: argparse.Namespace) -> None:
                     show(files)
             except NoViewer as error:
                 raise NoViewer(
-                    f"{error}; --serve shows it in a browser, `affinet render` and `report` need neither"
+                    f"{_why(error)}; --serve shows it in a browser, `affinet render` and `report` need neither"
                 ) from error
             return
         with WebViewer(files) as web:
             _until_asked(web, f"{web.page}\nserved until Ctrl-C")
+
+
+def _why(error: NoViewer) -> str:
+    return _SOURCE.sub(":", str(error)).rstrip(".")
 
 
 @contextmanager
@@ -60,7 +67,7 @@ def live(parsed: argparse.Namespace) -> Iterator[str | None]:
         viewer = open_viewer() if parsed.view else None
     except NoViewer as error:
         viewer = None
-        _tell(one_line(f"{error}; it flies without: `affinet watch RUN` shows it later, --serve in a browser"))
+        _tell(one_line(f"{_why(error)}; it flies without: `affinet watch RUN` shows it later, --serve in a browser"))
     yield viewer
 
 

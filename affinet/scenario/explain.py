@@ -105,12 +105,35 @@ def _mistake(model: type[BaseModel], problem: Mapping[str, Any]) -> Mistake:
     if code == "extra_forbidden":
         table = forms.place(model, loc[:-1])
         known = sorted(forms.bare(table.kind).model_fields)
-        near = hint(loc[-1], known)
+        near = _within(loc, model) or hint(loc[-1], known) or _called(loc[-1], known)
         meant = ".".join(filter(None, (table.key, near.split("'")[1]))) if near else None
         above = f"{loc[-1]!r} is a key of the file itself; " if not near and loc[-1] in model.model_fields else ""
         says = f"unknown key; {near}{above}known here: {', '.join(known)}"
         return Mistake(where.key, says, (table.path or "the file", where.key), 0, meant)
     return Mistake(where.key, _says(where, problem), (where.path or "the file", code), 2 if code == "missing" else 1)
+
+
+# What a probability of losing a message is called elsewhere.
+_SAME = ({"p", "loss", "probability"},)
+
+
+def _called(word: object, known: Sequence[str]) -> str:
+    """The question whether another word for the same is meant."""
+    others = next((names - {word} for names in _SAME if word in names), set())
+    return next((f"did you mean {name!r}? " for name in known if name in others), "")
+
+
+def _within(loc: Sequence[str | int], model: type[BaseModel]) -> str:
+    """The question whether the key of that name in a table is meant, of one that stands in the file itself."""
+    if len(loc) > 1:
+        return ""
+    tables = ((name, forms.bare(field.annotation)) for name, field in model.model_fields.items())
+    inner = (
+        f"{name}.{loc[0]}"
+        for name, kind in tables
+        if isinstance(kind, type) and issubclass(kind, BaseModel) and loc[0] in kind.model_fields
+    )
+    return next((f"did you mean {key!r}? " for key in inner), "")
 
 
 def _says(where: Place, problem: Mapping[str, Any]) -> str:
@@ -139,7 +162,18 @@ def _says(where: Place, problem: Mapping[str, Any]) -> str:
         return f"{problem['msg'].replace('Input should', 'should')}, got {shown(given)}"
     plain = {int, float, bool}.issuperset(forms.choices(where.kind))
     unquoted = ", without quotes" if plain and _is_no_text(given) else ""
-    return f"should be {forms.form(where.kind, where.path)}{unquoted}, got {shown(given)}"
+    share = _share(given) if float in forms.choices(where.kind) else ""
+    return f"should be {forms.form(where.kind, where.path)}{unquoted}, got {shown(given)}{share}"
+
+
+def _share(given: object) -> str:
+    """What a percentage is as a number."""
+    if not isinstance(given, str) or not given.strip().endswith("%"):
+        return ""
+    try:
+        return f"; write {float(given.strip()[:-1]) / 100.0:.10g}"
+    except ValueError:
+        return ""
 
 
 def _is_no_text(given: object) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +26,8 @@ from netem.core.plain import shown
 
 FILE = inputs.SCENARIO
 _FOLDER = "scenarios"
+_ROW = 100  # letters in a row of a list
+_LIST = re.compile(r'\[\n(?P<items>(?: +(?:[-+.\w]+|"[^"\\\s]*"),\n)+)(?P<indent> *)\]')
 
 
 def shipped() -> list[str]:
@@ -91,7 +95,8 @@ def resolved(out: Path, overrides: Sequence[str] = (), folder: Path | None = Non
     except (OSError, ValueError, TypeError, RecursionError) as error:
         of_tests = "" if out.exists() else ", or a failed test: pytest keeps those of its last three sessions"
         named = f"name one that `affinet run` printed{of_tests}"
-        raise ScenarioError(f"{out}: no run directory: {error}; {named}") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise ScenarioError(f"{out}: no run directory: {why}; {named}") from error
     changed = changes.read(overrides)
     origin, asked_from = _source(str(file), "", changed), folder or out.absolute()
     scenario = _validated(inputs.anchored(raw, out.absolute()), origin, changed, asked_from)
@@ -148,7 +153,22 @@ def _again(given: Scenario, entries: Sequence[Any]) -> Scenario:
 
 def to_toml(given: Scenario) -> str:
     """The scenario as a file says it."""
-    return tomli_w.dumps(given.model_dump(mode="json", exclude_none=True, exclude_defaults=True) | _verbs(given))
+    return _in_rows(
+        tomli_w.dumps(given.model_dump(mode="json", exclude_none=True, exclude_defaults=True) | _verbs(given))
+    )
+
+
+def _in_rows(text: str) -> str:
+    """A file in which lists of numbers, and of words, have as many to a line as it holds, and not one."""
+
+    def row(found: re.Match[str]) -> str:
+        items, indent = " ".join(found["items"].split()).removesuffix(","), found["indent"]
+        if len(indent) + len(items) < _ROW:
+            return f"[{items}]"
+        lines = textwrap.fill(items, _ROW, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ")
+        return f"[\n{lines},\n{indent}]"
+
+    return _LIST.sub(row, text)
 
 
 def _verbs(given: Scenario) -> dict[str, Any]:

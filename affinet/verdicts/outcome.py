@@ -16,7 +16,7 @@ import numpy as np
 
 from affinet.planning.plan import Plan
 from affinet.scenario import inputs, loading
-from affinet.verdicts import measures
+from affinet.verdicts import finite, measures
 from affinet.verdicts.bites import Bite, bites
 from affinet.verdicts.measures import Figures
 from affinet.verdicts.timing import Timing
@@ -259,12 +259,14 @@ def _messages(booked: Accounts, uninstructed: int | None, lost: int) -> dict[str
 
 def _what_is_wrong(plan: Plan, arrays: Arrays | None, booked: Accounts, uninstructed: int | None) -> list[str]:
     wrong = []
-    if arrays is None or not (plan.may_have_gaps or _all(arrays, lambda span: np.isfinite(span["position"]))):
+    if arrays is None:
         wrong.append("the swarm diverged: a position is not a number any more")
+    elif not plan.may_have_gaps and (says := finite.diverged(plan, arrays)):
+        wrong.append(says)
     elif np.isinf(arrays["error"]).any():
         wrong.append("the swarm diverged: its tracking error is too large for a number")
-    elif not _all(arrays, lambda span: np.isfinite(span["estimate"][span["known"]])):
-        wrong.append("an estimate is not a number any more")
+    elif says := finite.unknown(plan, arrays):
+        wrong.append(says)
     if uninstructed:
         wrong.append(f"{uninstructed} messages were lost that nobody ordered")
     if not booked.close:

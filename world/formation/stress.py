@@ -110,9 +110,21 @@ def _programmed(formation: Formation) -> tuple[Array | None, str]:
         return None, f"the nodes do not span {formation.dimension} dimensions: they lie on a line or plane"
     Q = null_space(affine.T).T
     if not basis.shape[1] or not len(Q):
-        return None, "no stress but zero balances the framework"
+        return None, f"no stress but zero balances the framework{_too_few(formation)}"
     with _without_warnings():
         return _optimised(formation, basis, Q)
+
+
+def _too_few(formation: Formation) -> str:
+    """How many edges are missing at least, if they are too few for whatever nodes in general position.
+
+    A framework that is to be universally rigid stays rigid without any one of its edges (Hendrickson).
+    """
+    agents, dimension, edges = formation.agents, formation.dimension, len(formation.edges)
+    least = dimension * agents - dimension * (dimension + 1) // 2 + 1
+    if agents < dimension + 2 or edges >= least:
+        return ""
+    return f"; {agents} nodes in general position need {least} edges at least, and it has {edges}"
 
 
 def _optimised(formation: Formation, basis: Array, Q: Array) -> tuple[Array | None, str]:
@@ -130,7 +142,7 @@ def _optimised(formation: Formation, basis: Array, Q: Array) -> tuple[Array | No
     if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE) or least.value < _RIGID:
         return None, (
             "the framework is not universally rigid: no stress is positive semidefinite of rank "
-            f"N - D - 1 = {len(Q)} (solver: {problem.status}, smallest eigenvalue {least.value})"
+            f"N - D - 1 = {len(Q)} (solver: {problem.status}, smallest eigenvalue {least.value}){_too_few(formation)}"
         )
     weights: Array = basis @ coordinates.value
     return weights, ""

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 
 import pytest
+from paths import DOCS
 
 from affinet.cli import options
 from affinet.cli.commands import main
@@ -51,6 +52,16 @@ def test_bash_completes(typed, completed, tmp_path, capsys):
     )
     assert set(done.stdout.split()) == completed
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_the_script_says_where_it_goes_as_the_docs_do(shell, capsys):
+    (line,) = [
+        line for line in (DOCS / "commands.md").read_text().splitlines() if f"affinet completion {shell}" in line
+    ]
+    said = script(shell, capsys)
+    assert f"# {line.strip()}\n" in said
+    assert "Usage:" not in said
 
 
 @pytest.mark.parametrize("shell", SHELLS)

@@ -113,6 +113,12 @@ def test_what_cannot_be_watched_is_refused(made, line, tmp_path, capsys):
     assert line in said
 
 
+def test_where_in_its_source_a_viewer_failed_is_not_told(runs, viewer, capsys):
+    viewer("echo 'Error: os error at /usr/registry/winit-0.30/src/mod.rs:765: DISPLAY is not set.' >&2; exit 1")
+    assert main(["watch", str(runs / "places")]) == 2
+    assert "ended: Error: os error: DISPLAY is not set; --serve" in capsys.readouterr().err
+
+
 def test_a_viewer_that_fails_is_told(runs, viewer, capsys):
     viewer("echo no display >&2; exit 1")
     assert main(["watch", str(runs / "places")]) == 2

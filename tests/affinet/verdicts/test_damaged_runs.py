@@ -137,6 +137,12 @@ def test_a_byte_that_was_flipped_is_not_the_same_bits(run, tmp_path, capsys):
     assert "tick 19: input of agent 7 is " in replayed(capsys, run, tmp_path, status=1)
 
 
+def test_a_directory_that_is_not_there_is_said_in_words(tmp_path, capsys):
+    line = said(capsys, "watch", tmp_path / "nope", status=2)
+    assert line.startswith(f"{tmp_path / 'nope'}: no run directory: No such file or directory; name one that")
+    assert "Errno" not in line
+
+
 @pytest.mark.parametrize("verb", ["replay", "fit", "inject"])
 @pytest.mark.parametrize("text", ["[" * 100_000, "[]", "7", "null", '"run"', "", "{"])
 def test_a_scenario_that_is_no_table_is_no_run(text, verb, run, tmp_path, capsys):
