@@ -15,7 +15,6 @@ from rich.console import Console
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
 from affinet.cli.status import PASS
-from affinet.planning.plan import PlanError
 from affinet.runtimes.interruption import ended_by_signals
 from affinet.scenario import files
 from affinet.scenario.words import one_line
@@ -107,12 +106,10 @@ def _own_modules(todo: Sequence[Piece]) -> dict[str, set[Module]]:
     own, why = dict[str, set[Module]](), dict[str, str]()
     for piece in todo:
         if piece.kind == "timed" and isinstance(piece.given, Cell):
-            try:
-                found = identity.own_modules(piece.given.plans((1,)))
-            except (ScenarioError, PlanError) as error:
-                why.setdefault(piece.entrant, str(error))
+            if (says := flying.unsuited(piece.given)) is None:
+                own.setdefault(piece.entrant, set()).update(identity.own_modules(piece.given.plans((1,))))
             else:
-                own.setdefault(piece.entrant, set()).update(found)
+                why.setdefault(piece.entrant, says)
     for name, says in why.items():
         if name not in own:
             raise ScenarioError(f"{name} suits none of the tasks: {says}")

@@ -68,16 +68,21 @@ class Cell:
             When the entrant does not suit the task.
         """
         own = f'{self.entrant.key}="{self.entrant.name}"'
-        name = self.task.scenario
-        scenario = str(Path(self.folder) / name) if name.endswith(".toml") else name
-        overrides = (*self.task.set, *self.set, *more, own, "record.enabled=false")
-        plans = [
-            making.make(loading.load(scenario, (*overrides, f"seed={seed}"), Path(self.entrant.folder)))
-            for seed in seeds
-        ]
+        plans = [self._plan((*self.set, *more, own, f"seed={seed}")) for seed in seeds]
         for plan in plans[:1]:
             refuse_in_process(plan)
         return plans
+
+    def asks_for(self) -> tuple[bool, bool]:
+        """Whether the task is for agents to find out where they are, and whether it is to pursue a target."""
+        plan = self._plan(())
+        return plan.localizes, plan.pursues
+
+    def _plan(self, overrides: Sequence[str]) -> Plan:
+        name = self.task.scenario
+        scenario = str(Path(self.folder) / name) if name.endswith(".toml") else name
+        every = (*self.task.set, *overrides, "record.enabled=false")
+        return making.make(loading.load(scenario, every, Path(self.entrant.folder)))
 
 
 @dataclass(frozen=True)
@@ -111,8 +116,8 @@ def cell(given: Cell) -> Flown:
     ScenarioError, PlanError
         When the task cannot be flown through this air, whoever flies.
     """
-    if (unsuited := _unsuited(given)) is not None:
-        return Flown({}, unsuited)
+    if (why := unsuited(given)) is not None:
+        return Flown({}, why)
     plans = given.plans(given.seeds)
     found = [measures.of(run, given.task) for run in rehearse_all(plans)]
     return Flown({name: [float(getattr(one, name)) for one in found] for name in Measured._fields}, None)
@@ -125,7 +130,7 @@ def descent(given: Descent) -> list[float]:
 
     Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
     """
-    if _unsuited(given.cell) is not None:
+    if unsuited(given.cell) is not None:
         return []  # the cells of the same task say why
     seeds, worse = given.cell.seeds, given.worsening
     low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
@@ -142,7 +147,7 @@ def timed(given: Cell) -> Timed | None:
 
     None of an entrant that does not suit the task.
     """
-    if _unsuited(given) is not None:
+    if unsuited(given) is not None:
         return None
     (plan,) = given.plans(given.seeds[:1])
     rehearse(plan)  # kernels are compiled
@@ -151,13 +156,15 @@ def timed(given: Cell) -> Timed | None:
     return Timed(median(took) / plan.world.ticks, said.messages, said.bytes)
 
 
-def _unsuited(given: Cell) -> str | None:
+def unsuited(given: Cell) -> str | None:
     """Why the entrant does not suit the task, whatever the air; None where it does."""
     try:
-        replace(given, set=()).plans(given.seeds[:1])
+        (plan,) = replace(given, set=()).plans(given.seeds[:1])
     except (ScenarioError, PlanError) as error:
         return str(error)
-    return None
+    if (plan.localizes, plan.pursues) == given.asks_for():
+        return None
+    return "what it reports is not what the task is about: places of agents, a target, or neither"
 
 
 def _lost(given: Descent, seeds: Sequence[int], worse: Sequence[float]) -> Any:

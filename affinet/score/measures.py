@@ -54,9 +54,9 @@ class Load(NamedTuple):
 
 
 def of(run: Evidence, task: Task) -> Measured:
-    """What is measured of a run of a task."""
+    """What is measured of a run of a task; one that failed, as a number in it is none, was as bad as can be."""
     with np.errstate(over="ignore", invalid="ignore"):  # of one that has diverged
-        error = _error(run)
+        error = np.full(run.ticks, np.inf) if run.outcome.verdict == "fail" else _error(run)
         end = error[-max(1, round(_END * run.ticks)) :]
         return Measured(
             error=_root_mean_square(error[~np.isnan(error)]),

@@ -1,6 +1,7 @@
 """A score as one has it: every run is the run alone, what has flown does not fly again, file and page say what came out."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -165,6 +166,27 @@ def test_what_cannot_be_scored_is_one_line(capsys, words, says):
     assert main(["score", "--card", "mine.toml", *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(says)
+
+
+def test_one_that_reports_something_else_does_not_suit_a_task():
+    says = "what it reports is not what the task is about"
+    assert flying.unsuited(cell("jor")).startswith(says)
+    assert flying.unsuited(cell("rkf")) is None
+    places = replace(cell("rkf"), task=TASK.model_copy(update={"scenario": "localization", "set": []}))
+    assert flying.unsuited(places).startswith(says)
+    assert flying.unsuited(replace(places, entrant=Entrant("agents.estimator", "jor", "."))) is None
+    assert flying.timed(cell("jor")) is None
+    assert flying.descent(Descent(cell("jor"), LOSS)) == []
+
+
+def test_a_run_in_which_an_estimate_is_no_number_is_lost(place, monkeypatch):
+    monkeypatch.syspath_prepend(str(place))
+    name = write(
+        place, broken(ESTIMATOR, ("Estimate(state.measured,", "Estimate(np.where(late, np.nan, state.measured),"))
+    )
+    entrant = Entrant("agents.estimator", f"{name}:Own", str(place))
+    flown = flying.cell(replace(cell("none", "agents.law=rest"), entrant=entrant))
+    assert (flown.runs["error"], flown.runs["lost"]) == ([np.inf] * 3, [1.0] * 3)
 
 
 def test_an_air_that_no_task_can_be_flown_through_is_an_error(place, capsys):
