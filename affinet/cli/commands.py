@@ -34,6 +34,7 @@ _WORK: Mapping[str, tuple[str, str]] = {
     "watch": ("watching", "watch"),
     "render": ("rendering", "render"),
     "compare": ("comparing", "compare"),
+    "diff": ("differing", "diff"),
     "report": ("reporting", "report"),
     "export": ("exporting", "write"),
     "fit": ("fitting", "fit"),

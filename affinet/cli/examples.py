@@ -84,6 +84,7 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example("affinet compare runs/kept runs/kept", "settings, figures, and the first tick in which they part"),
         Example("affinet compare runs/kept runs/kept --out errors.png", "and their curves over each other"),
     ),
+    "diff": (Example("affinet diff runs/kept --seed 8", "where it parts from a run of another seed, and after what"),),
     "report": (
         Example("affinet report runs/kept --out run.html", "a page with a scene, curves, faults, messages, settings"),
         Example("affinet report studies/bursts-quick", "its claims, figures and cases", alone=False),

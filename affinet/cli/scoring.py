@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich import progress as bar
@@ -23,7 +24,8 @@ from affinet.score import card as cards
 from affinet.score import flying, judging, measures, page, record, scoring
 from affinet.score.flying import Cell
 from affinet.score.scoring import Kept, Piece
-from affinet.studies import identity, pool
+from affinet.studies import cluster, identity, pool
+from affinet.studies.executor import Executor
 from affinet.studies.identity import Module
 
 PAGE = "score.html"
@@ -43,15 +45,14 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
     who = scoring.entrants(card, parsed.name, parsed.against, laws=parsed.law)
     folder = files.working_directory()
     todo = list(scoring.pieces(card, who, key, folder))
-    flies = _flies(todo, parsed.name)
+    own = _own_modules(todo)
+    flies = _flies(own)
     out = _directory(parsed)
     pieces = out / scoring.PIECES
     pieces.mkdir(parents=True, exist_ok=True)
     kept = Kept(pieces, {name: identity.digest(sorted(of.items())) for name, of in flies.items()})
-    with ended_by_signals(), _bar(parsed.name, len(todo)) as shown:
-        found = scoring.fly(
-            todo, pool.on_this_machine(parsed.jobs), kept, lambda done: shown.see(done, f"{done}/{len(todo)} pieces")
-        )
+    with ended_by_signals(), _executor(parsed, own) as executor, _bar(parsed.name, len(todo)) as shown:
+        found = scoring.fly(todo, executor, kept, lambda done: shown.see(done, f"{done}/{len(todo)} pieces"))
     if kept.there:
         print(one_line(f"{kept.there} of {len(todo)} pieces were there"), file=sys.stderr)  # noqa: T201
     raw = scoring.together(card, who, todo, found)
@@ -67,6 +68,15 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
             console.print(plain(f"- {one_line(sentence)}"), soft_wrap=True)
         console.print(plain(f"{out / PAGE} has all of it, {out / record.FILE} for programs"), soft_wrap=True)
     return PASS
+
+
+@contextmanager
+def _executor(parsed: argparse.Namespace, own: Mapping[str, set[Module]]) -> Iterator[Executor]:
+    if parsed.dask is None:
+        yield pool.on_this_machine(parsed.jobs)
+        return
+    with cluster.connected(parsed.dask, sorted(set().union(*own.values()))) as workers:
+        yield workers
 
 
 def _bar(name: str, pieces: int) -> Bar:
@@ -86,24 +96,30 @@ def _directory(parsed: argparse.Namespace) -> Path:
     return out
 
 
-def _flies(todo: Sequence[Piece], name: str) -> dict[str, dict[str, str]]:
-    """Of whose code the bits of each entrant come.
+def _own_modules(todo: Sequence[Piece]) -> dict[str, set[Module]]:
+    """Modules of a user's own that each entrant flies by.
 
     Raises
     ------
     ScenarioError
-        When the one that is scored suits no task, or a rival is none.
+        When one of them suits no task.
     """
-    code = identity.digest([Path(str(module.__file__)).read_bytes() for module in (flying, measures)])
-    own, why = dict[str, set[Module]](), list[str]()
+    own, why = dict[str, set[Module]](), dict[str, str]()
     for piece in todo:
         if piece.kind == "timed" and isinstance(piece.given, Cell):
-            of = own.setdefault(piece.entrant, set())
             try:
-                of.update(identity.own_modules(piece.given.plans((1,))))
+                found = identity.own_modules(piece.given.plans((1,)))
             except (ScenarioError, PlanError) as error:
-                why += [str(error)] * (piece.entrant == name)
-    tasks = sum(piece.kind == "timed" and piece.entrant == name for piece in todo)
-    if len(why) == tasks:
-        raise ScenarioError(f"{name} suits none of the tasks: {why[0]}")
-    return {who: {**identity.here(sorted(of)), "the score": code} for who, of in own.items()}
+                why.setdefault(piece.entrant, str(error))
+            else:
+                own.setdefault(piece.entrant, set()).update(found)
+    for name, says in why.items():
+        if name not in own:
+            raise ScenarioError(f"{name} suits none of the tasks: {says}")
+    return own
+
+
+def _flies(own: Mapping[str, set[Module]]) -> dict[str, dict[str, str]]:
+    """Of whose code the bits of each entrant come."""
+    code = identity.digest([Path(str(module.__file__)).read_bytes() for module in (flying, measures)])
+    return {name: {**identity.here(sorted(of)), "the score": code} for name, of in own.items()}

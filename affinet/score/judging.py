@@ -17,7 +17,7 @@ from analysis.models.arrays import Array
 
 CONFIDENCE = 0.95
 MATTERS = 1.1  # a factor of errors up to which one is as good as another
-_ASTRAY = 10.0  # times what loses a swarm: beyond that one error is as bad as another
+ASTRAY = 10.0  # times what loses a swarm: beyond that one error is as bad as another
 _TELLS_THE_TRUTH = (1 / 1.1, 1.1)  # of a normalised estimation error squared
 
 
@@ -119,7 +119,7 @@ def _compared(raw: Raw) -> Iterator[Compared]:
     ]
     for task, air, rival in pairs:
         one, other = (raw.runs(task.name, air, who, "error") for who in (raw.scored, rival))
-        factor = paired.ratio(one, other, _ASTRAY * task.lost, len(pairs), CONFIDENCE)
+        factor = paired.ratio(one, other, ASTRAY * task.lost, len(pairs), CONFIDENCE)
         yield Compared(task.name, air, rival, factor, paired.compared(factor, MATTERS))
 
 

@@ -69,7 +69,7 @@ class OverSeeds:
     share
         Of the runs that told anything, those that pass, with the interval.
     passed, failed, vacuous
-        How many passed, which failed, and the seeds of those that put nothing to the test.
+        The seeds of those that passed, which failed, and the seeds of those that put nothing to the test.
     most
         How many there are: it may have been decided before all had flown.
     """
@@ -79,7 +79,7 @@ class OverSeeds:
     asked: float | None
     confidence: float
     share: Interval
-    passed: int
+    passed: tuple[int, ...]
     failed: tuple[FailedSeed, ...]
     vacuous: tuple[int, ...]
     most: int
@@ -87,7 +87,7 @@ class OverSeeds:
     @property
     def flown(self) -> int:
         """How many runs were flown."""
-        return self.passed + len(self.failed) + len(self.vacuous)
+        return len(self.passed) + len(self.failed) + len(self.vacuous)
 
     @property
     def worst(self) -> FailedSeed | None:
@@ -95,11 +95,11 @@ class OverSeeds:
         return max(self.failed, key=lambda one: one.worst, default=None)
 
     def __str__(self) -> str:
-        told, early = self.passed + len(self.failed), self.flown < self.most
+        told, early = len(self.passed) + len(self.failed), self.flown < self.most
         low, high = (f"{100 * end:.4g}" for end in (self.share.low, self.share.high))
         wanted = "all have to" if self.asked is None else f"{100 * self.asked:g} % have to"
         says = [
-            f"{self.name}: {self.verdict}: {self.passed} of {told} runs pass, {low} to {high} % "
+            f"{self.name}: {self.verdict}: {len(self.passed)} of {told} runs pass, {low} to {high} % "
             f"with {100 * self.confidence:g} % confidence, and {wanted}",
             *([f"decided after {self.flown} of {self.most} runs"] if early else []),
             *([f"{len(self.vacuous)} runs put nothing to the test: {_seeds(self.vacuous)}"] if self.vacuous else []),
@@ -181,7 +181,7 @@ class FlownSeeds:
             asked=share,
             confidence=confidence,
             share=interval,
-            passed=tally.passed,
+            passed=tuple(tally.passed),
             failed=tuple(tally.failed),
             vacuous=tuple(tally.vacuous),
             most=len(self._seeds),
@@ -202,7 +202,7 @@ class FlownSeeds:
 class _Tally:
     """What runs came to so far."""
 
-    passed: int = 0
+    passed: list[int] = field(default_factory=list)
     failed: list[FailedSeed] = field(default_factory=list)
     vacuous: list[int] = field(default_factory=list)
 
@@ -214,12 +214,12 @@ class _Tally:
         elif verdict == "vacuous":
             self.vacuous.append(seed)
         else:
-            self.passed += 1
+            self.passed.append(seed)
 
     def judged(self, share: float | None, look: Look, *, last: bool) -> tuple[SeedsVerdict | None, Interval]:
         """What is decided at a look, or None where it has to be looked at again; and the share of those that pass."""
-        told = self.passed + len(self.failed)
-        interval = sequential.found(self.passed, told, look)
+        told = len(self.passed) + len(self.failed)
+        interval = sequential.found(len(self.passed), told, look)
         if not told:
             return "vacuous" if last else None, interval
         if share is None:

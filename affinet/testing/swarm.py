@@ -44,10 +44,11 @@ def flown(plan: Plan, runtime: Runtime, out: Path) -> FlownRun:
 
 
 class KeptWorst(NamedTuple):
-    """The worst run of many seeds, the others that fail, and the directory that holds all of the worst."""
+    """The worst run of many seeds, the others that fail, a seed that passes, and the directory of the worst."""
 
     worst: FailedSeed
     others: Sequence[FailedSeed]
+    passing: int | None
     out: Path
 
 
@@ -179,7 +180,8 @@ class SwarmRuns:
                 if asked.verdict != "holds" and (worst := asked.worst) is not None:
                     out = self._room() / "run"
                     fly(many.plan(worst.seed), "processes", out, lambda *_: None)
-                    kept.append(KeptWorst(worst, [one for one in asked.failed if one is not worst], out))
+                    others = [one for one in asked.failed if one is not worst]
+                    kept.append(KeptWorst(worst, others, next(iter(asked.passed), None), out))
         return kept
 
     def clear(self) -> None:

@@ -36,7 +36,10 @@ def test_no_script_is_left_out():
     assert all(f'"{script}.py"' in (ROOT / "tests" / file).read_text() for script, file in ELSEWHERE.items())
 
 
-@pytest.mark.parametrize("script", SMALLEST)
+# All together take as long as each of them, and what tests of their own have been through already.
+@pytest.mark.parametrize(
+    "script", [pytest.param(script, marks=[pytest.mark.slow] if script == "all" else []) for script in SMALLEST]
+)
 def test_a_script_runs_at_its_smallest_size(script):
     # A script died of a TypeError: messages had got fields it did not give.
     size, row = SMALLEST[script]

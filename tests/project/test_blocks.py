@@ -18,6 +18,7 @@ import affinet
 from affinet.cli import options
 from affinet.runtimes.machines.hosts import Hosts
 from affinet.scenario.sections import Scenario
+from affinet.score.card import Scorecard
 from affinet.studies import study
 
 PARTS = {*Scenario.model_fields, *study.Study.model_fields, *Hosts.model_fields}
@@ -64,8 +65,11 @@ def wrong_python(block):
 
 
 def wrong_toml(block):
-    """Keys of the first order that neither scenarios nor studies have, where it is of one of them."""
-    keys = set(tomllib.loads(block))
+    """Keys of the first order that neither scenarios nor studies have, where it is of one of them; scorecards are whole."""
+    keys = set(says := tomllib.loads(block))
+    if "tasks" in keys:
+        Scorecard.model_validate(says)
+        return []
     return sorted(keys - PARTS) if keys & PARTS else []
 
 
@@ -103,6 +107,8 @@ def test_what_is_wrong_is_found():
     assert not wrong_command("affinet run corridor --json > out.json  # all of it")
     assert wrong_python("import affinet\naffinet.fly()\nfrom affinet import run, walk") == ["fly", "walk"]
     assert wrong_toml("[formation]\n[manouvre]") == ["manouvre"]
+    with pytest.raises(ValueError, match="airs"):
+        wrong_toml("[[tasks]]")
     found = list(blocks("a\n\n    affinet run x\n\n```python\nb\n```\n"))
     assert found == [("python", "b\n"), ("", "affinet run x\n")]
 

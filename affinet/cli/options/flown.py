@@ -24,6 +24,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     _add_watch(commands)
     _add_render(commands)
     _add_compare(commands)
+    _add_diff(commands)
     _add_report(commands)
     _add_export(commands)
     _add_fit(commands)
@@ -68,6 +69,19 @@ def _add_compare(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--out", type=Path, metavar="FILE", help=f"their curves over each other, as a picture: {', '.join(OVERLAID)}"
     )
     compare.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _add_diff(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    diff = commands.add_parser(
+        "diff",
+        help="where a run that fails parts from one that passes, and what was lost before",
+        description="Of the agent that goes wrong most, the ticks in which its error, the error of its estimates and the age "
+        "of its news leave those of the other run for good, and what the links to it lost in the seconds before.",
+    )
+    diff.add_argument("run", type=Path, metavar="RUN", help="directory of the run that fails")
+    diff.add_argument("other", nargs="?", type=Path, metavar="OTHER", help="directory of the run that passes")
+    diff.add_argument("--seed", type=values.seed, metavar="N", help="or fly one with this seed, in this process")
+    diff.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _add_report(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

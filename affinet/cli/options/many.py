@@ -34,7 +34,11 @@ def _add_study(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="DIR",
         help="default: studies/NAME, numbered where that is taken; one that was interrupted there goes on",
     )
-    where = study.add_mutually_exclusive_group()
+    _add_where(study)
+
+
+def _add_where(command: argparse.ArgumentParser) -> None:
+    where = command.add_mutually_exclusive_group()
     where.add_argument(
         "--jobs",
         type=values.count,
@@ -72,12 +76,7 @@ def _add_score(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     score.add_argument(
         "--out", type=values.path, metavar="DIR", help="default: scores/NAME; what has flown there does not fly again"
     )
-    score.add_argument(
-        "--jobs",
-        type=values.count,
-        metavar="N",
-        help="in so many processes (default: as many as processors; 1: this one)",
-    )
+    _add_where(score)
     score.add_argument("--json", action="store_true", help="print one JSON object as the last line")
 
 

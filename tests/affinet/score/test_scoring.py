@@ -157,6 +157,7 @@ def test_a_law_is_scored_likewise(capsys):
     [
         (("nobody",), "nobody suits none of the tasks: override: agents.estimator: no 'nobody'"),
         (("target",), "target suits none of the tasks: "),
+        (("rkf", "--against", "nobody"), "nobody suits none of the tasks: override: agents.estimator: no 'nobody'"),
         (("rkf", "--card", "no.toml"), "no.toml: no such file, and no such scorecard"),
     ],
 )
