@@ -58,9 +58,7 @@ def warn(console: Console, quantity: Quantity, rows: Sequence[Row]) -> None:
         row for row in rows if row.found is not None and row.low is not None and -math.inf < row.low < 0.0 <= row.found
     ]
     if scattered and quantity not in _SIGNED and not quantity.startswith(REPORT):
-        says = (
-            "of an interval that reaches below 0 few runs make the mean: fly more, or take the median (docs/studies.md)"
-        )
+        says = "an interval reaches below 0: a few runs make the mean; fly more, or take the median (docs/studies.md)"
         console.print(plain(says), soft_wrap=True)
 
 

@@ -192,10 +192,20 @@ class FlownSeeds:
         return planning.make(self._scenario.model_copy(update={"seed": seed}))
 
     def _flown(self, seeds: Sequence[int]) -> Sequence[Evidence]:
+        plans = [self.plan(seed) for seed in seeds]
         try:
-            return self._launch([self.plan(seed) for seed in seeds])
-        except UserCodeError as error:
-            raise Broken(str(error)) from error
+            return self._launch(plans)
+        except UserCodeError:  # of which seed is told by one after the other
+            for plan in plans:
+                _alone(self._launch, plan)
+            raise
+
+
+def _alone(launch: Callable[[Sequence[Plan]], Sequence[Evidence]], plan: Plan) -> None:
+    try:
+        launch([plan])
+    except UserCodeError as error:
+        raise Broken(f"seed {plan.scenario.seed}: {error}") from error
 
 
 @dataclass

@@ -69,7 +69,8 @@ def _built(node: ast.expr) -> Checker:
         case ast.UnaryOp(ast.Invert(), operand):
             return ~_built(operand)
         case ast.Call(ast.Name(name), given, named) if name in NAMED:
-            return NAMED[name](*map(_argument, given), **{str(one.arg): _number(one.value) for one in named})
+            first = [_name(one) if name == "below" else _argument(one) for one in given[:1]]
+            return NAMED[name](*first, *map(_argument, given[1:]), **_words(named))
         case ast.Call(ast.Name(name)) | ast.Name(name) if name not in NAMED:
             raise ValueError(f"{name} is no checker; {hint(name, NAMED)}".rstrip("; "))
         case ast.Name(name):
@@ -77,14 +78,24 @@ def _built(node: ast.expr) -> Checker:
     raise ValueError(f"{ast.unparse(node)} is no checker")
 
 
-def _argument(node: ast.expr) -> float | str | Signal:
-    """A number; the name of a metric, in quotes; or a signal."""
+def _argument(node: ast.expr) -> float | Signal:
     match node:
-        case ast.Constant(str() as name):
-            return name
         case ast.Constant() | ast.UnaryOp(ast.USub() | ast.UAdd()):
             return _number(node)
     return _signal(node)
+
+
+def _name(node: ast.expr) -> str:
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    raise ValueError(f"{ast.unparse(node)} is no name of a metric: write it in quotes, like below('nees', 3)")
+
+
+def _words(given: list[ast.keyword]) -> dict[str, float]:
+    words = {str(one.arg): _number(one.value) for one in given}
+    if len(words) < len(given):
+        raise ValueError("a word is given twice")
+    return words
 
 
 def _signal(node: ast.expr) -> Signal:
@@ -99,8 +110,9 @@ def _signal(node: ast.expr) -> Signal:
             return _COMPARED[type(sign)](quantity(name), _number(level))
         case ast.Call(ast.Attribute(one, method), given, named) if method in _OF_SIGNALS:
             signals, numbers = given[: _OF_SIGNALS[method]], given[_OF_SIGNALS[method] :]
-            words = {str(word.arg): _number(word.value) for word in named}
-            made: Signal = getattr(_signal(one), method)(*map(_signal, signals), *map(_number, numbers), **words)
+            made: Signal = getattr(_signal(one), method)(
+                *map(_signal, signals), *map(_number, numbers), **_words(named)
+            )
             return made
     raise ValueError(
         f"{ast.unparse(node)} is no signal: compare a quantity with a number, in brackets, like (error < 0.3)"
@@ -108,7 +120,10 @@ def _signal(node: ast.expr) -> Signal:
 
 
 def _number(node: ast.expr) -> float:
-    value = ast.literal_eval(node)
+    try:
+        value = ast.literal_eval(node)
+    except ValueError:
+        value = None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise ValueError(f"{ast.unparse(node)} is no number")
     return float(value)

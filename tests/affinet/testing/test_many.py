@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from flying import plan_of
+from own_code import ESTIMATOR, write
+from own_code import broken as broken_text
 
 from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import loading
@@ -178,3 +180,27 @@ def test_a_verdict_is_of_one_run(tmp_path):
     runs = SwarmRuns("inprocess", None, lambda: tmp_path, tmp_path)
     with pytest.raises(ValueError, match="say in `check` which share has to pass"):
         runs("corridor", *SHORT).fly("fail", seeds=3)
+
+
+def test_an_estimator_that_fails_is_named_with_the_seed(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    name = write(
+        tmp_path, broken_text(ESTIMATOR, ("late = np", "late = np.abs(state.measured).max() > 5.5 and 1 / 0 or np"))
+    )
+    runs = SwarmRuns("inprocess", None, lambda: tmp_path, tmp_path)
+    swarm = runs("corridor", *SHORT, "agents.law=rest", f"agents.estimator={name}:Own")
+
+    def fails(seed):
+        try:
+            swarm.fly(seeds=[seed]).check()
+        except Broken as error:
+            return str(error)
+        return None
+
+    said = {seed: fails(seed) for seed in range(1, 9)}
+    first = next(seed for seed, says in said.items() if says)
+    assert None in said.values()
+    with pytest.raises(Broken) as caught:
+        swarm.fly(seeds=8).check(share=0.5)
+    assert str(caught.value) == said[first]
+    assert said[first].startswith(f"seed {first}: {name}:Own.fuse in tick ")

@@ -253,6 +253,11 @@ def test_what_is_written_in_words_is_what_python_makes(words, made):
         ("always(__import__('os').system('true'))", "is no signal"),
         ("error < 2", "is no checker"),
         ("below('neess', 3)", "no metric 'neess'"),
+        ("below('nees', 'much')", "'much' is no number"),
+        ("below(nees, 3)", "nees is no name of a metric: write it in quotes"),
+        ("bounded('5')", "'5' is no number"),
+        ("always(error < nan)", "nan is no number"),
+        ("always((error < 1).eventually(within=2, within=3))", "a word is given twice"),
     ],
 )
 def test_what_is_no_signal_in_words_is_one_line(words, says):
