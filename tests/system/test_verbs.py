@@ -168,7 +168,7 @@ def test_a_verb_whose_condition_never_comes_makes_the_run_vacuous_and_changes_no
 @pytest.mark.parametrize("verb", [verb for verb in verbs.VERBS if verb not in ENDED_BY])
 def test_what_lies_beyond_the_end_of_the_run_is_noted_and_makes_it_vacuous(verb, flown):
     flight = flown(*scripted(verb, 2.0))
-    assert any(f"'{verb}" in note.says and "beyond the end" in note.says for note in flight.plan.findings)
+    assert any(f"'{verb}" in note.says and "the run will be vacuous" in note.says for note in flight.plan.findings)
     (bite,) = flight.outcome.faults
     assert (flight.outcome.verdict, bite.at, bite.touched) == ("vacuous", 2.0, 0)
     assert flight.outcome.digest == flown().outcome.digest
