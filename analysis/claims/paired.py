@@ -9,6 +9,7 @@ from scipy import special
 
 from analysis.claims import intervals
 from analysis.claims.intervals import Interval
+from analysis.models import elementary
 from analysis.models.arrays import Array
 
 _LEAST = 1e-12  # an error below is none, and has no logarithm
@@ -43,7 +44,8 @@ def ratio(values: Array, others: Array, worst: float, tests: int, confidence: fl
     found = intervals.difference(
         _logs(values, worst), _logs(others, worst), paired=True, tests=tests, confidence=confidence
     )
-    return Interval(float(np.exp(found.found)), float(np.exp(found.low)), float(np.exp(found.high)))
+    back = elementary.exp(np.array([found.found, found.low, found.high]))
+    return Interval(float(back[0]), float(back[1]), float(back[2]))
 
 
 def compared(factor: Interval, matters: float) -> Comparison:
@@ -101,4 +103,4 @@ def larger(values: Array, others: Array, tests: int, confidence: float) -> Compa
 
 
 def _logs(values: Array, worst: float) -> Array:
-    return np.asarray(np.log(np.clip(np.where(values < worst, values, worst), _LEAST, None)))
+    return np.asarray(elementary.log(np.clip(np.where(values < worst, values, worst), _LEAST, None)))

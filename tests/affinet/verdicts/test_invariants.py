@@ -6,7 +6,7 @@ import pytest
 from judged import evidence
 
 from affinet.scenario.wrong import ScenarioError
-from affinet.verdicts import checkers, invariants, pursued
+from affinet.verdicts import checkers, invariants, pursued, temporal
 
 
 @pytest.mark.parametrize(
@@ -32,14 +32,14 @@ def test_every_word_makes_its_checker(text, checker):
     assert parsed(evidence()) == checker(evidence())
 
 
-def test_there_is_a_word_for_every_checker_that_numbers_describe():
+def test_there_is_a_word_for_every_checker():
     made = {
         name
-        for module in (checkers, pursued)
+        for module in (checkers, pursued, temporal)
         for name, function in inspect.getmembers(module, inspect.isfunction)
         if not name.startswith("_") and inspect.signature(function).return_annotation == "Checker"
     }
-    assert set(invariants.NAMED) == made - {"always", "eventually", "below"}  # which take signals, or a name
+    assert set(invariants.NAMED) == made
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,8 @@ EXEMPT = {
         world.recording.stage.Stage.scalars world.recording.stage.Stage.arrows world.recording.stage.Stage.segments
         world.recording.curves.EachAgent.log world.books.counted.per_tick world.formation.nominal.Formation.ends
         analysis.figures.axes.finish analysis.figures.swarm.film
-        analysis.claims.checks.flat
+        analysis.claims.checks.flat analysis.claims.paired.ratio analysis.claims.paired.median
+        analysis.claims.paired.larger
         analysis.claims.checks.approaches
         analysis.claims.checks.lower analysis.claims.checks.ratio analysis.claims.checks.stays_below
         analysis.claims.checks.leaves analysis.claims.checks.exponential analysis.claims.checks.never_above
