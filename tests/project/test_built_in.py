@@ -1,0 +1,77 @@
+"""The page of the built-in estimators: it is what its script writes of the score, and what it answers is what came out."""
+
+import json
+
+import pytest
+import score_page
+from paths import DOCS
+
+KEPT = json.loads((DOCS / "built-in.json").read_text(encoding="utf-8"))
+PLANE = ("corridor", "turns")
+
+
+def best(who, air, tasks=("corridor", "turns", "ravine")):
+    """Whether somebody is among the best in an air, in all of these tasks."""
+    return all(one["entrants"][who]["best"] for one in KEPT["cells"] if one["air"] == air and one["task"] in tasks)
+
+
+def count(who):
+    of = [one["entrants"][who]["best"] for one in KEPT["cells"] if who in one["entrants"]]
+    return sum(of) / len(of)
+
+
+def point(who, worsening, task):
+    (found,) = (
+        one["median"]["found"]
+        for one in KEPT["points"]
+        if (one["entrant"], one["worsening"], one["task"]) == (who, worsening, task)
+    )
+    return float(found)
+
+
+def too_small(who):
+    of = [one["entrants"][who]["nees"] for one in KEPT["cells"]]
+    return sum(one > 1.1 for one in of) / len(of)
+
+
+def test_the_page_is_what_the_script_writes():
+    assert (DOCS / "built-in.md").read_text(encoding="utf-8") == score_page.page(), "python docs/score_page.py"
+
+
+def test_ga_rkf_is_the_one_for_nearly_all():
+    others = ("none", "rkf", "ral", "conral", "imm")
+    assert all(count("ga-rkf") > count(who) for who in others)
+    assert all(best("ga-rkf", air) for air in ("bursts", "blackout", "split", "wifi_busy"))
+
+
+def test_rkf_is_as_good_where_losses_are_independent_and_bears_nothing_that_lasts():
+    assert all(best("rkf", air) for air in ("perfect", "loss 0.2", "loss 0.5"))
+    assert [point("rkf", "outage", task) for task in PLANE] == pytest.approx([13.1, 13.1], abs=0.5)
+    assert point("rkf", "outage", "ravine") == pytest.approx(6.4, abs=0.5)
+    assert [point("rkf", "burst", task) for task in PLANE] == pytest.approx([6, 6], abs=0.5)
+
+
+def test_imm_bears_the_most_losses_in_the_plane_and_no_bursts():
+    for task in PLANE:
+        assert all(
+            point("imm", "loss", task) > point(who, "loss", task) for who in ("none", "rkf", "ral", "conral", "ga-rkf")
+        )
+        assert 1 - point("imm", "loss", task) == pytest.approx(1 / 7, abs=0.05)
+        assert not best("imm", "bursts", (task,))
+
+
+def test_conral_is_as_good_where_losses_last():
+    assert all(best("conral", air) for air in ("bursts", "split"))
+    assert best("conral", "blind", ("ravine",))
+    assert not best("conral", "loss 0.8", ("ravine",))
+
+
+def test_ral_and_none_bear_no_losses_and_nobody_bears_nineteen_in_twenty():
+    assert all(point(who, "loss", task) < 0.31 for who in ("none", "ral") for task in PLANE)
+    lost = [of["lost"] for one in KEPT["cells"] if one["air"] == "loss 0.95" for of in one["entrants"].values()]
+    assert min(lost) > 0.9
+
+
+def test_covariances_are_too_small_as_often_as_it_says():
+    assert too_small("ga-rkf") == pytest.approx(1 / 3, abs=0.06)
+    assert too_small("conral") > 0.5
