@@ -27,7 +27,7 @@ def diff(parsed: argparse.Namespace) -> None:
     failing = reading.evidence(parsed.run)
     passing = reading.evidence(parsed.other) if parsed.seed is None else _flown(parsed)
     try:
-        found = parted.parted(failing, passing)
+        found = parted.parted(failing, passing, None if parsed.at is None else failing.tick(parsed.at))
     except parted.NotAlike as error:
         raise ScenarioError(str(error)) from error
     if parsed.json:

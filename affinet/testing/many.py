@@ -43,12 +43,15 @@ class FailedSeed:
         Of its draws.
     says
         What failed, and why.
+    at
+        When, in seconds, where a checker names a tick.
     worst
         Its largest tracking error, in square metres; infinite where it left the numbers.
     """
 
     seed: int
     says: str
+    at: float | None
     worst: float
 
 
@@ -220,7 +223,7 @@ class _Tally:
         """Count a run, with what checkers found in it."""
         seed, verdict = run.plan.scenario.seed, summed_up(run, findings)
         if verdict == "fail":
-            self.failed.append(FailedSeed(seed, _why(run, findings), _worst(run)))
+            self.failed.append(FailedSeed(seed, _why(run, findings), _when(run, findings), _worst(run)))
         elif verdict == "vacuous":
             self.vacuous.append(seed)
         else:
@@ -261,6 +264,11 @@ def seeds_of(first: int, given: int | Sequence[int]) -> Sequence[int]:
 def _why(run: Evidence, findings: Sequence[CheckResult]) -> str:
     wrong = [str(finding) for finding in findings if finding.verdict == "fail"]
     return "; ".join(wrong or run.outcome.reasons)
+
+
+def _when(run: Evidence, findings: Sequence[CheckResult]) -> float | None:
+    ticks = [finding.tick for finding in findings if finding.verdict == "fail" and finding.tick is not None]
+    return min(ticks) * run.dt if ticks else None
 
 
 def _worst(run: Evidence) -> float:

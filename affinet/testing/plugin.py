@@ -150,13 +150,17 @@ def _kept_of_many(runs: SwarmRuns) -> list[str]:
     for kept in runs.keep_worst():
         where = on_a_command_line(kept.out)
         replay, passes = f"affinet replay {where} --runtime inprocess --seed", kept.passing is not None
+        at = "" if kept.worst.at is None else f" --at {kept.worst.at:g}"
         said.append(
             "\n".join(
                 [
                     f"seed {kept.worst.seed}, the worst of {1 + len(kept.others)} that fail, processes",
                     f"recording: {kept.out / 'run.rrd'}",
                     f"fly the same bits again: affinet replay {where}",
-                    *([f"where it parts from one that passes: affinet diff {where} --seed {kept.passing}"] * passes),
+                    *(
+                        [f"where it parts from one that passes: affinet diff {where} --seed {kept.passing}{at}"]
+                        * passes
+                    ),
                     *(["the others that fail:"] if kept.others else []),
                     *(f"{replay} {one.seed}" for one in kept.others[:_COMMANDS]),
                     *([f"... and {len(kept.others) - _COMMANDS} more"] if len(kept.others) > _COMMANDS else []),

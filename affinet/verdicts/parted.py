@@ -102,8 +102,16 @@ class Parted:
         return said
 
 
-def parted(failing: Evidence, passing: Evidence) -> Parted | None:
+def parted(failing: Evidence, passing: Evidence, at: int | None = None) -> Parted | None:
     """Where a failing run parts from a passing one; None where no agent is farther off in it than in the other.
+
+    Parameters
+    ----------
+    failing, passing
+        The runs.
+    at
+        The tick in which the one fails: of the agent that is farthest off then, and of what comes before. None is when an
+        agent is farthest off in all of the run, which may be at its begin, where draws scatter the agents.
 
     Raises
     ------
@@ -119,6 +127,8 @@ def parted(failing: Evidence, passing: Evidence) -> Parted | None:
     ticks = min(failing.ticks, passing.ticks)
     one, other = (_quantities(run, ticks) for run in (failing, passing))
     off = _excess(one["error"][0], other["error"][0])
+    if at is not None:
+        off = np.where(np.arange(ticks)[:, None] == min(at, ticks - 1), off, 0.0)
     if not (off > 0).any():
         return None
     worst, agent = (int(place) for place in np.unravel_index(int(np.argmax(off)), off.shape))

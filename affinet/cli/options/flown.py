@@ -81,6 +81,12 @@ def _add_diff(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     diff.add_argument("run", type=Path, metavar="RUN", help="directory of the run that fails")
     diff.add_argument("other", nargs="?", type=Path, metavar="OTHER", help="directory of the run that passes")
     diff.add_argument("--seed", type=values.seed, metavar="N", help="or fly one with this seed, in this process")
+    diff.add_argument(
+        "--at",
+        type=values.between(0.0, 1e9),
+        metavar="S",
+        help="when it fails, as the check says (default: when an agent is farthest off)",
+    )
     diff.add_argument("--json", action="store_true", help="print one JSON object")
 
 

@@ -35,6 +35,7 @@ class Planted:
                 plan=plan,
                 outcome=SimpleNamespace(verdict="pass", reasons=()),
                 error=np.array([0.1, plan.scenario.seed / 10]),
+                dt=plan.world.dt,
             )
             for plan in plans
         ]
@@ -118,6 +119,7 @@ def test_those_that_fail_are_named_and_the_worst_is_the_one_with_the_largest_err
     result, _ = broken(["fail", "pass"] * 20, share=0.9)
     assert [one.seed for one in result.failed] == list(range(1, 1 + result.flown, 2))
     assert result.worst == max(result.failed, key=lambda one: one.seed)
+    assert result.worst.at == pytest.approx(3 * 0.05)
     first, *others = str(result).split("\n  ")
     assert first.startswith(f"planted(): fails: {len(result.passed)} of {result.flown} runs pass, ")
     assert "and 90 % have to" in first

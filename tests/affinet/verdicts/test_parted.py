@@ -36,6 +36,16 @@ def test_the_agent_that_was_cut_off_is_named_and_what_was_lost_before(runs):
     assert found.lines()[0].startswith(f"{found.left[0].tick * 0.05:g} s (tick {found.left[0].tick}): ")
 
 
+def test_of_a_moment_the_agent_that_is_farthest_off_then_is_looked_at(runs):
+    failing, passing = runs
+    off = np.linalg.norm(failing.position - failing.arrays["target"], axis=-1)
+    other = np.linalg.norm(passing.position - passing.arrays["target"], axis=-1)
+    for tick in (20, 100, 200):
+        found = parted(failing, passing, tick)
+        assert {one.agent - 1 for one in found.left} == {int(np.argmax((off - other)[tick]))}
+        assert all(one.tick <= tick for one in found.left)
+
+
 def test_what_links_lost_is_counted_in_the_seconds_before(runs):
     failing, passing = runs
     found = parted(failing, passing)
