@@ -26,6 +26,7 @@ from affinet.traces.goodness import Goodness
 from affinet.traces.link_data import INDIRECT, UNITS, LinkData
 from affinet.traces.summary import LinkSummary
 from netem.core.listing import listed
+from netem.processes.system_errors import said
 
 _SHOWN = 20
 _LOOKS = 1.0  # s
@@ -56,9 +57,9 @@ def trace(parsed: argparse.Namespace) -> None:
         found = summary.summaries(data)
         fitted = _fitted(parsed.fit, summary.sequences(data, parsed.dt)) if parsed.fit else None
         scaled = None if fitted is None else _scaled(fitted.fit, data, parsed.dt)
-    except FileNotFoundError as error:
-        raise ScenarioError(f"{parsed.file}: no such file") from error
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise ScenarioError(said(error)) from error
+    except ValueError as error:
         raise ScenarioError(f"{parsed.file}: {error}") from error
     if parsed.profile is not None:
         step = "time" if parsed.dt else "packet"

@@ -145,4 +145,4 @@ def test_what_is_wrong_is_one_line(text, given, says, tmp_path, capsys):
 
 def test_no_file(tmp_path, capsys):
     assert commands.main(["trace", str(tmp_path / "none.txt")]) == 2
-    assert "none.txt: no such file" in capsys.readouterr().err
+    assert "none.txt': No such file or directory" in capsys.readouterr().err
