@@ -167,7 +167,9 @@ def test_a_flight_that_breaks_off_shows_nothing_of_what_was_to_come():
         "done": "not reached",
         "acts": "not reached",
     }
-    assert found["tick"].instead[0].startswith("tick 6, sense: nothing came on input, measurement, and it sleeps")
+    # On a busy machine it may not have come to sleep yet.
+    mute = r"tick 6, sense: nothing came on input, measurement, and it (sleeps|computes) \(state \w\)"
+    assert re.match(mute, found["tick"].instead[0])
 
 
 def test_the_end_of_a_log_is_told_of_who_dies():
