@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import psutil
 
 from affinet.planning import limits
 from affinet.planning.plan import Plan, PlanError
+from affinet.runtimes import judged_again
 from affinet.runtimes.alike import alike
 from affinet.runtimes.inprocess import InProcessSwarm
 from affinet.runtimes.side_by_side import Flight, NotABatch, side_by_side, together
@@ -107,11 +108,13 @@ def _side_by_side(plans: Sequence[Plan]) -> list[Evidence]:
     except UserCodeError:  # of which run, and which agent of it, is told by the run alone
         return [rehearse(plan) for plan in plans]
     wall_s, arrays = (time.perf_counter() - started) / runs, flown.arrays()
+    changed = judged_again.changed(batch, plans, arrays["verdicts"], arrays["position"])
     waiting = swarm.under_way.reshape(runs, -1).sum(axis=1)
     found = []
     for number, plan in enumerate(plans):
         own = _of_run(plan, number, arrays) | counted.of(number)
-        found.append(Evidence(plan, own, _judged(plan, plan.timeline, own, int(waiting[number]), wall_s)))
+        done = _judged(plan, plan.timeline, own, int(waiting[number]), wall_s, changed[number])
+        found.append(Evidence(plan, own, done))
     return found
 
 
@@ -148,7 +151,14 @@ class _Counted:
         return {name: np.stack([tick[place][run] for tick in self._ticks]) for place, name in enumerate(names)}
 
 
-def _judged(plan: Plan, timeline: Timeline, arrays: Arrays, in_flight: int, wall_s: float) -> Outcome:
+def _judged(
+    plan: Plan,
+    timeline: Timeline,
+    arrays: Arrays,
+    in_flight: int,
+    wall_s: float,
+    changed: Mapping[int, int] | None = None,
+) -> Outcome:
     return outcome.judge(
         plan,
         timeline,
@@ -160,4 +170,5 @@ def _judged(plan: Plan, timeline: Timeline, arrays: Arrays, in_flight: int, wall
         wall_s=wall_s,
         processes=[],
         out=Path(),
+        changed=changed,
     )

@@ -84,7 +84,7 @@ def together(flights: Sequence[Flight]) -> Plan:
             _profile([(flight.plan.profiles[place], len(flight.seeds)) for flight in flights])
             for place in range(len(plan.profiles))
         ),
-        faults=tuple(_faults(flights, size)),
+        faults=tuple(faults_of(flights)),
         brief=_brief(plan.brief, number),
     )
 
@@ -199,8 +199,9 @@ def _padded(layer: ChainLayer, states: int) -> ChainLayer:
     )
 
 
-def _faults(flights: Sequence[Flight], size: int) -> Iterator[Fault]:
-    """Those of all runs, each run's in its own order; one that several have in the same place there is one."""
+def faults_of(flights: Sequence[Flight]) -> Iterator[Fault]:
+    """Those of all runs, each run's in its own order; one that several have in the same place is one."""
+    size = flights[0].plan.world.formation.agents
     ends = [*accumulate((len(flight.seeds) for flight in flights), initial=0)]
     for place in range(max(len(flight.plan.faults) for flight in flights)):
         whose: dict[Fault, list[int]] = {}

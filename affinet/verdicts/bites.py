@@ -62,7 +62,7 @@ class Bite:
         }
 
 
-def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
+def bites(plan: Plan, timeline: Timeline, arrays: Arrays, changed: Mapping[int, int] | None = None) -> list[Bite]:
     """What every fault took hold of in the ticks flown.
 
     Parameters
@@ -73,19 +73,22 @@ def bites(plan: Plan, timeline: Timeline, arrays: Arrays) -> list[Bite]:
         Its faults, where they came to lie.
     arrays
         What happened.
+    changed
+        How many messages fared otherwise because of each fault that is judged again; None where that is to be found out.
     """
-    judged_again = [number for number, fault in enumerate(timeline.faults) if _by_the_models(plan, fault)]
-    otherwise = _otherwise(plan, timeline, arrays, judged_again) if judged_again else {}
+    judged_again = [number for number, fault in enumerate(timeline.faults) if by_the_models(plan, fault)]
+    if changed is None:
+        changed = _otherwise(plan, timeline, arrays, judged_again) if judged_again else {}
     found = []
     for number, fault in enumerate(timeline.faults):
-        touched, what = _touched(plan, timeline, arrays, number, otherwise)
+        touched, what = _touched(plan, timeline, arrays, number, changed)
         why = None if touched else vacuous.why(plan, timeline, arrays, number)
         found.append(Bite(fault, _at(fault, plan.world.dt), touched, what, why))
         growing.let_go(arrays)
     return found
 
 
-def _by_the_models(plan: Plan, fault: Fault) -> bool:
+def by_the_models(plan: Plan, fault: Fault) -> bool:
     """Whether what became of a message does not say that this fault was why: it has to be judged without it, to compare."""
     return plan.journal is None and fault.trigger is None and fault.verb in _WITH_OTHERS
 
@@ -107,14 +110,14 @@ def _otherwise(plan: Plan, timeline: Timeline, arrays: Arrays, numbers: Sequence
             without = {number: other for number, other in without.items() if faults[number].end != tick}
             starting = changed.keys() & timeline.starting_numbers(tick)
             without |= {number: relay.under(timeline.without(number)) for number in starting}
-            arriving = _arriving(relay, tick, verdicts, position)
+            usual = arriving(relay, tick, verdicts, position)
             for number, other in without.items():
-                changed[number] += int((_arriving(other, tick, verdicts, position) != arriving).sum())
+                changed[number] += int((arriving(other, tick, verdicts, position) != usual).sum())
             tick += 1
     return changed
 
 
-def _arriving(relay: Relay[None], tick: int, verdicts: VerdictCodes, position: Array) -> Integers:
+def arriving(relay: Relay[None], tick: int, verdicts: VerdictCodes, position: Array) -> Integers:
     """When every message offered in a tick arrives, -1 where it is dropped at once, shape (C, L)."""
     decided = relay.decide_on(tick, verdicts != Verdict.SILENT, position).verdicts
     relay.finish(tick)

@@ -133,6 +133,7 @@ def judge(
     lost: int = 0,
     timing: Timing | None = None,
     refused: Sequence[dict[str, Any]] = (),
+    changed: Mapping[int, int] | None = None,
 ) -> Outcome:
     """The outcome of a run.
 
@@ -161,10 +162,12 @@ def judge(
         How they kept their time, in a run in real time.
     refused
         Wrong messages, as in `Outcome`.
+    changed
+        As of `bites`.
     """
     ticks = len(arrays["error"]) if arrays is not None else accounts.ticks if accounts else 0
     booked = accounts or NOTHING
-    faults = [] if arrays is None else bites(plan, timeline, arrays)
+    faults = [] if arrays is None else bites(plan, timeline, arrays, changed)
     zones = [] if arrays is None else jams(plan, arrays)
     wrong = [failure] if failure else []
     if not failure:

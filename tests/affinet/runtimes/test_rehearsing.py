@@ -28,7 +28,17 @@ SCRIPTS = (
     'timeline=[{verb="cut",at=9,links=["1-2"]}]',
     "timeline=[]",
 )
+# Faults that are judged again, in other places and at other times of each run, over each other too.
+LOSSES = (
+    'timeline=[{verb="lose",at=0.2,lasts=1,links=["all"],loss=0.5},{verb="lose",at=0.5,lasts=1,links=["4"],loss=0.7}]',
+    'timeline=[{verb="cut",at=0.1,lasts=0.4,links=["2->4"]},{verb="dropout",at=0.3,links=["all"],p=0.4},'
+    '{verb="lose",at=2,links=["leaders"],loss=0.3}]',
+    'timeline=[{verb="degrade",at=1,lasts=1,links=["all"],profile="wifi_clear"},{verb="lose",at=1.5,links=["2-4"],loss=0}]',
+    "timeline=[]",
+)
 SWARMS = {
+    "losses": [("corridor", *WILD, script, f"seed={seed}") for seed in (1, 7) for script in (*LOSSES[:2], LOSSES[3])],
+    "degraded": [("corridor", *WILD, LOSSES[2], f"seed={seed}") for seed in (1, 7)],
     "air": [("corridor", *LATE, f"seed={seed}") for seed in (1, 7, 2**63 + 5)],
     "wild": [("corridor", *WILD, f"seed={seed}") for seed in (1, 7)],
     "faults": [("corridor", *WILD, script, f"seed={seed}") for seed in (1, 7) for script in SCRIPTS],
