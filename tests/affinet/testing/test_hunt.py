@@ -268,3 +268,30 @@ def test_the_smallest_is_written_into_a_toml_file_or_not_at_all(capsys):
     with pytest.raises(SystemExit):
         commands.main(["hunt", "corridor", "--invariant", "bounded(5)", "--out", "found"])
     assert "call it found.toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("level", "verbs"), [(1e9, ("cut", "lose", "delay")), (5.0, ("dropout", "kill")), (3.0, ("cut", "bias"))]
+)
+def test_schedules_that_fly_side_by_side_are_found_to_be_what_they_are_alone(level, verbs, monkeypatch):
+    filtered = loading.load("corridor", ("time.dt=0.05", "time.duration=4", "agents.estimator=rkf"))
+
+    def hunted():
+        seen = []
+        found, coverage = hunt.hunt(
+            filtered,
+            checkers.bounded(level),
+            budget=20,
+            verbs=verbs,
+            seed=3,
+            watch=lambda coverage, broken: seen.append((coverage.schedules, coverage.vacuous, broken)),
+        )
+        return (found and (found.scenario, found.finding, found.digest)), coverage, seen
+
+    batches, fly = [], hunt.rehearse_all
+    monkeypatch.setattr(hunt, "rehearse_all", lambda plans: batches.append(len(plans)) or fly(plans))
+    together = hunted()
+    assert max(batches) > 4
+    monkeypatch.setattr(hunt, "rehearse_all", lambda plans: [hunt.rehearse(plan) for plan in plans])
+    assert hunted() == together
+    assert (together[0] is None) == (level == 1e9)
