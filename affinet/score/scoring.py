@@ -67,7 +67,7 @@ class Kept:
             unfinished.write_text(json.dumps(made), encoding="utf-8")
 
     def _file(self, piece: Piece) -> Path:
-        return self.folder / f"{identity.digest([self.flies[piece.entrant], repr(piece)])}.json"
+        return self.folder / f"{identity.digest([self.flies[piece.entrant], repr(piece), _scenario(piece)])}.json"
 
 
 def entrants(card: Scorecard, name: str, against: Sequence[str], *, laws: bool) -> dict[str, list[str]]:
@@ -174,6 +174,13 @@ def together(card: Scorecard, who: Mapping[str, Sequence[str]], flown: Sequence[
         points=points,
         times=times,
     )
+
+
+def _scenario(piece: Piece) -> bytes:
+    """What a scenario file of one's own says, beside its name."""
+    given = piece.given.cell if isinstance(piece.given, Descent) else piece.given
+    file = Path(given.folder) / given.task.scenario
+    return file.read_bytes() if file.suffix == ".toml" and file.is_file() else b""
 
 
 def _longer(one: Flown, more: Flown) -> Flown:

@@ -9,6 +9,7 @@ from own_code import ESTIMATOR, broken, write
 
 from affinet.cli.commands import main
 from affinet.runtimes.rehearsing import rehearse
+from affinet.scenario import loading
 from affinet.score import flying, measures
 from affinet.score.card import Task, Worsening
 from affinet.score.flying import Cell, Descent, Entrant
@@ -119,6 +120,16 @@ def test_what_has_flown_does_not_fly_again(place, capsys, monkeypatch):
     next(iter((place / "scores" / "none-quick" / "pieces").iterdir())).unlink()
     assert "4 of 7 pieces were there" in scored(capsys, "none", "--quick")[2]
     assert scored(capsys, "none")[1]["seeds"] == 3
+
+
+def test_a_scenario_file_that_says_something_else_flies_anew(place, capsys):
+    own = loading.to_toml(loading.load("corridor"))
+    (place / "own.toml").write_text(own)
+    (place / "mine.toml").write_text(CARD.replace('scenario = "corridor"', 'scenario = "own.toml"'))
+    assert scored(capsys, "none", "--quick")[0] == 0
+    assert "5 of 7 pieces were there" in scored(capsys, "none", "--quick")[2]
+    (place / "own.toml").write_text(own.replace("sigma = 0.1", "sigma = 0.2"))
+    assert "pieces were there" not in scored(capsys, "none", "--quick")[2]
 
 
 def test_the_file_and_the_page_have_what_came_out(place, capsys):
