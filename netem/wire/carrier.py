@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import queue
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any
@@ -224,6 +225,8 @@ class Session:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
         except zenoh.ZError as error:
             raise NotCarried(reasons.plain(str(error))) from error
+        self._leaving = threading.Lock()  # Zenoh fails in a thread that asks while another closes the session
+        self._is_left = False
         self._tokens: list[zenoh.LivelinessToken] = []
         self._handing: list[Any] = []  # hand over for as long as somebody has them
 
@@ -234,7 +237,9 @@ class Session:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._session.__exit__(kind, error, trace)  # type: ignore[no-untyped-call]
+        with self._leaving:
+            self._is_left = True
+            self._session.__exit__(kind, error, trace)  # type: ignore[no-untyped-call]
 
     def hears(self, key: str, room: int) -> Ear:
         """Hear a key; so many messages may wait."""
@@ -285,17 +290,15 @@ class Session:
         self._session.declare_queryable(key, lambda query: take(Question(key, query)))
 
     def ask_all(self, key: str, data: bytes, patience_s: float) -> list[tuple[str, bytes]]:
-        """What all those answer within so many seconds who answer on a key, each with the key it answers on."""
-        try:
-            answers = self._session.get(
-                key,
-                payload=data,
-                timeout=patience_s,
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-            )
-        except zenoh.ZError as error:
-            raise NotCarried(reasons.plain(str(error))) from error
+        """What all those answer within so many seconds who answer on a key, each with the key it answers on.
+
+        Raises
+        ------
+        NotCarried
+            When the session is left.
+        """
+        everybody = {"target": zenoh.QueryTarget.ALL, "consolidation": zenoh.ConsolidationMode.NONE}
+        answers = self._replies(key, data, patience_s, **everybody)
         return [(str(reply.ok.key_expr), reply.ok.payload.to_bytes()) for reply in answers if reply.ok is not None]
 
     def doorway(self, names: Iterable[str]) -> Doorway:
@@ -310,12 +313,21 @@ class Session:
         NotCarried
             When nobody answers for so many seconds, or whoever does refuses.
         """
-        for reply in self._session.get(key, payload=data, timeout=patience_s):
+        for reply in self._replies(key, data, patience_s):
             if reply.err is not None:
                 raise NotCarried(f"refused: {reply.err.payload.to_string()}")
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         raise NotCarried(f"no answer within {patience_s:g} s")
+
+    def _replies(self, key: str, data: bytes, patience_s: float, **whom: Any) -> Any:
+        with self._leaving:
+            if self._is_left:
+                raise NotCarried("the session is left")
+            try:
+                return self._session.get(key, payload=data, timeout=patience_s, **whom)
+            except zenoh.ZError as error:
+                raise NotCarried(reasons.plain(str(error))) from error
 
 
 def joined(login: Login, patience_s: float | None = None) -> Session:

@@ -172,6 +172,7 @@ class AskingEar(Ear):
         self._arrivals: queue.Queue[Arrived | None] = queue.Queue(room)
         self._turn: deque[Arrived | Again] = deque()
         self._incoming: dict[str, Incoming[Arrived | Again]] = {}
+        self._counting = threading.Lock()  # who leaves the session is another thread than who hears
         session.hands(key, self._arrivals.put)
         for key, answer in self._answers(_NONE_IS_DUE):  # who has spoken to a predecessor of this process goes on
             self._incoming[key] = Incoming(answer.speaker, answer.following)
@@ -201,10 +202,11 @@ class AskingEar(Ear):
 
     def close(self) -> None:
         """Nothing is heard any more: what had to be asked for was lost."""
-        for key, incoming in self._incoming.items():
-            if incoming.unseen:
-                self._lost(key, incoming.unseen)
-        self._incoming.clear()
+        with self._counting:
+            for key, incoming in self._incoming.items():
+                if incoming.unseen:
+                    self._lost(key, incoming.unseen)
+            self._incoming.clear()
         with suppress(queue.Full):  # then nobody waits
             self._arrivals.put_nowait(None)
 
@@ -212,9 +214,10 @@ class AskingEar(Ear):
         if len(arrived.note) != _NOTE.size:  # a program of somebody else's making does not number: docs/machines.md
             self._turn.append(arrived)
             return
-        incoming = self._incoming.setdefault(arrived.key, Incoming())
         speaker, number = _NOTE.unpack(arrived.note)
-        turn, lost = incoming.heard(speaker, number, arrived)
+        with self._counting:
+            incoming = self._incoming.setdefault(arrived.key, Incoming())
+            turn, lost = incoming.heard(speaker, number, arrived)
         self._turn += turn
         if lost:
             self._lost(arrived.key, lost)
@@ -223,14 +226,16 @@ class AskingEar(Ear):
 
     def _ask(self) -> None:
         for key, answer in self._answers(0):
-            incoming = self._incoming.setdefault(key, Incoming())
-            _refuse_gaps(key, answer, incoming)
-            for number, data in answer.said:
-                self._turn += incoming.repeated(answer.speaker, number, Again(key, data))
+            with self._counting:
+                incoming = self._incoming.setdefault(key, Incoming())
+                _refuse_gaps(key, answer, incoming)
+                for number, data in answer.said:
+                    self._turn += incoming.repeated(answer.speaker, number, Again(key, data))
 
     def _answers(self, first: int) -> list[tuple[str, Repeated]]:
         """What those answer who may say such keys; on which they do, and no word of theirs, says who they are."""
-        asked = Asked(first, {key: (one.speaker, one.due) for key, one in self._incoming.items()})
+        with self._counting:
+            asked = Asked(first, {key: (one.speaker, one.due) for key, one in self._incoming.items()})
         answers = self._session.ask_all(again(self._key), msgspec.msgpack.encode(asked), _ANSWERED_WITHIN_S)
         return [(once(key), _read(Repeated, data, once(key))) for key, data in answers]
 

@@ -111,6 +111,8 @@ class Coordinator:
             self._over.wait(0.05)
         self._over.set()
         self._asked.put(None)
+        for thread in self._threads[:-1]:  # the last one listens, until the session is left
+            thread.join()
         self._session.__exit__(kind, error, trace)
         for thread in self._threads:
             thread.join()

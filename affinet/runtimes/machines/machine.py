@@ -114,6 +114,7 @@ class Machine:
         self._taking = threading.Lock()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._over = threading.Event()
+        self._watching: threading.Thread | None = None
         self._gone: str | None = None
         self._leaves = False
 
@@ -126,7 +127,9 @@ class Machine:
             signal.signal(number, signal.SIG_IGN)  # it ends already
         self._end_all()
         self._stack.close()
-        os.close(self._wake)
+        if self._watching is not None:
+            self._watching.join()
+        os.close(self._wake)  # nobody who would write to it is left
 
     def join(self, wanted: Wanted) -> None:
         """Take the seats, all or none, and make ready to fork."""
@@ -142,7 +145,8 @@ class Machine:
                 joined.give_back()
             raise
         address = endpoints.over_machines(wanted.connect)
-        threading.Thread(target=self._watch, args=(address, admitted.gone_after_s), daemon=True).start()
+        self._watching = threading.Thread(target=self._watch, args=(address, admitted.gone_after_s), daemon=True)
+        self._watching.start()
         self._start_nursery(kernels)
 
     def _take_seat(self, name: str, wanted: Wanted) -> Admitted:

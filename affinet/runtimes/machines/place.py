@@ -78,12 +78,15 @@ class Place:
         self.log_fd = -1
         self.open_fds: set[int] = set()  # of its output, which it may close before it ends
         self.beaten = threading.Event()
+        self._listening: threading.Thread | None = None
 
     def __enter__(self) -> Place:
         return self
 
     def __exit__(self, *failure: Any) -> None:
         self._session.__exit__(*failure)
+        if self._listening is not None:
+            self._listening.join()
 
     def clock(self) -> ClockOffset:
         """How much the coordinator's clock shows more than ours.
@@ -106,7 +109,8 @@ class Place:
         answer = self._ask(seats.join(self.name), joining.pack(asks))
         self._session.hands(seats.BEAT, lambda _: self.beaten.set())
         self._session.asks(seats.file(self.name), lambda question: self._given(self, question))
-        threading.Thread(target=self._listen, args=(self._down,), daemon=True).start()
+        self._listening = threading.Thread(target=self._listen, args=(self._down,), daemon=True)
+        self._listening.start()
         self._session.is_here(seats.here(self.name))
         try:
             admitted: Admitted = joining.unpack(Admitted, answer)

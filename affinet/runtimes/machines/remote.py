@@ -121,7 +121,9 @@ class RemoteProcess:
         self._alive = alive
 
     def take(self, message: Up) -> None:
-        """What its machine tells of it, in a thread that is not the launcher's."""
+        """What its machine tells of it, in a thread that is not the launcher's; once it has ended, nothing."""
+        if self.returncode is not None:
+            return
         match message:
             case Started(pid=pid):
                 self.pid = pid
@@ -137,14 +139,14 @@ class RemoteProcess:
     def let_go(self) -> None:
         """Nothing more comes of it."""
         self._is_let_go = True
-        self._end(-signal.SIGKILL)
+        if self.returncode is None:
+            self._end(-signal.SIGKILL)
 
     def _end(self, status: int) -> None:
-        if self.returncode is None:
-            os.close(self._writes)
-            os.close(self._log)
-            self.returncode = status
-            self._ended.set()
+        os.close(self._writes)
+        os.close(self._log)
+        self.returncode = status
+        self._ended.set()
 
     def _pass_on(self, data: bytes) -> None:
         # The launcher may wait for this process meanwhile, and not read.

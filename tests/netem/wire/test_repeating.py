@@ -9,7 +9,7 @@ import pytest
 
 from netem.wire import authority
 from netem.wire.arrays import WireError
-from netem.wire.carrier import await_heard
+from netem.wire.carrier import NotCarried, await_heard
 from netem.wire.keys import Keys, again
 from netem.wire.repeating import Asked, Incoming, Repeated, RepeatingSession, opened
 from netem.wire.rights import hub
@@ -209,3 +209,32 @@ def test_who_answers_speaks_on_its_own_key_alone(star):
     with joined("agent-1") as agent:
         answering(agent, run.act(1), said)
         assert ear.next().key == run.act(1)
+
+
+def test_who_still_asks_while_another_thread_leaves_the_session_is_told_that_it_is_left(star):
+    """Zenoh fails in either thread if one closes a session in which the other asks, which a busy machine makes likely."""
+    run, medium, joined, _ = star
+    medium.says(run.inbox(1)).say(b"private")
+    question = msgspec.msgpack.encode(Asked(0, {}))
+    ended = []
+    failed = threading.Event()
+
+    def ask(session, begun):
+        try:
+            while not failed.is_set():
+                session.ask_all(again(run.inbox(1)), question, 5.0)
+                begun.set()
+        except RuntimeError as error:
+            ended.append(error)
+
+    try:
+        for _ in range(20):
+            with joined("agent-1") as one:
+                begun = threading.Event()
+                thread = threading.Thread(target=ask, args=(one, begun))
+                thread.start()
+                assert begun.wait(60.0)
+            thread.join()
+    finally:
+        failed.set()
+    assert [(type(error), str(error)) for error in ended] == 20 * [(NotCarried, "the session is left")]

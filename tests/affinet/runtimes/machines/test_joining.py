@@ -172,6 +172,9 @@ def test_what_a_process_on_another_machine_says_comes_out_of_a_pipe(tmp_path):
     process.take(joining.Ended(3, 5))
     assert (process.pid, process.wait(), process.stdout.read()) == (77, 5, b"event\n")
     assert said == [joining.Say(3, b"order\n"), joining.Signal(3, 15)]
+    for late in (joining.Told(3, b"more"), joining.Logged(3, b"more"), joining.Ended(3, 6), joining.Failed("too late")):
+        process.take(late)  # its pipes are closed, and their numbers may be those of other files by now
+    assert process.poll() == 5
     assert (tmp_path / "log").read_bytes() == b"line\n"
     process.stdout.close()
 
