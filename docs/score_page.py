@@ -136,7 +136,7 @@ def _page(kept: Mapping[str, Any], card: cards.Scorecard) -> Lines:
     yield from table(
         ("task", "made worse", *_entrants(kept)),
         (
-            [task, units[worse], *(_point(kept, task, worse, who, most[worse].most) for who in _entrants(kept))]
+            [task, units[worse], *(_point(kept, task, worse, who, most[worse]) for who in _entrants(kept))]
             for task, worse in dict.fromkeys((one["task"], one["worsening"]) for one in kept["points"])
         ),
     )
@@ -184,10 +184,10 @@ def _cell(one: Mapping[str, Any] | None) -> str:
     return f"**{says}**" if one["best"] else says
 
 
-def _point(kept: Mapping[str, Any], task: str, worse: str, who: str, most: float) -> str:
+def _point(kept: Mapping[str, Any], task: str, worse: str, who: str, made: cards.Worsening) -> str:
     for one in kept["points"]:
         if (one["task"], one["worsening"], one["entrant"]) == (task, worse, who):
-            return point(_interval(one["median"]), most)
+            return point(_interval(one["median"]), made)
     return "-"
 
 

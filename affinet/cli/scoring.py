@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -49,7 +49,7 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
     out = _directory(parsed)
     pieces = out / scoring.PIECES
     pieces.mkdir(parents=True, exist_ok=True)
-    kept = Kept(pieces, {name: identity.digest(sorted(of.items())) for name, of in flies.items()})
+    kept = Kept(pieces, {name: identity.digest(sorted(of.items())) for name, of in flies.items()}, _damaged)
     with ended_by_signals(), _executor(parsed, own) as executor, _bar(parsed.name, len(todo)) as shown:
         found = scoring.fly(todo, executor, kept, lambda done: shown.see(done, f"{done}/{len(todo)} pieces"))
     if kept.there:
@@ -67,6 +67,10 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
             console.print(plain(f"- {one_line(sentence)}"), soft_wrap=True)
         console.print(plain(f"{out / PAGE} has all of it, {out / record.FILE} for programs"), soft_wrap=True)
     return PASS
+
+
+def _damaged(file: Path) -> None:
+    print(one_line(f"{file} is not whole: it flies anew"), file=sys.stderr)  # noqa: T201
 
 
 @contextmanager
@@ -87,11 +91,9 @@ def _directory(parsed: argparse.Namespace) -> Path:
     out: Path = parsed.out or Path("scores") / (parsed.name.replace(":", "-") + ("-quick" if parsed.quick else ""))
     file = out / record.FILE
     if file.exists():
-        said = json.loads(file.read_text(encoding="utf-8"))
-        if (said["scored"], said["size"]) != (parsed.name, "quick" if parsed.quick else "full"):
-            raise FileExistsError(
-                f"{str(out)!r} holds the score of {said['scored']}; name another directory with --out"
-            )
+        scored, size = record.of_whom(file)
+        if (scored, size) != (parsed.name, "quick" if parsed.quick else "full"):
+            raise FileExistsError(f"{str(out)!r} holds the {size} score of {scored}; name another directory with --out")
     return out
 
 
@@ -117,6 +119,18 @@ def _own_modules(todo: Sequence[Piece]) -> dict[str, set[Module]]:
 
 
 def _flies(own: Mapping[str, set[Module]]) -> dict[str, dict[str, str]]:
-    """Of whose code the bits of each entrant come."""
+    """Of whose code the bits of each entrant come; what lies beside a module may be imported as it flies."""
     code = identity.digest([Path(str(module.__file__)).read_bytes() for module in (flying, measures)])
-    return {name: {**identity.here(sorted(of)), "the score": code} for name, of in own.items()}
+    return {
+        name: {**identity.here(sorted(of)), **_beside(folder for _, folder in of), "the score": code}
+        for name, of in own.items()
+    }
+
+
+def _beside(folders: Iterable[str]) -> dict[str, str]:
+    return {
+        f"beside in {folder}": identity.digest(
+            [(file.name, file.read_bytes()) for file in sorted(Path(folder).glob("*.py"))]
+        )
+        for folder in folders
+    }

@@ -18,6 +18,8 @@ from affinet.scenario.units import NotNegative, Positive
 from affinet.scenario.wrong import ScenarioError
 from analysis.models.arrays import Array
 
+STEPS = 6  # halvings of the range in which a break-down point lies
+
 _FOLDER = "scorecards"
 _Count = Annotated[int, Field(ge=2)]
 
@@ -36,6 +38,12 @@ class Task(Section):
     quick_rivals: list[str] = key(list, "those of the quick form, if others")
     laws: list[str] = key(list, "laws to compare with, where none are named")
     quick: bool = key(False, "whether it is flown in the quick form")
+
+    @model_validator(mode="after")
+    def _recovers(self) -> Task:
+        if self.recovered > self.lost:
+            raise ValueError("recovered: a swarm that is lost has not recovered: give no more than lost")
+        return self
 
     def quickly(self) -> Task:
         """Against fewer, where it says so."""
@@ -65,6 +73,14 @@ class Worsening(Section):
     def between(self, better: Array, worse: Array) -> Array:
         """How bad it is half way between."""
         return np.sqrt(better * worse) if self.least > 0.0 else (better + worse) / 2.0
+
+    @property
+    def least_tried(self) -> float:
+        """How bad it is at the best of what is tried."""
+        tried = np.array(self.most)
+        for _ in range(STEPS):
+            tried = self.between(np.array(self.least), tried)
+        return float(tried)
 
     def at(self, worse: float) -> list[str]:
         """The overrides that make it so bad."""

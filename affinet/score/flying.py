@@ -17,10 +17,9 @@ from affinet.runtimes.rehearsing import rehearse, rehearse_all
 from affinet.scenario import loading
 from affinet.scenario.wrong import ScenarioError
 from affinet.score import measures
-from affinet.score.card import Task, Worsening
+from affinet.score.card import STEPS, Task, Worsening
 from affinet.score.measures import Measured
 
-_STEPS = 6  # halvings of the range in which a break-down point lies
 _TIMED = 5  # flights whose time is taken
 
 
@@ -73,6 +72,16 @@ class Cell:
             refuse_in_process(plan)
         return plans
 
+    def nobody(self, more: Sequence[str] = ()) -> Plan:
+        """What is flown through the air, by whom the scenario names.
+
+        Raises
+        ------
+        ScenarioError, PlanError
+            When the task cannot be flown through it.
+        """
+        return self._plan((*self.set, *more))
+
     def asks_for(self) -> tuple[bool, bool]:
         """Whether the task is for agents to find out where they are, and whether it is to pursue a target."""
         plan = self._plan(())
@@ -124,9 +133,10 @@ def cell(given: Cell) -> Flown:
 
 
 def descent(given: Descent) -> list[float]:
-    """How bad it has to be for the swarm of each seed to be lost, by bisection; infinite where it is not lost at the worst.
+    """How bad it has to be for the swarm of each seed to be lost, by bisection.
 
-    Nothing of an entrant that does not suit the task.
+    Infinite where it is not lost at the worst, and the least where it is at all that is tried. Nothing of an entrant that
+    does not suit the task.
 
     Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
     """
@@ -135,11 +145,12 @@ def descent(given: Descent) -> list[float]:
     seeds, worse = given.cell.seeds, given.worsening
     low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
     survived = ~_lost(given, seeds, high.tolist())
-    for _ in range(_STEPS):
+    for _ in range(STEPS):
         middle = worse.between(low, high)
         gone = _lost(given, seeds, middle.tolist())
         low, high = np.where(gone, low, middle), np.where(gone, middle, high)
-    return [float(one) for one in np.where(survived, np.inf, worse.between(low, high))]
+    between = np.where(low > worse.least, worse.between(low, high), worse.least)
+    return [float(one) for one in np.where(survived, np.inf, between)]
 
 
 def timed(given: Cell) -> Timed | None:

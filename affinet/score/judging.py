@@ -162,21 +162,23 @@ def _points(raw: Raw, break_downs: Sequence[BreakDown]) -> Iterator[str]:
             continue
         worse = of[own.worsening]
         others = [
-            f"with {one.entrant} at {point(one.median, worse.most)} ({one.decision})"
+            f"with {one.entrant} at {point(one.median, worse)} ({one.decision})"
             for one in break_downs
             if (one.task, one.worsening) == (own.task, own.worsening) and one.entrant != raw.scored
         ]
         unit = f" {worse.unit}".rstrip()
         against = f"; {', '.join(others)}" if others else ""
-        yield f"{own.task}, {own.worsening}: half of the swarms are lost at {point(own.median, worse.most)}{unit}{against}"
+        yield f"{own.task}, {own.worsening}: half of the swarms are lost at {point(own.median, worse)}{unit}{against}"
 
 
-def point(found: Interval, most: float) -> str:
-    """A break-down point with its interval, in words, where it was looked for up to `most`."""
-    beyond = f"beyond {most:g}"
+def point(found: Interval, worse: Worsening) -> str:
+    """A break-down point with its interval, in words."""
+    if found.found <= worse.least:
+        return f"below {worse.least_tried:.3g}"
+    beyond = f"beyond {worse.most:g}"
     if np.isinf(found.found):
         return beyond
-    low = "0" if np.isinf(found.low) else f"{found.low:.3g}"
+    low = f"{worse.least:g}" if np.isinf(found.low) else f"{found.low:.3g}"
     return f"{found.found:.3g} ({low} to {beyond if np.isinf(found.high) else f'{found.high:.3g}'})"
 
 
@@ -201,16 +203,26 @@ def _honest(raw: Raw) -> Iterator[str]:
 
 def _blind_to_sensors(raw: Raw, task: Task) -> Iterator[str]:
     """Whoever measures estimates worse with worse sensors; who does not knows what nobody told it."""
-    worse = np.array(raw.noisier[task.name, raw.scored].runs["estimation"])
-    usual = raw.runs(task.name, raw.airs[0], raw.scored, "estimation")
-    if np.isnan(worse).any() or np.isnan(usual).any():
-        return
-    factor = paired.ratio(worse, usual, np.inf, len(raw.tasks), CONFIDENCE)
+    factor = _with_worse_sensors(raw, task, raw.scored)
+    suffers = [_with_worse_sensors(raw, task, rival) for rival in raw.entrants[1:]]
+    if factor is None or not any(one is not None and one.low > MATTERS for one in suffers):
+        return  # of one that estimates nothing, or where the sensors are worse to nobody
     if factor.high < MATTERS:
         yield (
             f"{task.name}: its estimates do not depend on its sensors: with {', '.join(task.noisier)} their errors are "
             f"{factor} times what they were; it knows what it has not measured"
         )
+
+
+def _with_worse_sensors(raw: Raw, task: Task, who: str) -> Interval | None:
+    """By which factor its estimates are worse."""
+    if (task.name, who) not in raw.noisier:
+        return None
+    worse = np.array(raw.noisier[task.name, who].runs["estimation"])
+    usual = raw.runs(task.name, raw.airs[0], who, "estimation")
+    if np.isnan(worse).any() or np.isnan(usual).any():
+        return None
+    return paired.ratio(worse, usual, np.inf, len(raw.tasks), CONFIDENCE)
 
 
 def _cost(raw: Raw) -> Iterator[str]:

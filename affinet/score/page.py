@@ -90,9 +90,9 @@ def _points(raw: Raw, score: Score) -> Iterator[str]:
         "than the others by the test of signs.</p>"
     )
     units = {one.name: f"{one.name} ({one.unit})" if one.unit else one.name for one in raw.worsenings}
-    most = {one.name: one.most for one in raw.worsenings}
+    worse = {one.name: one for one in raw.worsenings}
     rows = [
-        [one.task, units[one.worsening], one.entrant, point(one.median, most[one.worsening]), _against(raw, one)]
+        [one.task, units[one.worsening], one.entrant, point(one.median, worse[one.worsening]), _against(raw, one)]
         for one in score.break_downs
     ]
     yield html.table(rows, head=["task", "made worse", "who", "half are lost at", f"{raw.scored} is"])

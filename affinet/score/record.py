@@ -82,6 +82,21 @@ def write(out: Path, said: dict[str, Any]) -> None:
         unfinished.write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def of_whom(file: Path) -> tuple[str, str]:
+    """Who was scored, and whether in full.
+
+    Raises
+    ------
+    FileExistsError
+        When the file is not of a score.
+    """
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+        return str(said["scored"]), str(said["size"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise FileExistsError(f"{file}: not what a score wrote there; remove it, or name another with --out") from None
+
+
 def _interval(one: Interval) -> dict[str, Any]:
     found, low, high = _numbers([one.found, one.low, one.high])
     return {"found": found, "low": low, "high": high}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,29 +46,52 @@ class Kept:
         Of the pieces.
     flies
         Of each entrant a digest of the code that its bits come of.
+    damaged
+        Told of each file that is not what was kept.
     """
 
     folder: Path
     flies: Mapping[str, str]
+    damaged: Callable[[Path], None]
     there: int = field(default=0, init=False)
+    _airs: dict[Any, str] = field(default_factory=dict, init=False)
 
-    def has(self, piece: Piece) -> bool:
-        """Whether a piece has flown."""
-        return self._file(piece).exists()
-
-    def read(self, piece: Piece) -> Made:
-        """What came of it."""
-        self.there += 1
-        return _made(piece.kind, json.loads(self._file(piece).read_text(encoding="utf-8")))
+    def read(self, todo: Sequence[Piece]) -> dict[int, Made]:
+        """What came of those pieces that have flown, by their places."""
+        found: dict[int, Made] = {}
+        for number, piece in enumerate(todo):
+            file = self._file(piece)
+            if not file.exists():
+                continue
+            with about(file):
+                seal, _, said = file.read_bytes().partition(b"\n")
+            if seal != _seal(file, said):
+                self.damaged(file)
+                continue
+            found[number] = _made(piece.kind, json.loads(said))
+        self.there = len(found)
+        return found
 
     def keep(self, piece: Piece, made: Made) -> None:
         """Keep it."""
-        file = self._file(piece)
+        file, said = self._file(piece), json.dumps(made).encode()
         with about(file), whole(file) as unfinished:
-            unfinished.write_text(json.dumps(made), encoding="utf-8")
+            unfinished.write_bytes(_seal(file, said) + b"\n" + said)
 
     def _file(self, piece: Piece) -> Path:
-        return self.folder / f"{identity.digest([self.flies[piece.entrant], repr(piece), _scenario(piece)])}.json"
+        given = piece.given.cell if isinstance(piece.given, Descent) else piece.given
+        judged_by = (given.task.lost, given.task.recovered)
+        of = [self.flies[piece.entrant], piece.kind, *given.entrant[:2], given.seeds, judged_by, self._air(piece.given)]
+        return self.folder / f"{identity.digest(of)}.json"
+
+    def _air(self, given: Cell | Descent) -> str:
+        """What is flown, whoever flies: from files of a user's own, which may say something else by now."""
+        cell, worse = (given.cell, given.worsening) if isinstance(given, Descent) else (given, None)
+        of = (cell.task.name, cell.set, worse and worse.name)
+        if of not in self._airs:
+            ends = [[]] if worse is None else [worse.at(worse.least), worse.at(worse.most)]
+            self._airs[of] = identity.of_plans(cell.nobody(more) for more in ends)
+        return self._airs[of]
 
 
 def entrants(card: Scorecard, name: str, against: Sequence[str], *, laws: bool) -> dict[str, list[str]]:
@@ -89,7 +113,7 @@ def pieces(card: Scorecard, who: Mapping[str, Sequence[str]], key: str, folder: 
                 yield Piece("descent", task.name, worsening.name, name, 0, Descent(whole_cell, worsening))
             for air in card.airs:
                 yield from _cells(task, air.name, air.set, entrant, seeds, card.folder)
-            if name == who[task.name][0] and task.noisier and key.endswith("estimator"):
+            if name in who[task.name][:2] and task.noisier and key.endswith("estimator"):
                 first = card.airs[0]
                 yield from _cells(task, _NOISIER, [*first.set, *task.noisier], entrant, seeds, card.folder)
     for task in card.tasks:
@@ -129,7 +153,7 @@ def fly(todo: Sequence[Piece], executor: Executor, kept: Kept, watch: Callable[[
     watch
         Told how many are done.
     """
-    found: dict[int, Made] = {number: kept.read(piece) for number, piece in enumerate(todo) if kept.has(piece)}
+    found = kept.read(todo)
     left = [number for number, piece in enumerate(todo) if number not in found and piece.kind != "timed"]
     watch(len(found))
     for place, made in executor.each(_fly, [todo[number] for number in left], lambda _: None):
@@ -176,13 +200,6 @@ def together(card: Scorecard, who: Mapping[str, Sequence[str]], flown: Sequence[
     )
 
 
-def _scenario(piece: Piece) -> bytes:
-    """What a scenario file of one's own says, beside its name."""
-    given = piece.given.cell if isinstance(piece.given, Descent) else piece.given
-    file = Path(given.folder) / given.task.scenario
-    return file.read_bytes() if file.suffix == ".toml" and file.is_file() else b""
-
-
 def _longer(one: Flown, more: Flown) -> Flown:
     return Flown(
         {name: [*values, *more.runs[name]] for name, values in one.runs.items()}, one.unsuited or more.unsuited
@@ -194,6 +211,10 @@ def _fly(piece: Piece) -> Made:
     if isinstance(given, Descent):
         return flying.descent(given)
     return flying.timed(given) if piece.kind == "timed" else flying.cell(given)
+
+
+def _seal(file: Path, said: bytes) -> bytes:
+    return hashlib.sha256(file.name.encode() + said).hexdigest().encode()
 
 
 def _made(kind: str, said: Any) -> Any:

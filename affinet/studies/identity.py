@@ -43,8 +43,13 @@ _OF_PLANS = [field.name for field in fields(Plan) if field.name != "findings"]  
 
 def of_cells(study: Study, plans: Sequence[Plan], *, quick: bool) -> Identity:
     """That of the cells of a study, flown here."""
-    flies = digest([getattr(plan, name) for plan in plans for name in _OF_PLANS])
+    flies = of_plans(plans)
     return {GRID: record.grid(study, quick=quick), "what flies": flies, **here(own_modules(plans))}
+
+
+def of_plans(plans: Iterable[Plan]) -> str:
+    """A digest of what flies by these plans, in which is all that was read for them."""
+    return digest([getattr(plan, name) for plan in plans for name in _OF_PLANS])
 
 
 def own_modules(plans: Iterable[Plan]) -> list[Module]:

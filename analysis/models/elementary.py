@@ -95,7 +95,8 @@ def hypot(x: ArrayLike, y: ArrayLike) -> Array:
     largest = np.maximum(np.abs(x), np.abs(y))
     _, scale = np.frexp(np.where(np.isfinite(largest), largest, 0.0))
     small_x, small_y = np.ldexp(x, -scale), np.ldexp(y, -scale)
-    return np.ldexp(np.sqrt(small_x * small_x + small_y * small_y), scale)
+    with np.errstate(over="ignore"):  # the length itself may be
+        return np.ldexp(np.sqrt(small_x * small_x + small_y * small_y), scale)
 
 
 def exp(x: ArrayLike) -> Array:
@@ -106,7 +107,7 @@ def exp(x: ArrayLike) -> Array:
     rest = high - low
     squared = rest * rest
     bent = rest - squared * _polynomial(_EXP, squared)
-    with np.errstate(invalid="ignore"):  # NaN is no power of two
+    with np.errstate(invalid="ignore", over="ignore"):  # NaN is no power of two, and beyond the largest lies infinity
         return np.ldexp(1.0 - ((low - rest * bent / (2.0 - bent)) - high), twos.astype(np.int32))
 
 

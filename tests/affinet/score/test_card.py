@@ -55,6 +55,7 @@ def test_the_quick_form_has_what_says_so(tmp_path):
         ("seeds = 3", "seeds = 1", "seeds: should be greater than or equal to 2"),
         ("lost = 1.0", "lost = 0", "tasks.1.lost: should be greater than 0"),
         ("lost = 1.0", "los = 1.0", "unknown key"),
+        ("lost = 1.0", "lost = 0.01", "recovered: a swarm that is lost has not recovered: give no more than lost"),
         ('scenario = "corridor"', "", "tasks.1.scenario: is missing"),
         ("quick = true\n\n[[airs]]", "\n[[airs]]", "tasks: give one quick = true at least"),
         ("[[airs]]", '[[airs]]\nname = "perfect"\nsays = "twice"\n\n[[airs]]', "airs: 'perfect' stands there twice"),

@@ -50,12 +50,14 @@ def scored(folder):
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
 
-        def score(name, *against, worsenings=()):
-            card = CARD.model_copy(update={"worsenings": [one for one in CARD.worsenings if one.name in worsenings]})
+        def score(name, *against, worsenings=(), **of_task):
+            tasks = [task.model_copy(update=of_task) for task in CARD.tasks]
+            worse = [one for one in CARD.worsenings if one.name in worsenings]
+            card = CARD.model_copy(update={"tasks": tasks, "worsenings": worse})
             called = [f"planted_here:{one}" if one[0].isupper() else one for one in (name, *against)]
             who = scoring.entrants(card, called[0], called[1:], laws=False)
             todo = [one for one in scoring.pieces(card, who, "agents.estimator", folder) if one.kind != "timed"]
-            kept = Kept(folder, dict.fromkeys(called, "planted"))
+            kept = Kept(folder, dict.fromkeys(called, "planted"), pytest.fail)
             raw = scoring.together(card, who, todo, scoring.fly(todo, Here(), kept, lambda _: None))
             return raw, judging.judge(raw)
 
@@ -103,6 +105,20 @@ def test_one_that_is_told_where_its_neighbours_are_does_not_depend_on_its_sensor
     assert "it knows what it has not measured" in sentence
     for honest in ("Good", "Truthful", "Overconfident"):
         assert not said(scored(honest, "rkf")[1], "do not depend")
+
+
+def test_sensors_that_are_worse_to_nobody_accuse_nobody(scored):
+    _, score = scored("Leaking", "Truthful", noisier=["sensing.sigma=0.1"])
+    assert not said(score, "do not depend")
+
+
+def test_one_that_is_lost_at_all_that_is_tried_breaks_down_below_it(scored):
+    _, score = scored("Good", "rkf", worsenings=["loss"], lost=0.01, recovered=0.01)
+    assert [one.median.found for one in score.break_downs] == [0.0, 0.0]
+    (sentence,) = said(score, "half of the swarms")
+    assert sentence.startswith(
+        "corridor, loss: half of the swarms are lost at below 0.0155; with rkf at below 0.0155 ("
+    )
 
 
 def test_one_that_suits_no_task_says_why(scored):

@@ -1,6 +1,7 @@
 """A score as one has it: every run is the run alone, what has flown does not fly again, file and page say what came out."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -111,15 +112,64 @@ def test_what_has_flown_does_not_fly_again(place, capsys, monkeypatch):
         "quick",
         2,
     )
-    assert len(flown) == 3
+    assert len(flown) == 4
     _, again, err = scored(capsys, "none", "--quick")
-    assert len(flown) == 3
-    assert "5 of 7 pieces were there" in err
+    assert len(flown) == 4
+    assert "6 of 8 pieces were there" in err
     assert {**again, "verdict": [], "times": []} == {**first, "verdict": [], "times": []}
     # Of a piece that is gone, or of other seeds, what is missing flies.
     next(iter((place / "scores" / "none-quick" / "pieces").iterdir())).unlink()
-    assert "4 of 7 pieces were there" in scored(capsys, "none", "--quick")[2]
+    assert "5 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
     assert scored(capsys, "none")[1]["seeds"] == 3
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda kept, _: kept[:-9],
+        lambda _, __: b"",
+        lambda _, __: b"[[], null]",
+        lambda kept, _: kept.replace(b"1", b"2", 1),
+        lambda _, other: other,
+    ],
+    ids=["cut", "empty", "none of ours", "edited", "of another"],
+)
+def test_a_piece_that_is_not_whole_is_named_and_flies_anew(place, capsys, damage):
+    _, first, _ = scored(capsys, "none", "--quick")
+    one, other = sorted((place / "scores" / "none-quick" / "pieces").iterdir())[:2]
+    one.write_bytes(damage(one.read_bytes(), other.read_bytes()))
+    status, again, err = scored(capsys, "none", "--quick")
+    assert (status, again["cells"], again["break_downs"]) == (0, first["cells"], first["break_downs"])
+    assert f"{one.name} is not whole: it flies anew" in err
+    assert "5 of 8 pieces were there" in err
+    assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", "{}"])
+def test_a_result_that_cannot_be_read_is_not_written_over(place, capsys, damage):
+    assert scored(capsys, "none", "--quick")[0] == 0
+    (place / "scores" / "none-quick" / "score.json").write_text(damage)
+    status, _, err = scored(capsys, "none", "--quick")
+    assert status != 0
+    assert "score.json: not what a score wrote there" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_what_a_card_calls_its_airs_and_says_of_them_flies_nothing_anew(place, capsys):
+    assert scored(capsys, "none", "--quick")[0] == 0
+    (place / "mine.toml").write_text(CARD.replace("for half a second", "nobody hears").replace('"cut"\n', '"torn"\n'))
+    assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
+
+
+def test_a_file_that_a_scenario_reads_flies_anew_when_it_says_something_else(place, capsys):
+    contacts = place / "contacts.txt"
+    contacts.write_text("1 2 0 5\n")
+    own = """set = ['network.profile="own"', 'network.profiles.own={loss=[{model="trace",file="contacts.txt",format="intervals"}]}']"""
+    (place / "mine.toml").write_text(re.sub(r"set = .'timeline.*", own, CARD))
+    assert scored(capsys, "none", "--quick")[0] == 0
+    assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
+    contacts.write_text("1 3 0 5\n")
+    assert "2 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]  # the break-downs
 
 
 def test_a_scenario_file_that_says_something_else_flies_anew(place, capsys):
@@ -127,9 +177,9 @@ def test_a_scenario_file_that_says_something_else_flies_anew(place, capsys):
     (place / "own.toml").write_text(own)
     (place / "mine.toml").write_text(CARD.replace('scenario = "corridor"', 'scenario = "own.toml"'))
     assert scored(capsys, "none", "--quick")[0] == 0
-    assert "5 of 7 pieces were there" in scored(capsys, "none", "--quick")[2]
+    assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
     (place / "own.toml").write_text(own.replace("sigma = 0.1", "sigma = 0.2"))
-    assert "pieces were there" not in scored(capsys, "none", "--quick")[2]
+    assert "2 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]  # those with a sigma of the card's
 
 
 def test_the_file_and_the_page_have_what_came_out(place, capsys):
@@ -138,7 +188,7 @@ def test_the_file_and_the_page_have_what_came_out(place, capsys):
     errors = {one["entrant"]: np.array(one["runs"]["error"]) for one in said["cells"] if one["air"] == "cut"}
     assert compared["factor"]["found"] == pytest.approx(np.exp(np.log(errors["none"] / errors["rkf"]).mean()))
     assert {one["entrant"] for one in said["break_downs"]} == {"none", "rkf"}
-    assert [one["task"] for one in said["noisier"]] == ["corridor"]
+    assert [one["entrant"] for one in said["noisier"]] == ["none", "rkf"]
     assert {one["entrant"] for one in said["times"]} == {"none", "rkf"}
     assert json.loads((place / "scores/none-quick/score.json").read_text()) == said
     page = (place / "scores/none-quick/score.html").read_text()
@@ -154,7 +204,10 @@ def test_another_code_of_ones_own_flies_anew_and_the_others_do_not(place, capsys
     words = (f"{name}:Own", "--against", "rkf", "--quick", "--out", "here")
     assert scored(capsys, *words)[0] == 0
     (place / f"{name}.py").write_text(broken(ESTIMATOR, ("late = np", "later = np")))
-    assert "2 of 7 pieces were there" in scored(capsys, *words)[2]  # the other's cell and its break-down
+    left = "3 of 8 pieces were there"  # the other's cells and its break-down
+    assert left in scored(capsys, *words)[2]
+    (place / "late.py").write_text("")  # which it may import as it flies
+    assert left in scored(capsys, *words)[2]
 
 
 @pytest.mark.usefixtures("place")
@@ -210,4 +263,4 @@ def test_an_air_that_no_task_can_be_flown_through_is_an_error(place, capsys):
 def test_a_directory_of_another_score_is_left_alone(capsys):
     assert scored(capsys, "none", "--quick", "--out", "here")[0] == 0
     assert main(["score", "rkf", "--quick", "--card", "mine.toml", "--out", "here"]) == 2
-    assert "holds the score of none; name another directory" in capsys.readouterr().err
+    assert "holds the quick score of none; name another directory" in capsys.readouterr().err
