@@ -14,12 +14,19 @@ import argparse
 import sys
 import time
 
+import composed
 import independent
 import late
 import lossy
 import placed
 
-_CHECKS = {"loss": lossy.check, "delay": late.check, "place": placed.check, "independence": independent.check}
+_CHECKS = {
+    "loss": lossy.check,
+    "delay": late.check,
+    "place": placed.check,
+    "independence": independent.check,
+    "composed": composed.check,
+}
 _SEEDS_APART = 10_000
 
 
