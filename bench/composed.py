@@ -169,7 +169,7 @@ def _age(verdicts: int, seed: int) -> Iterator[Row]:
 
 
 def _arrivals(air: Medium, ticks: int) -> tuple[Integers, Integers]:
-    """Of every tick, the newest that arrives, -1 for none, shape (T, L); and all that arrives, as `arriving.expected` has it."""
+    """Of every tick, the newest that arrives, -1 for none, shape (T, L); and all that does, as `arriving.expected` has it."""
     state, everything, newest, rows = air.begin(), np.ones((1, len(air.timeline.links)), dtype=bool), [], []
     for tick in range(ticks):
         state, verdicts = air.judge(state, tick, everything, None)
