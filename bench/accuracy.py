@@ -19,6 +19,7 @@ import independent
 import late
 import lossy
 import placed
+from carried import processes
 
 _CHECKS = {
     "loss": lossy.check,
@@ -26,6 +27,7 @@ _CHECKS = {
     "place": placed.check,
     "independence": independent.check,
     "composed": composed.check,
+    "processes": processes.check,
 }
 _SEEDS_APART = 10_000
 

@@ -82,6 +82,11 @@ class Against:
         p = float(stats.f.sf(squared * (links - free) / (free * (links - 1)), free, links - free))
         return self._p(what, f"{free + 1} bins", f"{counted.sum():.0f} counted", p)
 
+    def standard(self, what: str, z: Array, least: float, most: float) -> Row:
+        """Independent numbers by their z, of which the least and the largest are shown: the sum of the squares is chi-square."""
+        p = float(stats.chi2.sf((z * z).sum(), z.size))
+        return self._p(what, f"{z.size} links", f"{least:.4g} to {most:.4g}", p)
+
     def distribution(self, what: str, cdf: Callable[[Array], Array], sample: Array) -> Row:
         """The distribution of independent values: Kolmogorov-Smirnov."""
         distributed: Any = cdf  # the stubs know of functions of one number only
