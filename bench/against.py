@@ -15,6 +15,7 @@ from analysis.models.arrays import Array, Integers
 SIGMAS = 3.0  # of a mean or a share
 SIGMAS_OF_MANY = 4.0  # of correlations, of which there are many
 UNLIKELY = 0.001  # p of a distribution
+_NINE_OF_TEN = 1.2816  # standard deviations
 _FEWEST = 5  # expected in a bin of chi-square
 _FEWEST_DEPENDENT = 50  # in a bin whose variance is estimated
 
@@ -31,9 +32,10 @@ class Row:
     evidence: str
     ok: bool
     chance: float = 0.0  # that a right model is not ok
+    found: str = ""  # how far off a model is that is not ok in nine of ten runs
 
     def __str__(self) -> str:
-        cells = (self.model, self.parameters, self.what, self.requested, self.achieved, self.evidence)
+        cells = (self.model, self.parameters, self.what, self.requested, self.achieved, self.evidence, self.found)
         return f"| {' | '.join(cells)} | {'ok' if self.ok else '**NOT OK**'} |"
 
 
@@ -83,7 +85,7 @@ class Against:
         return self._p(what, f"{free + 1} bins", f"{counted.sum():.0f} counted", p)
 
     def standard(self, what: str, z: Array, least: float, most: float) -> Row:
-        """Independent numbers by their z, of which the least and the largest are shown: the sum of the squares is chi-square."""
+        """Independent numbers by their z, with the least and the largest of them: the sum of the squares is chi-square."""
         p = float(stats.chi2.sf((z * z).sum(), z.size))
         return self._p(what, f"{z.size} links", f"{least:.4g} to {most:.4g}", p)
 
@@ -106,7 +108,15 @@ class Against:
     def exactly(self, what: str, requested: float, achieved: float) -> Row:
         """A number that leaves no room for chance."""
         same = achieved == requested
-        return Row(self.model, self.parameters, what, f"{requested:.6g}", f"{achieved:.6g}", "exact", same)
+        return Row(self.model, self.parameters, what, f"{requested:.6g}", f"{achieved:.6g}", "exact", same, found="any")
+
+    def judged(self, what: str, requested: str, achieved: str, evidence: str, ok: bool) -> Row:
+        """What is judged where it is measured."""
+        return Row(self.model, self.parameters, what, requested, achieved, evidence, ok)
+
+    def told(self, what: str, achieved: str) -> Row:
+        """What is told, and no more: nothing was asked of it."""
+        return Row(self.model, self.parameters, what, "-", achieved, "told", ok=True)
 
     def within(self, what: str, requested: float, achieved: float, tolerance: float, unit: str) -> Row:
         """A number with a bound."""
@@ -119,7 +129,8 @@ class Against:
         z = (achieved - requested) / spread
         chance = 2.0 * float(stats.norm.sf(most))
         shown = (f"{requested:.5g}", f"{achieved:.5g}", f"z = {z:+.2f}")
-        return Row(self.model, self.parameters, what, *shown, abs(z) < most, chance)
+        found = f"{(most + _NINE_OF_TEN) * spread / abs(requested):.2g}" if requested else ""
+        return Row(self.model, self.parameters, what, *shown, abs(z) < most, chance, found)
 
     def _p(self, what: str, requested: str, achieved: str, p: float) -> Row:
         return Row(self.model, self.parameters, what, requested, achieved, f"p = {p:.3f}", p > UNLIKELY, UNLIKELY)

@@ -70,7 +70,7 @@ def rows(against: Against, asked: Asked, made: Verdicts, dt: float) -> Iterator[
 
 def losses(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
     """Of messages lost (T, C, L), each channel and link by itself."""
-    ticks, channels, links = lost.shape
+    ticks, channels, _ = lost.shape
     variance = mean_variance(chain, ticks)
     apart = lost.reshape(ticks, -1)
     yield against.normal("mean loss", chain.mean_loss, float(lost.mean()), (variance / apart.shape[1]) ** 0.5)

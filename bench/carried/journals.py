@@ -30,7 +30,7 @@ class Noted(NamedTuple):
     links
         Those of the run.
     arrived
-        Rows of (tick of the inbox, content tick, channel row, link row, whether it is other than what was said), shape (m, 5).
+        Rows of (tick of the inbox, content tick, channel row, link row, whether it is not what was said), shape (m, 5).
     took_s
         How long each was under way, in simulated seconds; NaN of measurements, and in lockstep.
     empty
@@ -43,7 +43,7 @@ class Noted(NamedTuple):
     empty: Mask
 
     def of_these(self, expected: Integers) -> Integers:
-        """The messages that `arriving.expected` has, in rows as these: whether each is other than what was said, by its mark."""
+        """The messages that `arriving.expected` has, in rows as these: whether each is not what was said, by its mark."""
         _, content, channel, _, mark = expected.T
         wrong = changed_on_the_way(mark) & ~self.empty[content, channel, self.links.src[expected[:, 3]] - 1]
         return np.column_stack([expected[:, :4], wrong])
@@ -75,10 +75,10 @@ def verdicts(table: Any, links: Links, channels: Sequence[str], ticks: int) -> V
 
 def _cells(table: Any, links: Links, channels: Sequence[str]) -> tuple[Integers, Integers, Integers]:
     ends = np.stack([table[name].to_numpy() for name in ("src", "dst")], axis=-1)
-    return table["tick"].to_numpy(), places(table["channel"], channels), _rows(links, ends)
+    return table["tick"].to_numpy(), places(table["channel"], channels), rows_of(links, ends)
 
 
-def _rows(links: Links, ends: Integers) -> Integers:
+def rows_of(links: Links, ends: Integers) -> Integers:
     """Which links have these ends (m, 2)."""
     row = np.full((links.agents + 1, links.agents + 1), -1)
     row[links.src, links.dst] = np.arange(len(links))
@@ -101,6 +101,6 @@ def noted(files: Mapping[int, Path], links: Links, channels: Sequence[str], tick
     spoken[cells], empty[cells] = digest, numbers == 0
     tick, content, code, src, dst, digest = heard.T
     channel = order[np.searchsorted(codes[order], code)]
-    rows = _rows(links, np.stack([src, dst], axis=-1))
+    rows = rows_of(links, np.stack([src, dst], axis=-1))
     arrived = np.column_stack([tick, content, channel, rows, spoken[content, channel, src - 1] != digest])
     return Noted(links, arrived, np.concatenate([of["took_s"] for of in told.values()]), empty)

@@ -17,7 +17,7 @@ from affinet.planning.plan import Plan
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
 from affinet.verdicts.outcome import Outcome
-from analysis.models.arrays import Array, Integers
+from analysis.models.arrays import Integers
 from netem.medium import deliveries, journal
 from netem.medium.medium import JOURNAL
 from world.books import history

@@ -111,7 +111,7 @@ def test_messages_that_arrive_are_compared_one_by_one_and_as_often_as_they_come(
     rows = np.array([[3, 1, 0, 2, 0], [3, 1, 0, 2, 0], [4, 4, 0, 1, 2]])
     assert arriving.apart(rows, rows[::-1]) == 0
     assert arriving.apart(rows, rows[1:]) == 1
-    assert arriving.apart(rows, rows + [0, 0, 0, 0, 1]) == 6
+    assert arriving.apart(rows, rows + np.array([0, 0, 0, 0, 1])) == 6
 
 
 def test_what_arrives_of_verdicts_is_late_stale_twice_or_not_at_all():
