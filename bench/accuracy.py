@@ -1,23 +1,25 @@
 """What was requested of the air against what it did: in process, composed, over processes, in real time.
 
     python bench/accuracy.py [--verdicts 1000000] [--seed 1] [--only loss,delay,place,independence,composed,processes,real]
-        [--keep docs/accuracy.md]
+        [--keep docs/accuracy.json]
 
 Prints a table of what was requested and what was achieved, of so many verdicts at least of each model. A mean or a share must
-lie within three standard deviations, a distribution must have p > 0.001; what leaves no room for chance must be exact. The exit
-status is 1 when a row is not ok. Of so many rows chance alone turns one down for about every third seed (the last line says
-what to expect): look at it again with other seeds and more verdicts before you blame the model. `--keep` writes each table
-where the page has its mark.
+have what was requested in its interval, of 99.73 %; a distribution must have p > 0.001; what leaves no room for chance must be
+exact. The exit status is 1 when a row is not ok. Of so many rows chance alone turns one down for about every third seed (the
+last line says what to expect): look at it again with other seeds and more verdicts before you blame the model. `--keep` writes
+the tables down, and where the page beside that file has their marks.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
+import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import composed
 import independent
@@ -45,8 +47,8 @@ TABLES = {
     "real": ("real",),
 }
 _HEAD = (
-    "| model | parameters | what | requested | achieved | z or p | found from | |",
-    "|---|---|---|---|---|---|---|---|",
+    "| model | parameters | what | requested | achieved | interval | z or p | found from | file | |",
+    "|---|---|---|---|---|---|---|---|---|---|",
 )
 _CHECKS_AT_MOST, _SEEDS_APART = 10, 10_000
 
@@ -57,51 +59,67 @@ def main() -> int:
     parser.add_argument("--verdicts", type=int, default=1_000_000, help="of every model, at least")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=lambda names: names.split(","), default=list(_CHECKS), metavar="loss,delay,...")
-    parser.add_argument("--keep", type=Path, metavar="PAGE")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="where the tables are kept, beside their page")
     given = parser.parse_args()
     if unknown := {*given.only} - {*_CHECKS}:
         parser.error(f"--only: no {', '.join(sorted(unknown))}; there is {', '.join(_CHECKS)}")
-    failed = 0
+    made = {}
     for name, checks in TABLES.items():
         if wanted := [check for check in checks if check in given.only]:
-            lines, wrong = _table(wanted, given.verdicts, given.seed)
-            failed += wrong
-            if given.keep and wanted == [*checks]:
-                given.keep.write_text(kept(given.keep.read_text(), name, lines))
-    return 1 if failed else 0
+            made[name] = _measured(wanted, given.verdicts, given.seed)
+    if given.keep:
+        keep(given.keep, {name: table for name, table in made.items() if {*TABLES[name]} <= {*given.only}})
+    return 0 if all(row["ok"] for table in made.values() for row in table["rows"]) else 1
 
 
-def _table(checks: Sequence[str], verdicts: int, seed: int) -> tuple[list[str], int]:
-    """The lines of a table, printed as they come, and how many of its rows are not ok."""
+def _measured(checks: Sequence[str], verdicts: int, seed: int) -> dict[str, Any]:
+    """A table, printed as it comes."""
     began, rows = time.perf_counter(), []
-    lines = [*_HEAD]
-    print(*lines, sep="\n")
+    print(*_HEAD, sep="\n")
     for name in checks:
         place = seed * _CHECKS_AT_MOST + [*_CHECKS].index(name)
         for row in _CHECKS[name](verdicts, place * _SEEDS_APART):
-            rows.append(row)
-            lines.append(str(row))
-            print(row, flush=True)
+            rows.append(replace(row, file=row.file or f"bench/{_CHECKS[name].__module__}.py"))
+            print(rows[-1], flush=True)
+    seconds = round(time.perf_counter() - began)
+    table = {"verdicts": verdicts, "seed": seed, "seconds": seconds, "rows": [*map(asdict, rows)]}
+    print("", _in_all(table), "", sep="\n")
+    return table
+
+
+def _in_all(table: Mapping[str, Any]) -> str:
+    rows = [Row(**row) for row in table["rows"]]
     failed, chance = sum(not row.ok for row in rows), sum(row.chance for row in rows)
-    said = f"{len(rows)} rows, {failed} not ok where chance alone makes {chance:.2f}; "
-    lines += ["", f"{said}{verdicts} verdicts, seed {seed}, {time.perf_counter() - began:.0f} s"]
-    print(*lines[-2:], "", sep="\n")
-    return lines, failed
+    said = f"{len(rows)} rows, {failed} not ok where chance alone makes {chance:.2f}"
+    return f"{said}; {table['verdicts']:,} verdicts, seed {table['seed']}, {table['seconds']} s"
 
 
-def kept(page: str, name: str, lines: Sequence[str]) -> str:
-    """A page with these lines where it has the mark of a table.
+def keep(file: Path, made: Mapping[str, Any]) -> None:
+    """Write tables down beside those that are in a file, and all of them on the page beside it."""
+    before = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    tables = {**before, **made}
+    file.write_text(json.dumps(tables, indent=1) + "\n", encoding="utf-8")
+    page = file.with_suffix(".md")
+    page.write_text(laid(page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+
+
+def laid(page: str, tables: Mapping[str, Any]) -> str:
+    """A page with these tables where it has their marks.
 
     Raises
     ------
     ValueError
         When it has none.
     """
-    begins, ends = f"<!-- {name}: written by bench/accuracy.py -->", f"<!-- end of {name} -->"
-    if begins not in page or ends not in page:
-        raise ValueError(f"the page has no place for its table: write {begins} and {ends} where it is to be")
-    block = "\n".join([begins, "", *lines, "", ends])
-    return re.sub(f"{re.escape(begins)}.*?{re.escape(ends)}", lambda _: block, page, flags=re.DOTALL)
+    for name, table in tables.items():
+        begins, ends = f"<!-- {name}: written by bench/accuracy.py -->", f"<!-- end of {name} -->"
+        if begins not in page or ends not in page:
+            raise ValueError(f"the page has no place for its table: write {begins} and {ends} where it is to be")
+        rows = (str(Row(**row)) for row in table["rows"])
+        block = "\n".join([begins, "", *_HEAD, *rows, "", _in_all(table), "", ends])
+        before, _, rest = page.partition(begins)
+        page = before + block + rest.partition(ends)[2]
+    return page
 
 
 if __name__ == "__main__":

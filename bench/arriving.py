@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.models.arrays import Integers, Mask
+from analysis.models.arrays import Integers
 from netem.impairments.corrupt import Mark
 from netem.medium.in_flight import Verdicts
 from netem.medium.verdict import Verdict
@@ -34,26 +34,3 @@ def apart(one: Integers, other: Integers) -> int:
     net = np.zeros(len(rows), dtype=np.int64)
     np.add.at(net, place.ravel(), np.repeat([1, -1], [len(one), len(other)]))
     return int(np.abs(net).sum())
-
-
-def queued(passing: Mask, drained: Integers, size: int, room: int) -> tuple[Mask, Integers]:
-    """What a queue makes of the messages of a link, in whole units: which overflow, and the ticks in which the others are due.
-
-    Parameters
-    ----------
-    passing
-        Which messages come to it, one in each tick, shape (T, L).
-    drained
-        How many units can pass from each tick to the next, and longer than the messages may wait, shape (T + more,).
-    size, room
-        Units of a message, and those that may wait.
-    """
-    able = np.concatenate([[0], np.cumsum(drained)])
-    debt = np.zeros(passing.shape[1], dtype=np.int64)
-    overflow, due = np.zeros_like(passing), np.zeros(passing.shape, dtype=np.int64)
-    for tick, comes in enumerate(passing):
-        debt = np.maximum(debt - (drained[tick - 1] if tick else 0), 0)
-        overflow[tick] = comes & (debt + size > room)
-        debt += np.where(comes & ~overflow[tick], size, 0)
-        due[tick] = np.maximum(tick, np.searchsorted(able, able[tick] + debt))
-    return overflow, due

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import arriving
 import flown
 import numpy as np
+import queued
 from against import Against, Row
 from lossy import burst_rows
 from scipy import stats
@@ -28,11 +29,13 @@ _BURSTS = gilbert_elliott(0.02, 0.25)
 _UNIT = 128.0  # bits; of whole numbers of them a queue can be computed without rounding
 _SIZE, _ROOM, _DRAINED = 5, 20, 4  # units of a message, of a queue, and those that pass in a tick
 _WARM = 200  # ticks, after which nothing tells any more that a run began without messages under way
+_FEWEST = 50_000
 _SURVIVING = 400  # ticks, of which no message of these delays is older
 
 
 def check(verdicts: int, seed: int) -> Iterator[Row]:
-    """All of it."""
+    """All of it, of no fewer verdicts than leave some after `_WARM`."""
+    verdicts = max(verdicts, _FEWEST)
     yield from _losses(verdicts, seed)
     yield from _losses_and_a_trace(verdicts, seed + 1)
     yield from _queue_behind_bursts(verdicts, seed + 2)
@@ -81,7 +84,8 @@ def _queue_behind_bursts(verdicts: int, seed: int) -> Iterator[Row]:
     chains = flown.layers(links, chain)
     made = flown.fly(flown.medium(seed, links, chains=chains, rate=limit, message_bits=_bits()), ticks)
     against = Against("queue behind bursts", "Gilbert 1/6, 1/4; 1.25 ticks a message, 4 wait")
-    yield from _computed_again(against, made, _lost(seed, links, chain, ticks), np.full(2 * ticks, _DRAINED))
+    yield _as_without(against, made, _lost(seed, links, chain, ticks))
+    yield from queued.rows(against, made, np.full(2 * ticks, _DRAINED), [_SIZE], _ROOM)
     full, waits = _in_the_long_run(chain)
     overflow, wait = (made.kind[_WARM:, 0] == Verdict.OVERFLOW), made.due[_WARM:, 0] - np.arange(_WARM, ticks)[:, None]
     yield against.mean("share that overflows", full, overflow.mean(axis=0))
@@ -101,13 +105,9 @@ def _lost(seed: int, links: Links, chain: Chain, ticks: int) -> Mask:
     return flown.fly(flown.medium(seed, links, chains=flown.layers(links, chain)), ticks).kind[:, 0] == Verdict.LOST
 
 
-def _computed_again(against: Against, made: Verdicts, lost: Mask, drained: Integers) -> Iterator[Row]:
-    overflow, due = arriving.queued(~lost, drained, _SIZE, _ROOM)
-    kind = np.where(lost, Verdict.LOST, np.where(overflow, Verdict.OVERFLOW, Verdict.DELAYED))
-    yield against.exactly("verdicts other than computed again", 0.0, float((made.kind[:, 0] != kind).sum()))
-    waited = kind == Verdict.DELAYED
-    yield against.exactly("due in other ticks", 0.0, float((made.due[:, 0] != due)[waited].sum()))
-    yield against.exactly("of so many that waited", float(waited.sum()), float((made.due[:, 0] == due)[waited].sum()))
+def _as_without(against: Against, made: Verdicts, lost: Mask) -> Row:
+    other = (made.kind[:, 0] == Verdict.LOST) != lost
+    return against.exactly("lost other than without the queue", 0.0, float(other.sum()))
 
 
 def _in_the_long_run(chain: Chain) -> tuple[float, Array]:
@@ -253,4 +253,5 @@ def _rate_over_time(verdicts: int, seed: int) -> Iterator[Row]:
     made = flown.fly(flown.medium(seed, links, chains=chains, rate_trace=limit, message_bits=_bits()), ticks)
     drained = np.append(np.repeat(turns, np.diff(np.append(when, ticks))), np.full(ticks, turns[-1]))
     against = Against("rate over time", "51200, 25600, 0, 102400 bit/s in turn behind Gilbert 0.02, 0.25")
-    yield from _computed_again(against, made, _lost(seed, links, _BURSTS, ticks), drained)
+    yield _as_without(against, made, _lost(seed, links, _BURSTS, ticks))
+    yield from queued.rows(against, made, drained, [_SIZE], _ROOM)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import queued
 from against import Against, Row
 from lossy import burst_rows
 
@@ -16,6 +17,15 @@ from netem.medium.in_flight import Verdicts
 from netem.medium.verdict import Verdict
 
 _LONGEST = 60  # ticks of a delay that are told apart
+_NONE = 1e-12  # of correlations
+
+
+class Queue(NamedTuple):
+    """Bytes that pass in a tick, that may wait, and of a message on each channel of communication."""
+
+    drained: int
+    room: int
+    sizes: Sequence[int]
 
 
 class Asked(NamedTuple):
@@ -33,6 +43,8 @@ class Asked(NamedTuple):
         Distribution function of the delay of communication, in seconds; None without.
     duplicate, corrupt
         Chances of a copy, and of each mark.
+    queue
+        Without delays; None without one.
     """
 
     parameters: str
@@ -41,6 +53,7 @@ class Asked(NamedTuple):
     delay: Callable[[Array], Array] | None = None
     duplicate: float = 0.0
     corrupt: Mapping[Mark, float] = {}
+    queue: Queue | None = None
 
 
 def rows(against: Against, asked: Asked, made: Verdicts, dt: float) -> Iterator[Row]:
@@ -54,6 +67,10 @@ def rows(against: Against, asked: Asked, made: Verdicts, dt: float) -> Iterator[
         chances = np.diff(whole, prepend=0.0)
         yield against.counts("delay, ticks", chances, np.bincount(wait[passed], minlength=_LONGEST + 1))
         yield _of_links(against, "delay on each link, ticks", chances, wait, passed)
+        yield from _delays_apart(against, chances, wait, passed)
+    if asked.queue is not None:
+        drained, said = np.full(2 * len(lost), asked.queue.drained), Verdicts(*(field[:, 1:] for field in made))
+        yield from queued.rows(against, said, drained, asked.queue.sizes, asked.queue.room)
     if asked.duplicate:
         copied = made.copy_due[:, 1:] >= 0
         yield against.share("copies", asked.duplicate, copied[passed])
@@ -79,19 +96,44 @@ def losses(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
         "loss on each link", each, float(lost.mean(axis=(0, 1)).min()), float(lost.mean(axis=(0, 1)).max())
     )
     yield from burst_rows(against, chain, apart)
+    yield from _losses_apart(against, chain, apart)
 
 
 def mean_variance(chain: Chain, ticks: int) -> float:
     """Variance of the share that a chain loses of so many messages in a row, in closed form."""
-    mean, state = chain.mean_loss, chain.stationary * chain.loss
-    summed = ticks * mean * (1.0 - mean)
-    for apart in range(1, ticks):
+    mean, alike = chain.mean_loss, correlations(chain, ticks)
+    return mean * (1.0 - mean) * (1.0 + 2.0 * float((1.0 - np.arange(1, len(alike) + 1) / ticks) @ alike)) / ticks
+
+
+def correlations(chain: Chain, ticks: int) -> Array:
+    """Of the losses of messages 1, 2, ... apart, as far as there is any within so many ticks."""
+    mean, state, alike = chain.mean_loss, chain.stationary * chain.loss, []
+    for _ in range(1, ticks):
         state = state @ chain.transition
-        covariance = float(state @ chain.loss) - mean * mean
-        summed += 2.0 * (ticks - apart) * covariance
-        if abs(covariance) < 1e-15:
+        alike.append((float(state @ chain.loss) - mean * mean) / (mean * (1.0 - mean)))
+        if abs(alike[-1]) < _NONE:
             break
-    return summed / ticks**2
+    return np.array(alike)
+
+
+def _losses_apart(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
+    """Of every two series (T, S) that have nothing to do with each other: none alike, nor all a little."""
+    ticks, series = lost.shape
+    mean = chain.mean_loss
+    score = (lost - mean) / (mean * (1.0 - mean)) ** 0.5
+    spread = ((1.0 + 2.0 * float((correlations(chain, ticks) ** 2).sum())) / ticks) ** 0.5
+    alike = (score.T @ score / ticks)[np.triu_indices(series, 1)]
+    yield against.no_pair("losses of every two links and channels", alike / spread)
+    yield against.normal("their correlation in the mean", 0.0, float(alike.mean()), spread / len(alike) ** 0.5)
+
+
+def _delays_apart(against: Against, chances: Array, wait: Array, passed: Mask) -> Iterator[Row]:
+    """Of a message and the next of its link, and that of the next link."""
+    mean, spread = _moments(chances)
+    score, among = (wait - mean) / spread, passed[:-1] & passed[1:]
+    yield against.uncorrelated("delays of a message and the next", score[:-1][among], score[1:][among])
+    beside, among = np.roll(score, 1, axis=-1), passed & np.roll(passed, 1, axis=-1)
+    yield against.uncorrelated("delays of a link and the next", score[among], beside[among])
 
 
 def _shares(against: Against, what: str, chance: float, hits: Mask, among: Mask) -> Row:
@@ -101,9 +143,14 @@ def _shares(against: Against, what: str, chance: float, hits: Mask, among: Mask)
 
 def _of_links(against: Against, what: str, chances: Array, wait: Array, passed: Mask) -> Row:
     """The mean of each link, of delays that are independent."""
-    ticks = np.arange(len(chances))
-    mean = float(chances @ ticks)
-    spread = float(chances @ (ticks - mean) ** 2) ** 0.5
+    mean, spread = _moments(chances)
     number, summed = passed.sum(axis=(0, 1)), np.where(passed, wait, 0).sum(axis=(0, 1))
     means = summed / number
     return against.standard(what, (means - mean) / spread * number**0.5, float(means.min()), float(means.max()))
+
+
+def _moments(chances: Array) -> tuple[float, float]:
+    """Mean and standard deviation of a number that is 0, 1, ... with these chances."""
+    number = np.arange(len(chances))
+    mean = float(chances @ number)
+    return mean, float(chances @ (number - mean) ** 2) ** 0.5

@@ -7,6 +7,7 @@ import composed
 import flown
 import numpy as np
 import pytest
+import queued
 
 from netem.impairments.corrupt import Mark
 from netem.impairments.loss import bernoulli, gilbert_elliott
@@ -127,7 +128,7 @@ def test_what_arrives_of_verdicts_is_late_stale_twice_or_not_at_all():
 
 
 def test_a_queue_by_hand():
-    passing = np.array([[True], [True], [True], [False], [True]])
-    overflow, due = arriving.queued(passing, np.array([2, 0, 0, 5, 5, 5, 5]), size=3, room=5)
-    assert overflow[:, 0].tolist() == [False, False, True, False, False]
+    passing = np.array([True, True, True, False, True])[:, None, None]
+    overflow, due = queued.queued(passing, np.array([2, 0, 0, 5, 5, 5, 5]), sizes=[3], room=5)
+    assert overflow.ravel().tolist() == [False, False, True, False, False]
     assert due[passing & ~overflow].tolist() == [4, 4, 5]
