@@ -30,7 +30,8 @@ def expected(made: Verdicts) -> Integers:
 
 def apart(one: Integers, other: Integers) -> int:
     """How many rows (m, k) are in one of two lists and not in the other, each as often as it comes."""
-    rows, place = np.unique(np.concatenate([one, other]), axis=0, return_inverse=True)
-    net = np.zeros(len(rows), dtype=np.int64)
-    np.add.at(net, place.ravel(), np.repeat([1, -1], [len(one), len(other)]))
+    rows = np.concatenate([one, other])
+    rows = rows - rows.min(axis=0)
+    numbers, place = np.unique(np.ravel_multi_index(tuple(rows.T), tuple(rows.max(axis=0) + 1)), return_inverse=True)
+    net = np.bincount(place, np.repeat([1.0, -1.0], [len(one), len(other)]), len(numbers))
     return int(np.abs(net).sum())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import arriving
 import flown
@@ -188,7 +189,7 @@ def _copies_of_the_corrupted(verdicts: int, seed: int) -> Iterator[Row]:
     size = len(links)
     chances = {Mark.STALE: 0.05, Mark.BIAS: 0.1, Mark.BIT_FLIP: 0.02}
     table = np.tile([chances.get(mark, 0.0) for mark in (Mark.STALE, Mark.BIAS, Mark.NAN, Mark.BIT_FLIP)], (size, 1))
-    on = {"corrupt": table, "duplicate": np.full(size, 0.2), "delays": (_exponential(links),)}
+    on: dict[str, Any] = {"corrupt": table, "duplicate": np.full(size, 0.2), "delays": (_exponential(links),)}
     made = flown.fly(flown.medium(seed, links, **on), ticks)
     _, rows = _arrivals(flown.medium(seed, links, **on), ticks)
     against = Against("copies of the corrupted", "0.2 twice; stale 0.05, bias 0.1, flip 0.02; 30 ms exponentially")
@@ -200,9 +201,9 @@ def _copies_of_the_corrupted(verdicts: int, seed: int) -> Iterator[Row]:
     for kind, chance in chances.items():
         yield against.share(f"{kind.label} among the doubled", chance, mark[copied] == kind)
     rows = rows[rows[:, 1] >= 1]
-    arrived = np.bincount(rows[:, 3], minlength=size)
+    arrived = np.bincount(rows[:, 3], minlength=size).astype(np.float64)
     for kind, chance in chances.items():
-        struck = np.bincount(rows[rows[:, 4] == kind, 3], minlength=size)
+        struck = np.bincount(rows[rows[:, 4] == kind, 3], minlength=size).astype(np.float64)
         yield against.ratio(f"{kind.label} among all that arrives", chance / 1.2, struck, arrived)
 
 
@@ -210,11 +211,12 @@ def _delay_over_time(verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     rng, changes = np.random.default_rng(seed), 10
     when = np.arange(changes) * (ticks // changes)
-    due = rng.integers(0, 8, size=(changes, len(links))) * 0.005 + 0.0025
-    measured = Measured(np.repeat(when * flown.DT, len(links)), np.tile(np.arange(len(links)), changes), due.ravel())
+    due: Array = rng.integers(0, 8, size=(changes, len(links))) * 0.005 + 0.0025
+    rows = np.tile(np.arange(len(links)), changes)
+    measured = Measured(np.repeat(when * flown.DT, len(links)), rows, due.ravel())
     trace = DelayTrace(*measured.over(len(links), flown.DT, ticks))
     held = np.repeat(due, np.diff(np.append(when, ticks)), axis=0)
-    on = {"chains": flown.layers(links, bernoulli(0.2)), "delay_traces": (trace,)}
+    on: dict[str, Any] = {"chains": flown.layers(links, bernoulli(0.2)), "delay_traces": (trace,)}
     constant = MessageDelay(DelayLaw.CONSTANT, np.ones(len(links), dtype=bool), 0.02, 0.0, np.empty(0), 0.0, False)
     made = flown.fly(flown.medium(seed, links, delays=(constant,), **on), ticks)
     against = Against("delay over time", f"{changes} changes on each of {len(links)} links; 20 ms; 0.2 lost")

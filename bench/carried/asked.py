@@ -69,7 +69,10 @@ def rows(against: Against, asked: Asked, made: Verdicts, dt: float) -> Iterator[
         yield _of_links(against, "delay on each link, ticks", chances, wait, passed)
         yield from _delays_apart(against, chances, wait, passed)
     if asked.queue is not None:
-        drained, said = np.full(2 * len(lost), asked.queue.drained), Verdicts(*(field[:, 1:] for field in made))
+        drained, said = (
+            np.full(2 * len(lost), asked.queue.drained),
+            Verdicts(made.kind[:, 1:], made.due[:, 1:], made.mark[:, 1:], made.copy_due[:, 1:]),
+        )
         yield from queued.rows(against, said, drained, asked.queue.sizes, asked.queue.room)
     if asked.duplicate:
         copied = made.copy_due[:, 1:] >= 0

@@ -20,7 +20,7 @@ from netem.impairments.loss import bernoulli, gilbert_elliott
 from netem.medium.medium import JOURNAL
 from world.books.history import ARRAYS
 
-_DT = 0.05
+DT = 0.05
 _MESSAGES = 36  # of a tick: three channels of twelve links
 
 CASES = (
@@ -62,7 +62,7 @@ def check(verdicts: int, seed: int) -> Iterator[Row]:
     """Each profile, flown over processes, and in one; of so many messages in all."""
     for number, case in enumerate(CASES):
         ticks = -(-verdicts // (len(CASES) * _MESSAGES))
-        clock = (f"time.dt={_DT}", f"time.duration={ticks * _DT}")
+        clock = (f"time.dt={DT}", f"time.duration={ticks * DT}")
         over, alone = (fly(case.text, seed + number, clock) for fly in (swarm.over_processes, swarm.in_process))
         yield from of_a_flight(case, over, alone)
 
@@ -80,7 +80,7 @@ def of_a_flight(case: Asked, over: Flown, alone: Flown) -> Iterator[Row]:
     yield replace(noting, file=ARRAYS).exactly("newest other than heard", 0.0, float((over.newest != newest).sum()))
     same = over.journal.equals(alone.journal) and over.outcome.digest == alone.outcome.digest
     yield against.exactly("journal and digest are those in one process", 1.0, float(same))
-    yield from asked.rows(against, case, made, _DT)
+    yield from asked.rows(against, case, made, DT)
 
 
 def newest_heard(arrived: Integers, shape: tuple[int, ...]) -> Integers:

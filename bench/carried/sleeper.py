@@ -29,9 +29,10 @@ def sleeping(seconds: float) -> Iterator[list[float]]:
 
 
 def _sleep(seconds: float) -> list[float]:
-    woken, over = [], threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
-    while not over.is_set():
+    woken = []
+    waiting = threading.Thread(target=sys.stdin.read, daemon=True)
+    waiting.start()
+    while waiting.is_alive():
         due = time.monotonic() + seconds
         time.sleep(seconds)
         woken.append(time.monotonic() - due)

@@ -80,7 +80,7 @@ def over_processes(text: str, seed: int, overrides: Sequence[str] = ()) -> Flown
         files = {agent: Path(folder) / f"{agent}.npz" for agent in range(1, AGENTS + 1)}
         agent = Path(__file__).parent / "agent.py"
         programs = [f'agents.programs.{n}="{sys.executable} {agent} {file}"' for n, file in files.items()]
-        plan = _plan(text, seed, Path(folder), [*overrides, *programs])
+        plan = planned(text, seed, Path(folder), [*overrides, *programs])
         outcome, out = _flown(plan, "processes", Path(folder))
         noted = journals.noted(files, plan.world.links, plan.channels, plan.world.ticks)
         real = plan.pace is not None
@@ -96,11 +96,12 @@ def in_process(text: str, seed: int, overrides: Sequence[str] = ()) -> Flown:
         When the run fails.
     """
     with tempfile.TemporaryDirectory() as folder:
-        plan = _plan(text, seed, Path(folder), overrides)
+        plan = planned(text, seed, Path(folder), overrides)
         return _left(plan, *_flown(plan, "inprocess", Path(folder)), None, None)
 
 
-def _plan(text: str, seed: int, folder: Path, overrides: Sequence[str]) -> Plan:
+def planned(text: str, seed: int, folder: Path, overrides: Sequence[str]) -> Plan:
+    """The swarm under a profile; the scenario is written into a folder."""
     file = folder / "swarm.toml"
     file.write_text(f"{_SWARM}[network.profiles.asked]\n{text}")
     return making.make(loading.load(str(file), [f"seed={seed}", *overrides]))

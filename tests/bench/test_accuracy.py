@@ -1,13 +1,21 @@
 """Each row of the table of accuracy is not ok where the air is not what was asked for."""
 
+import json
 from dataclasses import replace
 
+import accuracy
 import arriving
 import composed
 import flown
+import independent
+import late
+import lossy
 import numpy as np
 import pytest
 import queued
+from against import Against
+from paths import DOCS
+from scipy import stats
 
 from netem.impairments.corrupt import Mark
 from netem.impairments.loss import bernoulli, gilbert_elliott
@@ -66,6 +74,23 @@ def one_percent_more_copies(_, on):
 PLANTED = {
     "losses": (composed._losses, off_by_one_percent, {"mean loss", "burst lengths", "mean burst"}),
     "bursts": (composed._delay_behind_losses, longer_bursts, {"burst lengths", "mean burst"}),
+    "a loss alone": (
+        lambda verdicts, seed: lossy._chain(lossy.CASES[0], verdicts, seed),
+        off_by_one_percent,
+        {"mean loss", "burst lengths", "mean burst", "mean age"},
+    ),
+    "a delay alone": (
+        lambda verdicts, seed: late._delay(late.CASES[6], verdicts, seed),
+        one_tick_more,
+        {"arrive before they are due, or a tick late"},
+    ),
+    "copies alone": (late._duplicates, one_percent_more_copies, {"share"}),
+    "corruption alone": (late._corruption, one_percent_more_corrupted, {"stale", "bias", "nan", "bit-flip", "kinds"}),
+    "draws that channels share": (
+        independent._ticks_and_channels,
+        lambda _, on: on | {"coupled": True},
+        {"of sense and input", "of sense and theta", "of input and theta"},
+    ),
     "a trace": (
         composed._losses_and_a_trace,
         off_by_one_percent,
@@ -84,7 +109,7 @@ PLANTED = {
     "ages": (composed._age, one_tick_more, {"mean age of the newest, ticks", "share older than 5 ticks"}),
     "copies": (composed._copies_of_the_corrupted, one_percent_more_copies, {"copies"}),
     "corruption": (
-        composed._copies_of_the_corrupted,
+        lambda verdicts, seed: composed._copies_of_the_corrupted(verdicts // 4, seed),
         one_percent_more_corrupted,
         {f"{kind} among all that arrives" for kind in ("stale", "bias", "bit-flip")},
     ),
@@ -106,6 +131,43 @@ PLANTED = {
 def test_impairments_together_that_are_not_what_was_asked_for_are_found(monkeypatch, name):
     check, planted, found = PLANTED[name]
     assert found <= not_ok(flying(monkeypatch, check, planted))
+
+
+def test_two_messages_that_are_swapped_are_found(monkeypatch):
+    arrivals = composed._arrivals
+
+    def swapped(air, ticks):
+        newest, rows = arrivals(air, ticks)
+        rows[[1000, 2000], 0] = rows[[2000, 1000], 0]
+        return newest, rows
+
+    monkeypatch.setattr(composed, "_arrivals", swapped)
+    assert not_ok(composed._copies_of_the_corrupted(100_000, 1)) == {"arrivals other than the verdicts say"}
+
+
+def test_a_row_has_what_was_requested_in_its_interval_or_is_not_ok():
+    against = Against("planted", "")
+    hits = np.arange(1000) < 250
+    for share in np.linspace(0.2, 0.3, 101):
+        row = against.share("share", share, hits)
+        low, high = map(float, row.interval.split(" to "))
+        assert row.ok == (low <= share <= high)
+    each = np.array([1.0, 2.0, 3.0, 4.0])
+    low, high = map(float, against.mean("mean", 2.5, each).interval.split(" to "))
+    inside = stats.ttest_1samp(each, 0.0).confidence_interval(1.0 - 2.0 * stats.norm.sf(3.0))
+    assert (low, high) == pytest.approx((inside.low, inside.high), rel=1e-4)
+
+
+def test_the_page_has_the_tables_that_were_kept():
+    page, kept = ((DOCS / f"accuracy.{kind}").read_text(encoding="utf-8") for kind in ("md", "json"))
+    tables = json.loads(kept)
+    assert {*tables} == {*accuracy.TABLES}
+    assert all(row["ok"] and row["file"] for table in tables.values() for row in table["rows"])
+    assert accuracy.laid(page, tables) == page
+    tables["models"]["seed"] += 1
+    assert accuracy.laid(page, tables) != page
+    with pytest.raises(ValueError, match="the page has no place for its table"):
+        accuracy.laid("# A page", tables)
 
 
 def test_messages_that_arrive_are_compared_one_by_one_and_as_often_as_they_come():
