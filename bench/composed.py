@@ -211,7 +211,7 @@ def _delay_over_time(verdicts: int, seed: int) -> Iterator[Row]:
     links, ticks = flown.size(verdicts)
     rng, changes = np.random.default_rng(seed), 10
     when = np.arange(changes) * (ticks // changes)
-    due: Array = rng.integers(0, 8, size=(changes, len(links))) * 0.005 + 0.0025
+    due = rng.integers(0, 8, size=(changes, len(links))).astype(np.float64) * 0.005 + 0.0025
     rows = np.tile(np.arange(len(links)), changes)
     measured = Measured(np.repeat(when * flown.DT, len(links)), rows, due.ravel())
     trace = DelayTrace(*measured.over(len(links), flown.DT, ticks))
