@@ -69,7 +69,7 @@ bench: $(READY) ## speed against peers, and against the run kept last; fails whe
 accuracy: $(READY) ## what is asked of the air against what it does, 100,000 verdicts of each model, in a minute
 	$(BIN)/python bench/accuracy.py --verdicts 100000
 
-accuracy-weekly: $(READY) ## the same of a million, in six minutes, into docs/accuracy.json and the tables of docs/accuracy.md
+accuracy-weekly: $(READY) ## the same of a million, in eight minutes, into docs/accuracy.json and the tables of docs/accuracy.md
 	$(BIN)/python bench/accuracy.py --keep docs/accuracy.json
 
 # What somebody installed beside it, a project of their own, stays: --inexact.

@@ -169,7 +169,7 @@ class Against:
         return replace(self._row(what, requested, achieved, f"p = {p:.3f}", p > UNLIKELY), chance=UNLIKELY)
 
     def _row(self, what: str, requested: str, achieved: str, evidence: str, ok: bool) -> Row:
-        return Row(self.model, self.parameters, what, requested, achieved, "", evidence, ok, file=self.file)
+        return Row(self.model, self.parameters, what, requested, achieved, "", evidence, bool(ok), file=self.file)
 
 
 def _chance(sigmas: float) -> float:

@@ -158,6 +158,24 @@ def test_a_row_has_what_was_requested_in_its_interval_or_is_not_ok():
     assert (low, high) == pytest.approx((inside.low, inside.high), rel=1e-4)
 
 
+def test_tables_are_kept_beside_their_page(tmp_path, monkeypatch):
+    page, file = tmp_path / "accuracy.md", tmp_path / "accuracy.json"
+    marks = "".join(
+        f"<!-- {name}: written by bench/accuracy.py -->\n<!-- end of {name} -->\n" for name in accuracy.TABLES
+    )
+    page.write_text(f"# A page\n{marks}the end\n", encoding="utf-8")
+    for only in ("loss", "composed"):  # of the first table that is a part
+        options = ["--verdicts", "50000", "--seed", "2", "--only", only, "--keep", str(file)]
+        monkeypatch.setattr("sys.argv", ["accuracy.py", *options])
+        assert accuracy.main() == 0
+    assert [*json.loads(file.read_text(encoding="utf-8"))] == ["composed"]
+    said = page.read_text(encoding="utf-8")
+    assert said.startswith("# A page\n")
+    assert said.endswith("the end\n")
+    assert "\n| queue behind bursts | " in said
+    assert "; 50,000 verdicts, seed 2, " in said
+
+
 def test_the_page_has_the_tables_that_were_kept():
     page, kept = ((DOCS / f"accuracy.{kind}").read_text(encoding="utf-8") for kind in ("md", "json"))
     tables = json.loads(kept)
