@@ -66,7 +66,7 @@ bench: $(READY) ## speed against peers, and against the run kept last; fails whe
 	$(UV) sync --locked --quiet --inexact --group bench --compile-bytecode
 	$(BIN)/python bench/all.py
 
-accuracy: $(READY) ## what is asked of the air against what it does, 100,000 verdicts of each model, in a minute
+accuracy: $(READY) ## what is asked of the air against what it does, 100,000 verdicts of each model, in about a minute
 	$(BIN)/python bench/accuracy.py --verdicts 100000
 
 accuracy-weekly: $(READY) ## the same of a million, in eight minutes, into docs/accuracy.json and the tables of docs/accuracy.md
