@@ -6,7 +6,7 @@ PYTEST := $(BIN)/pytest --timeout 400 # a busy machine is no failure; what hangs
 FLIES := .venv/.flies
 READY := .venv/.ready
 
-.PHONY: demo help test test-room test-all test-pythons test-wheel test-browser docs docs-serve coverage lint types imports picture bench clean
+.PHONY: demo help test test-room test-all test-pythons test-wheel test-browser docs docs-serve coverage lint types imports picture bench accuracy accuracy-weekly clean
 
 demo: $(FLIES) ## bursts of losses with GA-RKF, which holds the formation, beside a filter alone; then over processes
 	@echo "The first flight on a machine compiles its kernels, which takes half a minute; later ones begin at once."
@@ -65,6 +65,12 @@ picture: $(READY) ## docs/pictures/house.svg and the contracts in docs/architect
 bench: $(READY) ## speed against peers, and against the run kept last; fails where a ratio is 20 % worse
 	$(UV) sync --locked --quiet --inexact --group bench --compile-bytecode
 	$(BIN)/python bench/all.py
+
+accuracy: $(READY) ## what is asked of the air against what it does, 100,000 verdicts of each model, in about a minute
+	$(BIN)/python bench/accuracy.py --verdicts 100000
+
+accuracy-weekly: $(READY) ## the same of a million, in eight minutes, into docs/accuracy.json and the tables of docs/accuracy.md
+	$(BIN)/python bench/accuracy.py --keep docs/accuracy.json
 
 # What somebody installed beside it, a project of their own, stays: --inexact.
 $(READY): pyproject.toml uv.lock

@@ -64,7 +64,7 @@ def _chain(case: Case, verdicts: int, seed: int) -> Iterator[Row]:
     else:
         yield against.mean("mean loss", chain.mean_loss, lost.mean(axis=0))
         yield from _stationary(against, case, verdicts, seed + 500)
-    yield from _bursts(against, chain, lost)
+    yield from burst_rows(against, chain, lost)
     warm = len(lost) // 4
     yield against.mean("mean age", chain.mean_age, _age(lost)[warm:].mean(axis=0))
     if chain.extra_delay.any():
@@ -98,7 +98,7 @@ def _stationary(against: Against, case: Case, verdicts: int, seed: int) -> Itera
     yield against.share("loss of the 64th", chain.mean_loss, lost[63])
 
 
-def _bursts(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
+def burst_rows(against: Against, chain: Chain, lost: Mask) -> Iterator[Row]:
     """Of the bursts that begin early enough to be seen whole."""
     horizon = len(lost) // 3
     begins = ~lost[:-1] & lost[1:]

@@ -220,10 +220,14 @@ class MediumPorts:
 
     def _rewritten(self, said: messages.Broadcast, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
         """A broadcast with its fields as `change` makes them; it sees them as those of one message, shape (1, ...)."""
-        if (forms := self._brief.forms.get(said.channel)) is None:  # nobody looks into it
-            return messages.pack(said)
-        changed = change(channel_rows(forms, [said.payload], [f"agent {said.src} on {said.channel!r}"]))
-        payload = {name: packed(changed[name], form.dtype) for name, form in forms.items()}
+        whose = f"agent {said.src} on {said.channel!r}"
+        if said.channel == channels.MEASUREMENT:  # of as many neighbours as were measured
+            measured = numbers(said.payload["measured"], f"{whose}: 'measured'", (-1, self._brief.dimension))
+            payload = {**said.payload, "measured": packed(change({"measured": measured[None]})["measured"])}
+        else:
+            forms = self._brief.forms[said.channel]
+            changed = change(channel_rows(forms, [said.payload], [whose]))
+            payload = {name: packed(changed[name], form.dtype) for name, form in forms.items()}
         return messages.pack(replace(said, payload=payload))
 
     def end(self, tick: int) -> None:

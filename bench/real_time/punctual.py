@@ -28,6 +28,7 @@ from affinet.planning import making
 from affinet.planning.plan import Plan
 from affinet.runtimes.run import fly
 from affinet.scenario import loading
+from netem.core import channels
 from netem.medium import deliveries
 
 _HERE = Path(__file__).parent
@@ -54,7 +55,7 @@ def busy(loops: int) -> Iterator[None]:
 
 def plan_of(agents: int, rate: float, seconds: float, heard: Path, per_process: int = 1) -> Plan:
     """A ring of agents with uniform delays of 5 to 45 ms, the last of which is the probe."""
-    probe = json.dumps(f"{sys.executable} {_HERE / 'probe_agent.py'} {heard}")
+    probe = json.dumps(f"{sys.executable} {_HERE.parent / 'carried' / 'agent.py'} {heard}")
     angles = 2.0 * np.pi * np.arange(agents) / agents
     nodes = (5.0 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).round(6).tolist()
     edges = [f"{n + 1}-{(n + step) % agents + 1}" for n in range(agents) for step in (1, 2)]
@@ -103,8 +104,10 @@ def flown(agents: int, rate: float, seconds: float, loops: int, per_process: int
         table = deliveries.read(out / deliveries.FILE)
         columns = [table[name].to_pylist() for name in ("src", "dst", "channel", "content")]
         asked = dict(zip(zip(*columns, strict=True), table["asked_s"].to_pylist(), strict=True))
-        rows = [json.loads(line) for line in heard.read_text().splitlines()]
-        errors = [seconds - asked[src, agents, channel, content] for src, channel, content, seconds in rows]
+        errors = [
+            seconds - asked[src, agents, channel, content]
+            for src, channel, content, seconds in _heard(heard, plan.channels)
+        ]
     lateness = outcome.timing.lateness
     return {
         "messages": len(errors),
@@ -117,6 +120,14 @@ def flown(agents: int, rate: float, seconds: float, loops: int, per_process: int
         "moments": sum(of.moments for of in lateness.values()),
         "unsaid": outcome.messages["dropped"].get("unsaid", 0),
     }
+
+
+def _heard(file: Path, names: Sequence[str]) -> Iterator[tuple[int, str, int, float]]:
+    """Of each broadcast, who said it on which channel in which tick, and how many seconds later it arrived."""
+    told, named = np.load(file), {channels.code(name): name for name in names}
+    for (_, content, code, src, _), seconds in zip(told["heard"].tolist(), told["took_s"].tolist(), strict=True):
+        if not np.isnan(seconds):
+            yield src, named[code], content, seconds
 
 
 def _quantiles(seconds: Sequence[float]) -> list[float]:

@@ -12,6 +12,8 @@ from analysis.models.arrays import Array, Integers, Mask
 from netem.impairments.rate import Admission, Rate
 
 _NEVER = 1e300  # s
+# What passes up to when a rate falls has passed, however times are rounded: so much of a message is nothing.
+_SLACK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def _until() -> Plain:
                 left, at, place = bits[channel, link], now, first
                 while left > 0.0 and place + 1 < len(begins):
                     room = (begins[place + 1] - at) * rates[place, link]
-                    if left <= room:
+                    if left <= room + _SLACK * bits[channel, link]:
                         break
                     left -= room
                     at = begins[place + 1]

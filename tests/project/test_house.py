@@ -116,7 +116,9 @@ def strings(value: Any) -> Iterator[str]:
             yield from strings(each)
 
 
-@pytest.mark.parametrize("file", [".github/workflows/ci.yml", ".pre-commit-config.yaml"])
+@pytest.mark.parametrize(
+    "file", [".github/workflows/ci.yml", ".github/workflows/weekly.yml", ".pre-commit-config.yaml"]
+)
 def test_every_target_that_ci_and_hooks_make_exists(file):
     said = list(strings(yaml.safe_load((ROOT / file).read_text(encoding="utf-8"))))
     made = [target for text in said for target in re.findall(r"\bmake ([a-z-]+)", text)]
@@ -130,8 +132,9 @@ def test_ci_tries_the_wheel_and_every_python_that_is_promised():
     promised = re.findall(r"Programming Language :: Python :: (3\.\d+)", project)
     assert jobs["test"]["strategy"]["matrix"]["python"] == promised
     assert jobs["test"]["continue-on-error"] == "${{ matrix.python == '3.14' }}"
-    assert [step["run"] for job in ("test", "wheel") for step in jobs[job]["steps"] if "run" in step] == [
+    assert [step["run"] for job in ("test", "accuracy", "wheel") for step in jobs[job]["steps"] if "run" in step] == [
         "make test",
+        "make accuracy",
         "make test-wheel",
     ]
 

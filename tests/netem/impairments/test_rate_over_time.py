@@ -72,3 +72,14 @@ def test_what_is_sent_arrives_when_it_has_passed_whatever_the_rates():
         begins = max(before[2], after[0] * DT) if after[1] is None else after[1]
         grid = np.clip(np.arange(61) * DT, begins, after[2])
         assert np.diff(grid) @ rates == pytest.approx(40.0, abs=1e-6)
+
+
+def test_what_just_passes_before_a_rate_falls_to_0_does_not_wait_for_the_next():
+    # 5.0 - 4.9 is a little less than 0.1: a message waited for 2.5 s for the sake of a part of a bit.
+    for tick in range(1, 500):
+        limit = RateOverTime(
+            0.01, np.array([0, tick, 750]), np.array([[25600.0], [0.0], [1e5]]), np.zeros(1), np.ones(1)
+        )
+        before = max(0, tick - 10)
+        waited = limit.seconds(before, np.array([[256.0 * (tick - before)]])).item()
+        assert waited == pytest.approx(0.01 * (tick - before), abs=1e-9)
