@@ -12,10 +12,11 @@ import numpy as np
 from rich import progress as bar
 from rich.console import Console
 
-from affinet.cli import means
+from affinet.cli import given, means
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
 from affinet.runtimes.rehearsing import why_alone
+from affinet.scenario import overrides
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
@@ -38,12 +39,14 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     UserCodeError
         When a user's own code does something wrong.
     """
-    if parsed.seeds is not None and parsed.seed is not None:
-        raise ScenarioError("--seed and --seeds: give the one or the other")
-    given = [name for name in _OF_ONE_RUN if getattr(parsed, name)]
-    if given or parsed.runtime == "processes":
+    fixed = given.overrides(parsed)
+    if parsed.seeds is not None and any(one.key == "seed" for one in overrides.read(fixed)):
+        raise ScenarioError("--seeds and a seed: give the one or the other")
+    sweeping.refuse_twice(parsed.sweep, fixed)
+    of_one_run = [name for name in _OF_ONE_RUN if getattr(parsed, name)]
+    if of_one_run or parsed.runtime == "processes":
         raise ScenarioError(
-            f"--{(*given, 'runtime processes')[0]} is of one run, "
+            f"--{(*of_one_run, 'runtime processes')[0]} is of one run, "
             "and --seeds, --sweep and --check fly many in this process: leave it out"
         )
     checker = None if parsed.check is None else invariants.parse(parsed.check)

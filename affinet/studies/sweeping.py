@@ -17,6 +17,7 @@ from affinet.planning import making as planning
 from affinet.planning.plan import Plan
 from affinet.planning.programs import refuse_in_process
 from affinet.runtimes.rehearsing import rehearse_all, why_alone
+from affinet.scenario import overrides, source
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import pool, study
@@ -92,9 +93,35 @@ def values_of(sweep: str) -> tuple[str, list[str]]:
     values = [value.strip() for value in _parts(text)]
     if not key.strip() or not all(values):
         raise ScenarioError(f"--sweep {sweep}: write it as key=value,value, like network.availability=0.2,0.5,1")
-    if again := [value for value, times in Counter(values).items() if times > 1]:
-        raise ScenarioError(f"--sweep {sweep}: {again[0]} stands there twice")
+    said = [one.value for one in overrides.read([f"{key}={value}" for value in values])]
+    for number, value in enumerate(said):
+        if value in said[:number]:
+            raise ScenarioError(f"--sweep {sweep}: {values[number]} stands there twice")
     return key.strip(), values
+
+
+def refuse_twice(sweeps: Sequence[str], fixed: Sequence[str]) -> None:
+    """Go on if each key is said once, by what is swept or by what is the same in all runs.
+
+    Parameters
+    ----------
+    sweeps, fixed
+        Texts like `key=value,value`, and overrides.
+
+    Raises
+    ------
+    ScenarioError
+        When one would be dropped for another, or seeds are swept, which runs of a setting have of their own.
+    """
+    swept = [".".join(source.parts(sweep.partition("=")[0])).strip() for sweep in sweeps]
+    if "seed" in swept:
+        raise ScenarioError("--sweep seed: the seeds of runs are given by --seeds, like --seeds 1-50")
+    for number, key in enumerate(swept):
+        if key in swept[:number]:
+            raise ScenarioError(f"--sweep {key}: it is swept twice; give all its values at once")
+    for one in overrides.read(fixed):
+        if one.key in swept:
+            raise ScenarioError(f"--sweep {one.key}: {one.says} is given as well; leave one of them out")
 
 
 def planned(load: Load, sweeps: Sequence[tuple[str, list[str]]], seed: int | None) -> list[Labelled]:
@@ -193,11 +220,11 @@ def _of_runs(result: study.Result) -> Setting:
 
 
 def _looked_at(labels: Mapping[str, str], plan: Plan, runs: int, load: Load) -> Iterator[Evidence]:
-    overrides, first = [f"{key}={value}" for key, value in labels.items()], plan.scenario.seed
+    labelled, first = [f"{key}={value}" for key, value in labels.items()], plan.scenario.seed
     for begin in range(first, first + runs, _LOOKED_AT):
         seeds = range(begin, min(begin + _LOOKED_AT, first + runs))
         yield from rehearse_all(
-            [plan if seed == first else planning.make(load([*overrides, f"seed={seed}"])) for seed in seeds]
+            [plan if seed == first else planning.make(load([*labelled, f"seed={seed}"])) for seed in seeds]
         )
 
 

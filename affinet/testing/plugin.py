@@ -22,6 +22,7 @@ _SEEDS, _RUNTIME = "affinet_seeds", "affinet_runtime"
 _RUNTIMES = ("inprocess", "processes")
 _MOST = 2**64  # seeds are below
 _COMMANDS = 50  # of other seeds that fail
+_MOST_SEEDS = 10_000  # each is a test for each that there is
 _RUNS: pytest.StashKey[SwarmRuns] = pytest.StashKey()
 
 
@@ -60,8 +61,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def _number_of_seeds(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: give how many seeds, at least 1")
+    if not text.isdecimal() or not 1 <= int(text) <= _MOST_SEEDS:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: give how many seeds, from 1 to {_MOST_SEEDS}; runs of more fly sooner by swarm.fly(seeds=)"
+        )
     return int(text)
 
 
@@ -175,5 +178,7 @@ def _checked_again(item: pytest.Item) -> str:
     file = os.path.relpath(item.path, item.config.invocation_params.dir)
     runtime = item.config.getoption("--affinet-runtime")
     where = "" if runtime == _RUNTIMES[0] else f" --affinet-runtime={runtime}"
+    if (number := item.config.getoption("--affinet-seeds")) is not None:
+        where += f" --affinet-seeds={number}"  # by which the test has its name
     _, _, test = item.nodeid.partition("::")
     return f"pytest {shlex.quote(f'{file}::{test}')}{where}"

@@ -164,7 +164,8 @@ def test_what_a_card_calls_its_airs_and_says_of_them_flies_nothing_anew(place, c
 def test_a_file_that_a_scenario_reads_flies_anew_when_it_says_something_else(place, capsys):
     contacts = place / "contacts.txt"
     contacts.write_text("1 2 0 5\n")
-    own = """set = ['network.profile="own"', 'network.profiles.own={loss=[{model="trace",file="contacts.txt",format="intervals"}]}']"""
+    trace = 'loss=[{model="trace",file="contacts.txt",format="intervals"}]'
+    own = f"""set = ['network.profile="own"', 'network.profiles.own={{{trace}}}']"""
     (place / "mine.toml").write_text(re.sub(r"set = .'timeline.*", own, CARD))
     assert scored(capsys, "none", "--quick")[0] == 0
     assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]

@@ -338,4 +338,17 @@ def test_without():
     result = tested(text, "--affinet-seeds=3", "-v")
     assert outcomes(result) == {"passed": 5}
     result.stdout.fnmatch_lines(["*test_plain?seed1?*", "*test_plain?seed2?*", "*test_plain?seed3?*"])
-    assert tested(text, "--affinet-seeds=0").ret != 0
+    for number in ("0", "10001", "99999999"):
+        assert tested(text, f"--affinet-seeds={number}").ret != 0
+
+
+def test_a_test_of_a_suite_with_so_many_seeds_is_checked_again_by_the_command_that_it_says(tested, pytester):
+    text = f"""
+def test_breaks(swarm):
+    run = swarm({SHORT}).fly()
+    run.check(bounded(1e-9 if run.plan.scenario.seed == 2 else 9))
+"""
+    (said,) = CHECK_AGAIN.findall(tested(text, "--affinet-seeds=3").stdout.str())
+    again = pytester.runpytest_inprocess(f"--basetemp={pytester.path / 'base'}", *shlex.split(said))
+    assert outcomes(again) == {"failed": 1}
+    again.stdout.fnmatch_lines(["seed 2, inprocess"])
