@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 
+from affinet.cli import moments
 from affinet.planning import making
 from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import files
+from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import parted, reading
 from affinet.verdicts.evidence import Evidence
@@ -26,8 +29,11 @@ def diff(parsed: argparse.Namespace) -> None:
         raise ScenarioError("affinet diff: give the directory of a run that passes, or --seed to fly one")
     failing = reading.evidence(parsed.run)
     passing = reading.evidence(parsed.other) if parsed.seed is None else _flown(parsed)
+    last = float(min(failing.seconds[-1], passing.seconds[-1]))
+    at = None if parsed.at is None else failing.tick(moments.within("--at", parsed.at, last))
+    _warn(failing, passing)
     try:
-        found = parted.parted(failing, passing, None if parsed.at is None else failing.tick(parsed.at))
+        found = parted.parted(failing, passing, at)
     except parted.NotAlike as error:
         raise ScenarioError(str(error)) from error
     if parsed.json:
@@ -35,6 +41,16 @@ def diff(parsed: argparse.Namespace) -> None:
         return
     lines = ["no agent is farther off in it than in the other run"] if found is None else found.lines()
     print("\n".join(lines))  # noqa: T201
+
+
+def _warn(failing: Evidence, passing: Evidence) -> None:
+    """What would be misread; by its own verdict alone a run that a test failed may pass."""
+    verdict, reasons = passing.outcome.verdict, "; ".join(passing.outcome.reasons)
+    if verdict == "fail":
+        print(one_line(f"note: the other run fails too: {reasons}"), file=sys.stderr)  # noqa: T201
+    if failing.ticks > passing.ticks:
+        flown = f"note: the other run has {passing.ticks} ticks: nothing is said of what came after them"
+        print(flown, file=sys.stderr)  # noqa: T201
 
 
 def _flown(parsed: argparse.Namespace) -> Evidence:

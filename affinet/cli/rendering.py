@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from rich import progress as bar
 
+from affinet.cli import moments
 from affinet.cli.options.flown import STILL
 from affinet.cli.progress import Bar
 from affinet.runtimes import directories
@@ -41,24 +42,26 @@ def render(parsed: argparse.Namespace) -> None:
     last = max(float(flight.seconds[-1]) for flight in flights)
     with about(parsed.out):
         if parsed.out.suffix in STILL:
-            swarm.still(flights, _within("--at", last if parsed.at is None else parsed.at, last), parsed.out)
+            swarm.still(flights, moments.within("--at", last if parsed.at is None else parsed.at, last), parsed.out)
         else:
             _film(flights, _moments(parsed, last), parsed.fps, parsed.out)
     print(one_line(str(parsed.out)))  # noqa: T201
 
 
-def _film(flights: Sequence[Flight], moments: Array, frames_per_s: int, out: Path) -> None:
+def _film(flights: Sequence[Flight], times: Array, frames_per_s: int, out: Path) -> None:
     try:
-        with Bar(str(out), len(moments), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
-            for number in swarm.film(flights, moments, frames_per_s, out):
-                shown.see(number + 1, f"{number + 1}/{len(moments)} frames")
+        with Bar(str(out), len(times), bar.BarColumn(), bar.TextColumn("{task.fields[says]}")) as shown:
+            for number in swarm.film(flights, times, frames_per_s, out):
+                shown.see(number + 1, f"{number + 1}/{len(times)} frames")
     except swarm.NoFilm as error:
         raise ScenarioError(str(error)) from error
 
 
 def _moments(parsed: argparse.Namespace, last: float) -> Array:
-    begins = _within("--from", parsed.begins, last)
-    ends = last if parsed.ends is None else _within("--to", parsed.ends, last)
+    begins = moments.within("--from", parsed.begins, last)
+    ends = last if parsed.ends is None else moments.within("--to", parsed.ends, last)
+    if last == 0.0:
+        raise ScenarioError(f"{parsed.out}: the run has one tick, which is no film; give a name that ends in .png")
     if ends <= begins:
         raise ScenarioError(f"--to {ends:g}: give a moment after --from {begins:g}")
     step = parsed.speed / parsed.fps
@@ -66,11 +69,5 @@ def _moments(parsed: argparse.Namespace, last: float) -> Array:
         raise ScenarioError(
             f"--speed {parsed.speed:g}: that would be more than {_MOST_FRAMES} frames; give a higher one"
         )
-    moments: Array = np.arange(begins, ends + 0.5 * step, step)
-    return moments
-
-
-def _within(option: str, seconds: float, last: float) -> float:
-    if not 0.0 <= seconds <= last:
-        raise ScenarioError(f"{option} {seconds:g}: give a moment from 0 to {last:g} s")
-    return seconds
+    times: Array = np.arange(begins, ends + 0.5 * step, step)
+    return times

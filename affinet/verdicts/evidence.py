@@ -36,6 +36,10 @@ class Evidence:
     arrays: Arrays
     outcome: Outcome
 
+    def __post_init__(self) -> None:
+        for values in self.arrays.values():
+            values.flags.writeable = False  # nobody who looks at a run changes what the next one sees
+
     def __repr__(self) -> str:
         source, digest = self.plan.scenario.source, self.outcome.digest or ""
         flown = f"{one_line(source.file)}, {self.outcome.verdict}, {digest[:_DIGITS]}, {self.ticks} ticks"
@@ -80,25 +84,30 @@ class Evidence:
     @cached_property
     def present(self) -> Mask:
         """Agents that take part, shape (T, N)."""
-        return self.timeline.present(range(self.ticks))
+        return _kept(self.timeline.present(range(self.ticks)))
 
     @cached_property
     def embodied(self) -> Mask:
         """Agents that have a body in the air, shape (T, N)."""
-        return self.timeline.each(range(self.ticks), lambda now: ~now.vanished)
+        return _kept(self.timeline.each(range(self.ticks), lambda now: ~now.vanished))
 
     @cached_property
     def awake(self) -> Mask:
         """Agents whose processes live and run, shape (T, N)."""
-        return self.timeline.each(range(self.ticks), lambda now: ~now.idle)
+        return _kept(self.timeline.each(range(self.ticks), lambda now: ~now.idle))
 
     @cached_property
     def located(self) -> Mask:
         """Ticks in which it is known where all agents were, shape (T,): all but in runs that were not simulated."""
         if not self.plan.may_have_gaps:
-            return np.ones(self.ticks, dtype=bool)
-        return np.asarray(~np.isnan(self.position).any(axis=(-2, -1)))
+            return _kept(np.ones(self.ticks, dtype=bool))
+        return _kept(np.asarray(~np.isnan(self.position).any(axis=(-2, -1))))
 
     def tick(self, seconds: float) -> int:
         """The tick of a time."""
         return round(seconds / self.dt)
+
+
+def _kept(mask: Mask) -> Mask:
+    mask.flags.writeable = False
+    return mask

@@ -137,6 +137,15 @@ def test_a_film_has_as_many_frames_as_its_speed_asks_for(runs, tmp_path):
         assert np.abs(np.asarray(film.convert("L")).astype(int) - first).max() > 100
 
 
+def test_one_tick_is_no_film(tmp_path, capsys):
+    short = str(tmp_path / "short")
+    assert main(["run", "corridor", "--runtime", "inprocess", "--dt", "0.05", "--duration", "0.05", "--out", short]) == 0
+    capsys.readouterr()
+    assert main(["render", short, "--out", str(tmp_path / "x.gif")]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.endswith("x.gif: the run has one tick, which is no film; give a name that ends in .png")
+
+
 def test_without_ffmpeg_a_film_says_what_would_help(runs, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(swarm.FFMpegWriter, "isAvailable", lambda: False)
     out = tmp_path / "swarm.mp4"

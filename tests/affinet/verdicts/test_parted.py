@@ -9,6 +9,7 @@ from flying import plan_of
 
 from affinet import load
 from affinet.cli.commands import main
+from affinet.cli.differing import _warn
 from affinet.runtimes.rehearsing import rehearse
 from affinet.verdicts.parted import NotAlike, parted
 from netem.medium.verdict import Verdict
@@ -102,3 +103,25 @@ def test_the_command_reads_both_or_flies_one_with_another_seed(tmp_path, capsys)
     assert capsys.readouterr().out == "no agent is farther off in it than in the other run\n"
     assert main(["diff", kept]) == 2
     assert "give the directory of a run that passes, or --seed to fly one" in capsys.readouterr().err
+    assert main(["diff", kept, kept, "--at", "12"]) == 2
+    assert capsys.readouterr().err == "--at 12: give a moment from 0 to 11.95 s\n"
+
+
+def test_a_run_that_is_no_better_or_shorter_is_told(capsys):
+    failing = rehearse(plan_of("corridor", *COARSE))
+    lost = replace(failing.outcome, verdict="fail", reasons=("the swarm diverged at 3 s",))
+    cut_off = {name: values[:60] for name, values in failing.arrays.items()}
+    _warn(failing, replace(failing, outcome=lost, arrays=cut_off))
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "note: the other run fails too: the swarm diverged at 3 s"
+    assert second == "note: the other run has 60 ticks: nothing is said of what came after them"
+    _warn(failing, failing)
+    assert not capsys.readouterr().err
+
+
+def test_nobody_who_looks_at_a_run_changes_what_the_next_one_sees(runs):
+    run, _ = runs
+    looked_at = [*run.arrays.values(), run.error, run.position, run.present, run.embodied, run.awake, run.located]
+    for values in looked_at:
+        with pytest.raises(ValueError, match="read-only"):
+            values[...] = 0
