@@ -89,7 +89,7 @@ class Kept:
         cell, worse = (given.cell, given.worsening) if isinstance(given, Descent) else (given, None)
         of = (cell.task.name, cell.set, worse and worse.name)
         if of not in self._airs:
-            ends = [[]] if worse is None else [worse.at(worse.least), worse.at(worse.most)]
+            ends = [[]] if worse is None else [worse.at(worse.least_tried), worse.at(worse.most)]
             self._airs[of] = identity.of_plans(cell.nobody(more) for more in ends)
         return self._airs[of]
 

@@ -139,7 +139,9 @@ def test_a_film_has_as_many_frames_as_its_speed_asks_for(runs, tmp_path):
 
 def test_one_tick_is_no_film(tmp_path, capsys):
     short = str(tmp_path / "short")
-    assert main(["run", "corridor", "--runtime", "inprocess", "--dt", "0.05", "--duration", "0.05", "--out", short]) == 0
+    assert (
+        main(["run", "corridor", "--runtime", "inprocess", "--dt", "0.05", "--duration", "0.05", "--out", short]) == 0
+    )
     capsys.readouterr()
     assert main(["render", short, "--out", str(tmp_path / "x.gif")]) == 2
     (said,) = capsys.readouterr().err.splitlines()

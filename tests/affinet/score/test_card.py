@@ -36,7 +36,7 @@ def test_everything_on_a_card_that_is_shipped_can_fly(name):
     assert card.quickly().tasks
     for task in card.tasks:
         assert set(task.quick_rivals) <= set(task.rivals)
-        worst = [one.at(one.most) for one in card.worsenings] + [one.at(one.most / 2) for one in card.worsenings]
+        worst = [one.at(bad) for one in card.worsenings for bad in (one.least_tried, one.most / 2, one.most)]
         for more in [*(air.set for air in card.airs), *worst, task.noisier]:
             making.make(loading.load(task.scenario, (*task.set, *more)))
 

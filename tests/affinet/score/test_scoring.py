@@ -10,10 +10,12 @@ from own_code import ESTIMATOR, broken, write
 
 from affinet.cli.commands import main
 from affinet.runtimes.rehearsing import rehearse
-from affinet.scenario import loading
-from affinet.score import flying, measures
+from affinet.scenario import files, loading
+from affinet.score import card as cards
+from affinet.score import flying, measures, scoring
 from affinet.score.card import Task, Worsening
 from affinet.score.flying import Cell, Descent, Entrant
+from affinet.score.scoring import Kept
 from affinet.studies.executor import Here
 
 CARD = """\
@@ -171,6 +173,15 @@ def test_a_file_that_a_scenario_reads_flies_anew_when_it_says_something_else(pla
     assert "6 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]
     contacts.write_text("1 3 0 5\n")
     assert "2 of 8 pieces were there" in scored(capsys, "none", "--quick")[2]  # the break-downs
+
+
+@pytest.mark.parametrize("name", files.shipped("scorecards"))
+def test_what_flies_is_known_of_every_piece_of_a_card_that_is_shipped(tmp_path, name):
+    card = cards.load(name)
+    kept = Kept(tmp_path, {"mine": "code"}, pytest.fail)
+    todo = list(scoring.pieces(card, {task.name: ["mine"] for task in card.tasks}, "agents.estimator", tmp_path))
+    assert kept.read(todo) == {}
+    assert len({kept._file(piece) for piece in todo}) == len(todo)
 
 
 def test_a_scenario_file_that_says_something_else_flies_anew(place, capsys):
