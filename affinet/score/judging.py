@@ -104,7 +104,14 @@ class Score:
 def judge(raw: Raw) -> Score:
     """Judge what was flown."""
     compared, break_downs = tuple(_compared(raw)), tuple(_break_downs(raw))
-    words = [*_unsuited(raw), *_against(raw, compared), *_points(raw, break_downs), *_honest(raw), *_cost(raw)]
+    words = [
+        *_unsuited(raw),
+        *_vacuous(raw),
+        *_against(raw, compared),
+        *_points(raw, break_downs),
+        *_honest(raw),
+        *_cost(raw),
+    ]
     return Score(compared, break_downs, tuple(words))
 
 
@@ -139,6 +146,17 @@ def _unsuited(raw: Raw) -> Iterator[str]:
     for task in raw.tasks:
         if not raw.flies(task.name, raw.scored):
             yield f"{task.name}: {raw.scored} does not suit it: {raw.cells[task.name, raw.airs[0], raw.scored].unsuited}"
+
+
+def _vacuous(raw: Raw) -> Iterator[str]:
+    for task in raw.tasks:
+        if not raw.flies(task.name, raw.scored):
+            continue
+        for air in raw.airs:
+            share = raw.runs(task.name, air, raw.scored, "vacuous").mean()
+            if share > 0.0:
+                runs = "all runs" if share == 1.0 else f"{share:.0%} of the runs"
+                yield f"{task.name}, {air}: in {runs} a fault touched nothing, which proves nothing"
 
 
 def _against(raw: Raw, compared: Sequence[Compared]) -> Iterator[str]:

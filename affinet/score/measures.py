@@ -36,6 +36,8 @@ class Measured(NamedTuple):
         Root mean square of the errors of an estimated edge, in metres; NaN where none is estimated.
     delivered
         Which share of the messages offered arrived.
+    vacuous
+        Whether a fault of it touched nothing.
     """
 
     error: float
@@ -44,6 +46,7 @@ class Measured(NamedTuple):
     nees: float
     estimation: float
     delivered: float
+    vacuous: bool
 
 
 class Load(NamedTuple):
@@ -65,6 +68,7 @@ def of(run: Evidence, task: Task) -> Measured:
             nees=_mean(of_run(run, "nees", range(run.ticks))) / run.plan.world.formation.dimension,
             estimation=_estimation(run),
             delivered=_delivered(run),
+            vacuous=run.outcome.verdict == "vacuous",
         )
 
 
