@@ -1,28 +1,32 @@
-"""`affinet hunt`: what a person sees of it, and the scenario that it leaves."""
+"""`affinet hunt`: what a person sees of it, and the scenarios that it leaves."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import operator
-from dataclasses import asdict
-from functools import reduce
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, closing
+from itertools import product
 from pathlib import Path
 
-from affinet.cli import show
+from affinet.cli import hunted, show
 from affinet.cli.given import scenario
 from affinet.cli.status import FAIL, PASS
 from affinet.planning import making as planning
 from affinet.runtimes import directories
 from affinet.runtimes.run import evidence, fly
 from affinet.scenario import files, loading
+from affinet.scenario.sections import Scenario
 from affinet.scenario.words import among
 from affinet.scenario.wrong import ScenarioError
-from affinet.testing import hunt, strategies
-from affinet.testing.hunt import Counterexample
-from affinet.verdicts import invariants
-from affinet.verdicts.checking import Checker
+from affinet.studies import pool, sweeping
+from affinet.testing import flights, hunt, menu
+from affinet.testing.flights import Chunk, Each
+from affinet.testing.hunt import Counterexample, Quarry
+from affinet.testing.trial import Settings
 from netem.processes.system_errors import about
+
+_WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
 
 
 def hunt_and_report(parsed: argparse.Namespace) -> int:
@@ -31,41 +35,97 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
     Raises
     ------
     ScenarioError, PlanError, UserCodeError, OSError
-        When the hunt cannot begin, or its smallest fault not be written.
+        When the hunt cannot begin, or what it finds not be written.
     """
-    given = scenario(parsed)
-    invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
-    verbs = parsed.verbs or list(strategies.VERBS)
-    if strangers := sorted(set(verbs) - set(strategies.VERBS)):
-        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
-    if parsed.out and not parsed.out.parent.is_dir():
-        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
-    folder = parsed.out.absolute().parent if parsed.out else files.working_directory()
-    for name, lies_in in given.own_modules.items():
-        if folder != lies_in:
-            raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
-    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
-    with directories.unless_empty(file), show.HuntProgress(parsed.budget) as chase:
-        counterexample, coverage = hunt.hunt(
-            given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
-        )
-        if counterexample is not None:
-            with about(file):
-                file.write_text(loading.to_toml(counterexample.scenario), encoding="utf-8")
-    show.hunted(counterexample, coverage)
-    if counterexample is not None:
-        _confirm(counterexample, invariant, file)
+    quarry = quarry_of(parsed)
+    places = _places(parsed, quarry)
+    with ExitStack() as claimed:
+        for file in places:
+            claimed.enter_context(directories.unless_empty(file))
+        with hunted.Progress(parsed.budget) as chase:
+            found = hunt.hunt(
+                quarry,
+                budget=parsed.budget,
+                seed=next(iter(quarry.scenarios.values())).seed,
+                watch=chase.see,
+                each=flown_by(parsed.jobs),
+            )
+        for one in found.found:
+            write(one.scenario, places[one.number])
+    hunted.show(found, [one.name for one in quarry.make()], quarry)
+    for one in found.found:
+        _confirm(one, quarry, places[one.number])
     if parsed.json:
-        found = (
-            None
-            if counterexample is None
-            else {"scenario": str(file), "finding": str(counterexample.finding), "digest": counterexample.digest}
-        )
-        print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
-    return PASS if counterexample is None else FAIL
+        print(json.dumps(hunted.as_json(found, places, quarry)))  # noqa: T201
+    return FAIL if found.found else PASS
 
 
-def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> None:
+def quarry_of(parsed: argparse.Namespace) -> Quarry:
+    """What is hunted, as the command line says it.
+
+    Raises
+    ------
+    ScenarioError
+        When something in it is wrong.
+    """
+    make = flights.said(parsed.invariant)
+    if parsed.seeds is not None and parsed.seed is not None:
+        raise ScenarioError("--seed and --seeds: give the one or the other")
+    verbs = parsed.verbs or list(menu.VERBS)
+    if strangers := sorted(set(verbs) - set(menu.VERBS)):
+        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], menu.VERBS)}")
+    swept = [sweeping.values_of(sweep) for sweep in parsed.sweep]
+    varied = product(*([f"{key}={value}" for value in values] for key, values in swept))
+    scenarios: dict[Settings, Scenario] = {settings: scenario(parsed, settings) for settings in varied}
+    seeds = parsed.seeds or [next(iter(scenarios.values())).seed]
+    return Quarry(make, scenarios, list(seeds), verbs)
+
+
+def flown_by(jobs: int | None) -> Each:
+    """What flies chunks of trials: the first here, and all others, where that takes long, in so many processes."""
+
+    def each(work: flights.Work, chunks: Sequence[Chunk]) -> Generator[tuple[int, flights.Made], None, None]:
+        ticks, here = 0, 0
+        while here < len(chunks) and ticks < _WORTH_PROCESSES:
+            ticks += sum(case.given.time.ticks for case in chunks[here])
+            here += 1
+        yield from enumerate(map(work, chunks[:here]))
+        if here < len(chunks):
+            executor = pool.on_this_machine(jobs)
+            with closing(executor.each(work, chunks[here:], lambda _: None)) as flown:
+                yield from ((here + number, made) for number, made in flown)
+
+    return each
+
+
+def write(given: Scenario, file: Path) -> None:
+    """Write a scenario into its file.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written.
+    """
+    with about(file):
+        file.write_text(loading.to_toml(given), encoding="utf-8")
+
+
+def _places(parsed: argparse.Namespace, quarry: Quarry) -> list[Path]:
+    """A new, empty file for what breaks each invariant."""
+    out: Path | None = parsed.out
+    if out and not out.parent.is_dir():
+        raise ScenarioError(f"--out {out}: there is no directory {out.parent}")
+    folder = out.absolute().parent if out else files.working_directory()
+    for name, lies_in in (pair for given in quarry.scenarios.values() for pair in given.own_modules.items()):
+        if folder != lies_in:
+            raise ScenarioError(f"--out {out or '.'}: {name} lies in {lies_in}: write the file there")
+    numbers = range(1, len(parsed.invariant) + 1)
+    if out is None:
+        return [directories.for_hunt(Path(parsed.scenario).stem) for _ in numbers]
+    return [directories.for_hunt(out if number == 1 else out.with_stem(f"{out.stem}-{number}")) for number in numbers]
+
+
+def _confirm(counterexample: Counterexample, quarry: Quarry, file: Path) -> None:
     """Fly the smallest fault over processes."""
     plan = planning.make(loading.load(str(file)))
     out = directories.for_run(file.stem)
@@ -73,5 +133,5 @@ def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> 
         flown = fly(plan, "processes", out, watch.see)
     same = "the same bits" if flown.digest == counterexample.digest else "OTHER BITS"
     landed = evidence(plan, flown)
-    found = invariant(landed) if landed else "; ".join(flown.reasons)
+    found = quarry.make()[counterexample.number](landed) if landed else "; ".join(flown.reasons)
     print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
