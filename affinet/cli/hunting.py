@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -13,17 +15,19 @@ from affinet.cli import hunted, show
 from affinet.cli.given import scenario
 from affinet.cli.status import FAIL, PASS
 from affinet.planning import making as planning
+from affinet.planning.plan import PlanError
 from affinet.runtimes import directories
 from affinet.runtimes.run import evidence, fly
 from affinet.scenario import files, loading
 from affinet.scenario.sections import Scenario
-from affinet.scenario.words import among
+from affinet.scenario.words import among, one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.studies import pool, sweeping
-from affinet.testing import flights, hunt, menu
+from affinet.testing import corpus, flights, hunt, menu
+from affinet.testing.corpus import Found
 from affinet.testing.flights import Chunk, Each
 from affinet.testing.hunt import Counterexample, Quarry
-from affinet.testing.trial import Settings
+from affinet.testing.trial import Settings, Trial
 from netem.processes.system_errors import about
 
 _WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
@@ -38,6 +42,7 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
         When the hunt cannot begin, or what it finds not be written.
     """
     quarry = quarry_of(parsed)
+    quarry, trials = _with_corpus(parsed, quarry)
     places = _places(parsed, quarry)
     with ExitStack() as claimed:
         for file in places:
@@ -49,9 +54,13 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
                 seed=next(iter(quarry.scenarios.values())).seed,
                 watch=chase.see,
                 each=flown_by(parsed.jobs),
+                corpus=trials,
             )
         for one in found.found:
             write(one.scenario, places[one.number])
+    if parsed.corpus:
+        new = corpus.keep(parsed.corpus, Path(parsed.scenario).stem, found.worth)
+        _note(f"{parsed.corpus}: {len(trials)} flown first, {new} new")
     hunted.show(found, [one.name for one in quarry.make()], quarry)
     for one in found.found:
         _confirm(one, quarry, places[one.number])
@@ -79,6 +88,32 @@ def quarry_of(parsed: argparse.Namespace) -> Quarry:
     scenarios: dict[Settings, Scenario] = {settings: scenario(parsed, settings) for settings in varied}
     seeds = parsed.seeds or [next(iter(scenarios.values())).seed]
     return Quarry(make, scenarios, list(seeds), verbs)
+
+
+def _with_corpus(parsed: argparse.Namespace, quarry: Quarry) -> tuple[Quarry, list[Trial]]:
+    """The trials of the corpus that fit the scenario and hold undisturbed, and their settings; others are told of."""
+    known = dict[str, Found]()
+    for one in corpus.read(parsed.corpus) if parsed.corpus else ():
+        try:
+            if one.trial.settings not in {**quarry.scenarios, **quarry.beyond}:
+                settings = {one.trial.settings: scenario(parsed, one.trial.settings)}
+                quarry = replace(quarry, beyond={**quarry.beyond, **settings})
+            planning.make(one.trial.in_scenario(quarry.case(one.trial).given))
+        except (ScenarioError, PlanError) as error:
+            _note(f"{one.file}: left out, as it does not fit {parsed.scenario}: {error}")
+            continue
+        known[one.trial.key] = one
+    pairs = [(one.trial.settings, one.trial.seed) for one in known.values()]
+    failing = hunt.failing_undisturbed(quarry, pairs, flown_by(parsed.jobs)) if pairs else []
+    for one, finding in zip(list(known.values()), failing, strict=True):
+        if finding is not None:
+            _note(f"{one.file}: left out, as its seed and settings fail with no fault at all: {finding}")
+            del known[one.trial.key]
+    return quarry, [one.trial for one in known.values()]
+
+
+def _note(line: str) -> None:
+    print(one_line(line), file=sys.stderr)  # noqa: T201
 
 
 def flown_by(jobs: int | None) -> Each:

@@ -85,16 +85,19 @@ class Quarry:
         Of the runs; the first is the plainest.
     verbs
         Of the faults to draw from.
+    beyond
+        Settings that trials of a corpus have, and none that are drawn.
     """
 
     make: Make
     scenarios: Mapping[Settings, Scenario]
     seeds: Sequence[int]
     verbs: Sequence[str]
+    beyond: Mapping[Settings, Scenario] = field(default_factory=dict)
 
     def case(self, trial: Trial) -> Case:
         """A trial in its scenario."""
-        return Case(self.scenarios[trial.settings], trial)
+        return Case({**self.scenarios, **self.beyond}[trial.settings], trial)
 
 
 def hunt(quarry: Quarry, *, budget: int, seed: int, watch: Watch, each: Each, corpus: Sequence[Trial] = ()) -> Hunted:
@@ -122,7 +125,7 @@ def hunt(quarry: Quarry, *, budget: int, seed: int, watch: Watch, each: Each, co
     UserCodeError
         When a user's own estimator or law does something wrong, under the smallest schedule found that makes it do so.
     """
-    refuse_failing_undisturbed(quarry, each, corpus)
+    refuse_failing_undisturbed(quarry, each)
     menus = {settings: menu(given, quarry.verbs) for settings, given in quarry.scenarios.items()}
     drawn = Deck(quarry.scenarios, quarry.seeds, menus).drawn(seed, budget)
     hunted, broken = _flown(quarry, [*_chunks(iter(corpus)), *_chunks(drawn)], each, watch)
@@ -131,7 +134,7 @@ def hunt(quarry: Quarry, *, budget: int, seed: int, watch: Watch, each: Each, co
     return hunted
 
 
-def refuse_failing_undisturbed(quarry: Quarry, each: Each, corpus: Sequence[Trial] = ()) -> None:
+def refuse_failing_undisturbed(quarry: Quarry, each: Each) -> None:
     """Go on if no invariant fails with no fault added, in any setting and with any seed.
 
     Raises
@@ -139,21 +142,30 @@ def refuse_failing_undisturbed(quarry: Quarry, each: Each, corpus: Sequence[Tria
     ScenarioError
         When one does.
     """
-    pairs = dict.fromkeys([*product(quarry.scenarios, quarry.seeds), *((one.settings, one.seed) for one in corpus)])
+    pairs = [*product(quarry.scenarios, quarry.seeds)]
+    for (settings, seed), finding in zip(pairs, failing_undisturbed(quarry, pairs, each), strict=True):
+        if finding is not None:
+            where = "".join(f", with {words}" for words in settings) + (f", seed {seed}" if len(pairs) > 1 else "")
+            raise ScenarioError(f"{finding}; it fails with no fault at all{where}, and there is nothing to hunt for")
+
+
+def failing_undisturbed(quarry: Quarry, pairs: Sequence[tuple[Settings, int]], each: Each) -> list[CheckResult | None]:
+    """What fails with no fault added, with each of these settings and seeds; None where nothing does.
+
+    Raises
+    ------
+    UserCodeError, ScenarioError, PlanError
+        When one of them cannot fly.
+    """
     bare = [Trial(settings, seed, ()) for settings, seed in pairs]
     chunks = [[quarry.case(trial) for trial in chunk] for chunk in _chunks(iter(bare))]
     with closing(each(partial(fly, quarry.make), chunks)) as found:
-        for chunk, flown in zip(chunks, in_order(found), strict=True):
-            for (given, trial), one in zip(chunk, flown, strict=True):
-                if one is None or one.raised:  # says so itself
-                    rehearse(planning.make(trial.in_scenario(given)))
-                    continue
-                for finding in one.findings:
-                    if finding.verdict == "fail":
-                        where = "".join(f" with {words}" for words in (*trial.settings, f"seed {trial.seed}"))
-                        raise ScenarioError(
-                            f"{finding}; it fails with no fault at all{where}, and there is nothing to hunt for"
-                        )
+        flown = [one for made in in_order(found) for one in made]
+    for trial, one in zip(bare, flown, strict=True):
+        if one is None or one.raised:  # by itself it says what is wrong
+            rehearse(planning.make(trial.in_scenario(quarry.case(trial).given)))
+    findings = [one.findings if one else () for one in flown]
+    return [next((finding for finding in some if finding.verdict == "fail"), None) for some in findings]
 
 
 def _chunks(trials: Iterator[Trial]) -> Iterator[list[Trial]]:
@@ -197,11 +209,11 @@ def _smallest(quarry: Quarry, number: int, trial: Trial, hunted: Hunted, watch: 
         watch(coverage, None)
         return [one is not None and one.breaks(number) for one in flown]
 
-    ground = Ground(quarry.scenarios, quarry.seeds)
+    ground = Ground({**quarry.scenarios, **quarry.beyond}, quarry.seeds)
     found = shrinking.smallest(trial, ground, breaks, lambda smaller: watch(coverage, smaller))
     invariant = quarry.make()[number]
     hunted.worth.append((found, (invariant.name,)))
-    broken = found.in_scenario(quarry.scenarios[found.settings])
+    broken = found.in_scenario(quarry.case(found).given)
     try:
         evidence = rehearse(planning.make(broken))
     except UserCodeError as error:

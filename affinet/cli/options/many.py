@@ -120,6 +120,12 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         help="the smallest, as a scenario (default: hunted-SCENARIO.toml)",
     )
     hunt.add_argument(
+        "--corpus",
+        type=values.path,
+        metavar="DIR",
+        help="a folder: what broke something in earlier hunts, or covered what is rare, flies first; what does now is kept",
+    )
+    hunt.add_argument(
         "--jobs",
         type=values.count,
         metavar="N",

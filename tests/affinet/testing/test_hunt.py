@@ -297,7 +297,7 @@ def test_the_smallest_is_written_into_a_toml_file_or_not_at_all(capsys):
     assert "call it found.toml" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verbs", [("cut", "lose", "delay"), ("dropout", "kill"), ("degrade", "dropout")])
+@pytest.mark.parametrize("verbs", [("cut", "lose", "delay"), ("dropout", "kill"), ("degrade", "partition")])
 def test_schedules_that_fly_side_by_side_are_found_to_be_what_they_are_alone(verbs):
     filtered = loading.load("corridor", ("time.dt=0.05", "time.duration=4", "agents.estimator=rkf"))
     deck = Deck({(): filtered}, (1, 2), {(): menu.menu(filtered, verbs)})
