@@ -120,6 +120,24 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         help="the smallest, as a scenario (default: hunted-SCENARIO.toml)",
     )
     hunt.add_argument(
+        "--every",
+        metavar="CLASS",
+        help="draw nothing, and fly all of a class of faults, like 'one link, up to 5 s, from any 0.5 s, with cut'; a "
+        "certificate where all hold",
+    )
+    hunt.add_argument(
+        "--certificate",
+        type=values.path,
+        metavar="FILE",
+        help="of --every, where nothing breaks (default: certified-SCENARIO.json)",
+    )
+    hunt.add_argument(
+        "--frontier",
+        type=values.drawing,
+        metavar="FILE",
+        help="draw nothing, and cut more and more links for longer and longer: a picture of what breaks",
+    )
+    hunt.add_argument(
         "--corpus",
         type=values.path,
         metavar="DIR",

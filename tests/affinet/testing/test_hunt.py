@@ -61,7 +61,7 @@ def test_the_smallest_is_named_after_its_scenario_where_no_file_is_named(den, mo
     trial = Trial((), 1, ())
     smallest = hunt.Counterexample(0, CORRIDOR, CheckResult("bounded(5)", "fail", 3, "x"), "digest", trial)
     monkeypatch.setattr(hunt, "hunt", lambda *_, **__: Hunted([smallest]))
-    monkeypatch.setattr(hunting, "_confirm", lambda *_: None)
+    monkeypatch.setattr(hunting, "confirm", lambda *_: None)
     assert commands.main(["hunt", "corridor", "--invariant", "bounded(5)"]) == 1
     assert said(loading.load(str(den / "hunted-corridor.toml"))) == said(CORRIDOR)
 
