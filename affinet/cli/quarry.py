@@ -24,7 +24,7 @@ from affinet.testing.hunt import Counterexample, Quarry
 from affinet.testing.trial import Settings
 from netem.processes.system_errors import about
 
-_WORTH_PROCESSES = 50_000  # ticks of runs, below which starting them takes longer
+_WORTH_PROCESSES = 20_000  # ticks of runs, below which starting them takes longer
 
 
 def quarry_of(parsed: argparse.Namespace) -> Quarry:

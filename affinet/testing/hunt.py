@@ -22,7 +22,7 @@ from affinet.testing.trial import Deck, Settings, Trial
 from affinet.verdicts.checking import CheckResult
 from netem.processes.user_code import UserCodeError
 
-_FIRST, _MOST = 8, 256  # trials that fly at once: few at first, as the first may break it
+_FIRST, _MOST = 8, 64  # trials that fly at once: few at first, as the first may break it; enough to keep processes busy
 Watch = Callable[[Coverage, Trial | None], None]
 
 

@@ -104,9 +104,11 @@ def _fault(given: Scenario, dishes: Sequence[Dish], drawn: Iterator[float]) -> E
     dish = _of(dishes, next(drawn))
     span: Entry = {"at": seconds(given, int(next(drawn) * STEPS))}
     ends, lasts = next(drawn) < 0.5 or not dish.forever, _of(_LASTS, next(drawn))
-    if ends:
+    chosen = [_chosen(part, drawn) for part in dish.parts]
+    # What is held for good is lost; it would only be known how late it may be, of each run another time.
+    if ends or any(words.get("in_flight") == "hold" for words in chosen):
         span["lasts"] = seconds(given, lasts)
-    return dish.entries(span, [_chosen(part, drawn) for part in dish.parts])
+    return dish.entries(span, chosen)
 
 
 def _chosen(part: Part, drawn: Iterator[float]) -> Entry:
