@@ -108,8 +108,21 @@ def shorter(trial: Trial, ground: Ground) -> Iterator[Trial]:
         for ticks in _less(end - start):
             yield _with(trial, number, spanning(fault, (start, start + ticks), given))
             yield _with(trial, number, spanning(fault, (end - ticks, None if for_good else end), given))
-        for earlier in (0, *_less(start)) if start else ():
-            yield _with(trial, number, spanning(fault, (earlier, earlier + end - start), given))
+        for moved in _before_it(start):
+            yield _with(trial, number, spanning(fault, (moved, moved + end - start), given))
+
+
+def all_earlier(trial: Trial, ground: Ground) -> Iterator[Trial]:
+    """All faults sooner by as much: what has to meet cannot move alone."""
+    given = ground.scenarios[trial.settings]
+    if len(trial.faults) < 2 or any(_TIMED_APART & fault[0].keys() for fault in trial.faults):
+        return
+    spans = [span(fault, given) for fault in trial.faults]
+    first = min(start for start, _ in spans)
+    for moved in _before_it(first):
+        sooner = [(start - first + moved, end - first + moved) for start, end in spans]
+        pairs = zip(trial.faults, sooner, strict=True)
+        yield replace(trial, faults=tuple(spanning(fault, ticks, given) for fault, ticks in pairs))
 
 
 def weaker(trial: Trial, ground: Ground) -> Iterator[Trial]:
@@ -121,7 +134,7 @@ def weaker(trial: Trial, ground: Ground) -> Iterator[Trial]:
                 yield _with(trial, number, [fault[0] | {key: value}, *fault[1:]])
 
 
-AXES: tuple[Axis, ...] = (fewer_faults, plainer_run, plainer_words, less_wide, shorter, weaker)
+AXES: tuple[Axis, ...] = (fewer_faults, plainer_run, plainer_words, less_wide, shorter, all_earlier, weaker)
 
 
 def span(fault: Entries, given: Scenario) -> tuple[int, int]:
@@ -180,6 +193,11 @@ def _less(whole: int) -> list[int]:
     """Whole numbers below one: its half, and the half of that; it less one, two, four; the smallest first."""
     places = range(whole.bit_length())
     return sorted({number for n in places for number in (whole >> n, whole - (1 << n)) if 0 < number < whole})
+
+
+def _before_it(tick: int) -> tuple[int, ...]:
+    """Ticks before one, the earliest first."""
+    return (0, *_less(tick)) if tick else ()
 
 
 def _smaller(value: Any, step: float) -> Iterator[Any]:

@@ -434,3 +434,24 @@ def test_a_hunt_over_seeds_and_settings_leaves_a_scenario_that_has_them(den, cap
     again = loading.load(str(den / "hunted-corridor.toml"))
     assert again.seed == one["seed"] in (3, 4)
     assert one["settings"] == [f"network.availability={again.network.availability:g}"]
+
+
+def both_at_once(least):
+    """Whether a link is never cut in so many ticks in which another loses enough."""
+
+    def ticks(evidence, verb, pair, share):
+        return {
+            tick
+            for fault in evidence.plan.faults
+            if str(fault.verb) == verb and pair in fault.pairs and fault.probability >= share
+            for tick in range(fault.start, fault.end or evidence.plan.world.ticks)
+        }
+
+    return planted(lambda run: len(ticks(run, "cut", (2, 4), 0.0) & ticks(run, "lose", (3, 5), 0.2)) < least)
+
+
+def test_two_faults_that_break_it_together_are_each_as_short_small_and_weak_as_can_be():
+    ((one, other),) = smallest_of(both_at_once(3), verbs=["cut", "lose"], given=SECOND, budget=600)
+    ((cut,), (lose,)) = sorted((one, other), key=lambda fault: fault[0]["verb"])
+    assert (cut["links"], cut["at"], cut["lasts"]) == (["2->4"], 0.0, 0.15)
+    assert (lose["links"], lose["at"], lose["lasts"], lose["loss"]) == (["3->5"], 0.0, 0.15, 0.2)
