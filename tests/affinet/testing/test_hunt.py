@@ -417,6 +417,17 @@ def test_seeds_and_settings_are_drawn_and_the_plainest_that_break_it_are_kept():
     assert found.scenario.seed == found.trial.seed > 2
 
 
+def test_where_seed_and_setting_are_of_no_matter_they_are_the_first():
+    scenarios = {
+        (words,): loading.load("corridor", ("time.dt=0.05", "time.duration=0.2", words))
+        for words in ("network.availability=0.9", "network.availability=0.8", "network.availability=0.7")
+    }
+    quarry = Quarry(lambda: [planted(lambda run: not run.plan.faults)], scenarios, range(1, 9), ["cut"])
+    for seed in (1, 2):
+        found = hunt.hunt(quarry, budget=30, seed=seed, watch=lambda *_: None, each=flights.in_this_process).found[0]
+        assert (found.trial.settings, found.trial.seed) == (("network.availability=0.9",), 1)
+
+
 def test_a_hunt_over_seeds_and_settings_leaves_a_scenario_that_has_them(den, capsys):
     options = (
         "--seeds",
