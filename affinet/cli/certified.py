@@ -22,7 +22,7 @@ from affinet.testing.certificate import Flights, certificate, fly_every
 from affinet.testing.hunt import Counterexample, Quarry
 from netem.processes.system_errors import about
 
-_OTHER = ("verbs", "corpus", "frontier")
+_OTHER = ("verbs", "budget", "corpus", "frontier")
 _TOLD = 6  # of what broke an invariant
 
 

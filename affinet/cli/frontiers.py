@@ -20,7 +20,7 @@ from analysis.figures.frontier import frontier as draw
 from analysis.models.arrays import Array
 from netem.processes.system_errors import about
 
-_OTHER = ("verbs", "corpus", "every", "sweep", "out")
+_OTHER = ("verbs", "budget", "corpus", "sweep", "out")
 
 
 def fly_and_draw(parsed: argparse.Namespace) -> int:

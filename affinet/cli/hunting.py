@@ -23,6 +23,8 @@ from affinet.testing.corpus import Found
 from affinet.testing.hunt import Quarry
 from affinet.testing.trial import Trial
 
+_BUDGET = 100
+
 
 def hunt_and_report(parsed: argparse.Namespace) -> int:
     """Hunt, and say what was found; to find something is to fail.
@@ -34,17 +36,20 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
     """
     if parsed.every:
         return certified.fly_and_certify(parsed)
+    if parsed.certificate:
+        raise ScenarioError("--certificate: one is left of all faults of a class; say of which with --every")
     if parsed.frontier:
         return frontiers.fly_and_draw(parsed)
     quarry, trials = _with_corpus(parsed, quarry_of(parsed))
     places = places_of(parsed, quarry)
+    budget = parsed.budget or _BUDGET
     with ExitStack() as claimed:
         for file in places:
             claimed.enter_context(directories.unless_empty(file))
-        with hunted.Progress(parsed.budget) as chase:
+        with hunted.Progress(budget) as chase:
             found = hunt.hunt(
                 quarry,
-                budget=parsed.budget,
+                budget=budget,
                 seed=next(iter(quarry.scenarios.values())).seed,
                 watch=chase.see,
                 each=flown_by(parsed.jobs),

@@ -107,9 +107,7 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         metavar="KEY=V,V,...",
         help="settings to draw from; several combine",
     )
-    hunt.add_argument(
-        "--budget", type=values.count, default=100, metavar="N", help="schedules to draw (default: %(default)s)"
-    )
+    hunt.add_argument("--budget", type=values.count, metavar="N", help="schedules to draw (default: 100)")
     hunt.add_argument(
         "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
     )

@@ -196,7 +196,20 @@ def test_the_shortest_that_breaks_it_is_left_and_confirmed_and_there_is_no_certi
     assert entry.lasts == lengths[0]
 
 
-def test_what_a_class_leaves_no_room_for_is_refused(capsys):
-    options = ("--invariant", "bounded(5)", "--every", "one link, up to 0.5 s, from any 0.5 s")
-    assert commands.main([*HUNT, *options, "--verbs", "cut"]) == 2
-    assert "--every and --verbs: nothing is drawn of a class that is flown whole" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (
+            ("--every", "one link, up to 0.5 s, from any 0.5 s", "--verbs", "cut"),
+            "--every and --verbs: nothing is drawn",
+        ),
+        (
+            ("--every", "one link, up to 0.5 s, from any 0.5 s", "--budget", "9"),
+            "--every and --budget: nothing is drawn",
+        ),
+        (("--certificate", "c.json"), "--certificate: one is left of all faults of a class; say of which with --every"),
+    ],
+)
+def test_what_goes_with_no_class_or_without_one_is_refused(options, says, capsys):
+    assert commands.main([*HUNT, "--invariant", "bounded(5)", *options]) == 2
+    assert says in capsys.readouterr().err
