@@ -184,7 +184,7 @@ def _flown(
     hunted, broken = Hunted(), dict[int, Trial]()
     cases = [[quarry.case(trial) for trial in chunk] for chunk in chunks]
     with closing(each(partial(fly, quarry.make), cases)) as found:
-        for chunk, flown in zip(chunks, in_order(found), strict=False):
+        for chunk, flown in zip(chunks, in_order(found), strict=True):
             for trial, one in zip(chunk, flown, strict=True):
                 if one is None:
                     hunted.coverage.unfit += 1
