@@ -102,6 +102,22 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
             "exit status 1 when something breaks it",
             "--budget 1 --duration 0.5",
         ),
+        Example(
+            "affinet hunt corridor --invariant 'bounded(5)' --seeds 1-20 --corpus corpus --set time.dt=0.05 --duration 20",
+            "of many seeds; what it finds flies first the next time",
+            "--budget 1 --duration 0.5 --seeds 1-2",
+        ),
+        Example(
+            "affinet hunt corridor --invariant 'bounded(5)' --every 'one link, up to 1 s, from any 0.5 s' --set time.dt=0.05 "
+            "--duration 5",
+            "every one of them: a certificate, or what breaks it",
+            "--duration 1",
+        ),
+        Example(
+            "affinet hunt corridor --invariant 'bounded(5)' --frontier broken.png --set time.dt=0.05 --duration 12",
+            "how many links may be cut for how long: a picture, and its numbers",
+            "--duration 0.5 --seeds 1-2",
+        ),
     ),
     "study": (
         Example("affinet study bursts --quick", "a coarse version, of minutes, in studies/bursts-quick/", alone=False),

@@ -1,28 +1,29 @@
-"""`affinet hunt`: what a person sees of it, and the scenario that it leaves."""
+"""`affinet hunt`: what a person sees of it, and the scenarios that it leaves."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import operator
-from dataclasses import asdict
-from functools import reduce
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
-from affinet.cli import show
+from affinet.cli import certified, frontiers, hunted
 from affinet.cli.given import scenario
+from affinet.cli.quarry import confirm, flown_by, places_of, quarry_of, write
 from affinet.cli.status import FAIL, PASS
 from affinet.planning import making as planning
+from affinet.planning.plan import PlanError
 from affinet.runtimes import directories
-from affinet.runtimes.run import evidence, fly
-from affinet.scenario import files, loading
-from affinet.scenario.words import among
+from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
-from affinet.testing import hunt, strategies
-from affinet.testing.hunt import Counterexample
-from affinet.verdicts import invariants
-from affinet.verdicts.checking import Checker
-from netem.processes.system_errors import about
+from affinet.testing import corpus, hunt
+from affinet.testing.corpus import Found
+from affinet.testing.hunt import Quarry
+from affinet.testing.trial import Trial
+
+_BUDGET = 100
 
 
 def hunt_and_report(parsed: argparse.Namespace) -> int:
@@ -31,47 +32,63 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
     Raises
     ------
     ScenarioError, PlanError, UserCodeError, OSError
-        When the hunt cannot begin, or its smallest fault not be written.
+        When the hunt cannot begin, or what it finds not be written.
     """
-    given = scenario(parsed)
-    invariant = reduce(operator.and_, map(invariants.parse, parsed.invariant))
-    verbs = parsed.verbs or list(strategies.VERBS)
-    if strangers := sorted(set(verbs) - set(strategies.VERBS)):
-        raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], strategies.VERBS)}")
-    if parsed.out and not parsed.out.parent.is_dir():
-        raise ScenarioError(f"--out {parsed.out}: there is no directory {parsed.out.parent}")
-    folder = parsed.out.absolute().parent if parsed.out else files.working_directory()
-    for name, lies_in in given.own_modules.items():
-        if folder != lies_in:
-            raise ScenarioError(f"--out {parsed.out or '.'}: {name} lies in {lies_in}: write the file there")
-    file = directories.for_hunt(parsed.out or Path(parsed.scenario).stem)
-    with directories.unless_empty(file), show.HuntProgress(parsed.budget) as chase:
-        counterexample, coverage = hunt.hunt(
-            given, invariant, budget=parsed.budget, verbs=verbs, seed=given.seed, watch=chase.see
-        )
-        if counterexample is not None:
-            with about(file):
-                file.write_text(loading.to_toml(counterexample.scenario), encoding="utf-8")
-    show.hunted(counterexample, coverage)
-    if counterexample is not None:
-        _confirm(counterexample, invariant, file)
+    if parsed.every:
+        return certified.fly_and_certify(parsed)
+    if parsed.certificate:
+        raise ScenarioError("--certificate: one is left of all faults of a class; say of which with --every")
+    if parsed.frontier:
+        return frontiers.fly_and_draw(parsed)
+    quarry, trials = _with_corpus(parsed, quarry_of(parsed))
+    places = places_of(parsed, quarry)
+    budget = parsed.budget or _BUDGET
+    with ExitStack() as claimed:
+        for file in places:
+            claimed.enter_context(directories.unless_empty(file))
+        with hunted.Progress(budget) as chase:
+            found = hunt.hunt(
+                quarry,
+                budget=budget,
+                seed=next(iter(quarry.scenarios.values())).seed,
+                watch=chase.see,
+                each=flown_by(parsed.jobs),
+                corpus=trials,
+            )
+        for one in found.found:
+            write(one.scenario, places[one.number])
+    if parsed.corpus:
+        new = corpus.keep(parsed.corpus, Path(parsed.scenario).stem, found.worth)
+        _note(f"{parsed.corpus}: {len(trials)} flown first, {new} new")
+    hunted.show(found, [one.name for one in quarry.make()], quarry)
+    for one in found.found:
+        confirm(one, quarry, places[one.number])
     if parsed.json:
-        found = (
-            None
-            if counterexample is None
-            else {"scenario": str(file), "finding": str(counterexample.finding), "digest": counterexample.digest}
-        )
-        print(json.dumps({"found": found, "tried": asdict(coverage)}))  # noqa: T201
-    return PASS if counterexample is None else FAIL
+        print(json.dumps(hunted.as_json(found, places, quarry)))  # noqa: T201
+    return FAIL if found.found else PASS
 
 
-def _confirm(counterexample: Counterexample, invariant: Checker, file: Path) -> None:
-    """Fly the smallest fault over processes."""
-    plan = planning.make(loading.load(str(file)))
-    out = directories.for_run(file.stem)
-    with show.Progress(plan, file.stem, out) as watch:
-        flown = fly(plan, "processes", out, watch.see)
-    same = "the same bits" if flown.digest == counterexample.digest else "OTHER BITS"
-    landed = evidence(plan, flown)
-    found = invariant(landed) if landed else "; ".join(flown.reasons)
-    print(f"over processes, {same}: {found}\n{file}: affinet run {directories.on_a_command_line(file)}")  # noqa: T201
+def _with_corpus(parsed: argparse.Namespace, quarry: Quarry) -> tuple[Quarry, list[Trial]]:
+    """The trials of the corpus that fit the scenario and hold undisturbed, and their settings; others are told of."""
+    known = dict[str, Found]()
+    for one in corpus.read(parsed.corpus) if parsed.corpus else ():
+        try:
+            if one.trial.settings not in {**quarry.scenarios, **quarry.beyond}:
+                settings = {one.trial.settings: scenario(parsed, one.trial.settings)}
+                quarry = replace(quarry, beyond={**quarry.beyond, **settings})
+            planning.make(one.trial.in_scenario(quarry.case(one.trial).given))
+        except (ScenarioError, PlanError) as error:
+            _note(f"{one.file}: left out, as it does not fit {parsed.scenario}: {error}")
+            continue
+        known[one.trial.key] = one
+    pairs = [(one.trial.settings, one.trial.seed) for one in known.values()]
+    failing = hunt.failing_undisturbed(quarry, pairs, flown_by(parsed.jobs)) if pairs else []
+    for one, finding in zip(list(known.values()), failing, strict=True):
+        if finding is not None:
+            _note(f"{one.file}: left out, as its seed and settings fail with no fault at all: {finding}")
+            del known[one.trial.key]
+    return quarry, [one.trial for one in known.values()]
+
+
+def _note(line: str) -> None:
+    print(one_line(line), file=sys.stderr)  # noqa: T201

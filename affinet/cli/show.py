@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from affinet.planning.designing import Designed
     from affinet.studies.record import StudyRecord
     from affinet.studies.study import Result
-    from affinet.testing.hunt import Counterexample, Coverage
-    from affinet.testing.strategies import Entries
     from netem.wire.authority import Made
 
 _SAYS = "{task.fields[says]}"
@@ -71,30 +69,6 @@ class Progress:
         factor = f"{(tick - self._first[0]) * self._dt / elapsed:4.1f} x real time" if elapsed > 0.0 else ""
         off = "" if math.isnan(error) else f"error {error:.4f} m²  "  # where nobody knows where agents are
         self._bar.see(tick, f"{tick * self._dt:6.2f} s  {off}{factor}")
-
-
-class HuntProgress:
-    """How a hunt goes, on standard error."""
-
-    def __init__(self, budget: int) -> None:
-        self._budget = budget
-        self._broken = 0
-        self._bar = Bar("hunting", budget, bar.BarColumn(), bar.TextColumn(_SAYS))
-
-    def __enter__(self) -> HuntProgress:
-        self._bar.__enter__()
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self._bar.__exit__(*failure)
-
-    def see(self, coverage: Coverage, broken: Entries | None) -> None:
-        """Show how far it is, and every schedule that breaks the invariant."""
-        if broken is not None:
-            self._broken += 1
-            self._bar.tell(f"breaks: {', '.join(entry['verb'] for entry in broken)}")
-        says = f"{coverage.schedules} flown{', shrinking' if self._broken else ''}"
-        self._bar.see(min(coverage.schedules, self._budget), says)
 
 
 class Grid:
@@ -174,25 +148,6 @@ def claims(judged: StudyRecord, full: StudyRecord | None, out: Path) -> None:
             said = f"{other.says}: in the full study, of {full.runs} runs, it {other.decision}: {other.found}"
             console.print(plain(said))
     console.print(plain(f"data and figure in {out}"))
-
-
-def hunted(counterexample: Counterexample | None, coverage: Coverage) -> None:
-    """What a hunt has found, and what it tried."""
-    console = Console()
-    if counterexample is None:
-        console.print("nothing found that breaks it", highlight=False)
-    else:
-        console.print(plain(f"{counterexample.finding}"))
-        for entry in counterexample.scenario.timeline:
-            said = entry.model_dump(mode="json", exclude_none=True)
-            console.print(plain(f"  {said.pop('verb')} {said}"))
-    table = Table("tried", "how often")
-    for counted in (coverage.verbs, coverage.selectors):
-        for name, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])):
-            table.add_row(plain(name), str(number))
-        table.add_section()
-    console.print(f"{coverage.schedules} schedules, {coverage.vacuous} could not tell", highlight=False)
-    console.print(table)
 
 
 def designed(made: Designed, file: Path) -> None:

@@ -49,6 +49,17 @@ def for_hunt(file: Path | str) -> Path:
     return _file(file, "hunted")
 
 
+def for_certificate(file: Path | str) -> Path:
+    """A new, empty file for what a hunt certifies: this one, or by default certified-NAME.json, numbered likewise.
+
+    Raises
+    ------
+    OSError
+        When it is there already, or cannot be made.
+    """
+    return _file(file, "certified", ".json", "--certificate")
+
+
 def for_design(file: Path | str) -> Path:
     """A new, empty file for a scenario that is designed: this one, or by default designed-NAME.toml, numbered likewise.
 
@@ -76,7 +87,7 @@ def new_file(file: Path, text: str) -> None:
             raise FileExistsError(f"{str(file)!r} is there already; name another") from error
 
 
-def refuse_there(file: Path) -> None:
+def refuse_there(file: Path, option: str = "--out") -> None:
     """Go on if a file that is to be written would take the place of none.
 
     Raises
@@ -85,7 +96,7 @@ def refuse_there(file: Path) -> None:
         When it would.
     """
     if file.is_file():  # what is no file, like /dev/stdout, is written to
-        raise FileExistsError(f"{str(file)!r} is there already; name another with --out, or remove it")
+        raise FileExistsError(f"{str(file)!r} is there already; name another with {option}, or remove it")
 
 
 @contextmanager
@@ -109,14 +120,14 @@ def _remove_if_empty(path: Path) -> None:
         path.unlink()
 
 
-def _file(file: Path | str, how: str) -> Path:
+def _file(file: Path | str, how: str, ending: str = ".toml", option: str = "--out") -> Path:
     if isinstance(file, str):
-        return _claimed(Path(), f"{how}-{_shortened(file)}", ".toml", partial(Path.touch, exist_ok=False))
+        return _claimed(Path(), f"{how}-{_shortened(file)}", ending, partial(Path.touch, exist_ok=False))
     with system_errors.about(file):
         try:
             file.touch(exist_ok=False)
         except FileExistsError as error:
-            raise FileExistsError(f"{str(file)!r} is there already; name another file with --out") from error
+            raise FileExistsError(f"{str(file)!r} is there already; name another file with {option}") from error
     return file
 
 

@@ -1,56 +1,29 @@
-"""The hunt for the smallest fault that breaks an invariant: draw schedules, fly them in process, shrink what fails."""
+"""The hunt for the smallest fault that breaks an invariant: draw trials, fly them side by side, shrink what breaks."""
 
 from __future__ import annotations
 
 import json
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
-from random import Random
-
-from hypothesis import HealthCheck, Phase, find, reject, settings
-from hypothesis.errors import NoSuchExample
-from hypothesis.strategies import SearchStrategy
+from functools import partial
+from itertools import islice, product
 
 from affinet.planning import making as planning
-from affinet.planning.plan import Plan, PlanError
-from affinet.runtimes.rehearsing import rehearse, rehearse_all
-from affinet.scenario.loading import extended
+from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario.sections import Scenario
 from affinet.scenario.wrong import ScenarioError
-from affinet.testing import strategies
-from affinet.testing.strategies import Entries
-from affinet.verdicts.checking import Checker, CheckResult
-from affinet.verdicts.evidence import Evidence
+from affinet.testing import shrinking
+from affinet.testing.covered import Coverage
+from affinet.testing.flights import Case, Each, Make, fly, in_order
+from affinet.testing.menu import menu
+from affinet.testing.reducing import Ground
+from affinet.testing.trial import Deck, Settings, Trial
+from affinet.verdicts.checking import CheckResult
 from netem.processes.user_code import UserCodeError
 
-_FIRST, _MOST = 8, 64  # schedules that fly at once: few at first, as the first may break it
-
-
-@dataclass
-class Coverage:
-    """What a hunt has tried.
-
-    Parameters
-    ----------
-    schedules
-        How many were flown.
-    verbs, selectors
-        How often each verb, and each kind of selector, was among them.
-    vacuous
-        How many could not tell: a fault touched nothing, or the invariant was not put to the test.
-    """
-
-    schedules: int = 0
-    verbs: Counter[str] = field(default_factory=Counter)
-    selectors: Counter[str] = field(default_factory=Counter)
-    vacuous: int = 0
-
-    def add(self, entries: Entries) -> None:
-        """Count a schedule."""
-        self.schedules += 1
-        self.verbs.update(entry["verb"] for entry in entries)
-        self.selectors.update(_kind(word) for entry in entries for word in _words(entry))
+_FIRST, _MOST = 8, 64  # trials that fly at once: few at first, as the first may break it; enough to keep processes busy
+Watch = Callable[[Coverage, Trial | None], None]
 
 
 @dataclass(frozen=True)
@@ -59,196 +32,191 @@ class Counterexample:
 
     Parameters
     ----------
+    number
+        Of the invariant, from 0.
     scenario
-        With the schedule in its timeline.
+        With settings, seed, and the schedule in its timeline.
     finding
         How it breaks.
     digest
         Of the run in process.
+    trial
+        What it is.
     """
 
+    number: int
     scenario: Scenario
     finding: CheckResult
     digest: str
+    trial: Trial
 
 
-def hunt(
-    given: Scenario,
-    invariant: Checker,
-    *,
-    budget: int,
-    verbs: Sequence[str],
-    seed: int,
-    watch: Callable[[Coverage, Entries | None], None],
-) -> tuple[Counterexample | None, Coverage]:
-    """The smallest schedule of faults found that breaks an invariant, if one was, and what was tried.
+@dataclass
+class Hunted:
+    """What a hunt came to.
 
     Parameters
     ----------
-    given
-        The scenario to which the faults are added.
-    invariant
-        What must not fail.
-    budget
-        Schedules to draw before giving up; shrinking takes more.
+    found
+        The smallest for each invariant that broke, in the order of the invariants.
+    coverage
+        What was tried.
+    worth
+        Trials worth keeping for the next hunt: what each broke, by the names of invariants; nothing of those that covered
+        something new.
+    """
+
+    found: list[Counterexample] = field(default_factory=list)
+    coverage: Coverage = field(default_factory=Coverage)
+    worth: list[tuple[Trial, tuple[str, ...]]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Quarry:
+    """What is hunted, and where.
+
+    Parameters
+    ----------
+    make
+        Makes the invariants that must not fail.
+    scenarios
+        By the settings that make them; the first is the plainest.
+    seeds
+        Of the runs; the first is the plainest.
     verbs
         Of the faults to draw from.
+    beyond
+        Settings that trials of a corpus have, and none that are drawn.
+    """
+
+    make: Make
+    scenarios: Mapping[Settings, Scenario]
+    seeds: Sequence[int]
+    verbs: Sequence[str]
+    beyond: Mapping[Settings, Scenario] = field(default_factory=dict)
+
+    def case(self, trial: Trial) -> Case:
+        """A trial in its scenario."""
+        return Case({**self.scenarios, **self.beyond}[trial.settings], trial)
+
+
+def hunt(quarry: Quarry, *, budget: int, seed: int, watch: Watch, each: Each, corpus: Sequence[Trial] = ()) -> Hunted:
+    """The smallest schedule of faults found that breaks each invariant, where one was, and what was tried.
+
+    Parameters
+    ----------
+    quarry
+        What is hunted, and where.
+    budget
+        Trials to draw before giving up; shrinking takes more.
     seed
         Of the draws.
     watch
-        Called after each flight, with the schedule if it broke the invariant.
+        Called after each flight of a trial that was drawn, and with what broke something, or is smaller.
+    each
+        Flies chunks of trials, in this process or in others.
+    corpus
+        Trials that are flown first.
 
     Raises
     ------
     ScenarioError
-        When the invariant fails with no fault added.
+        When an invariant fails with no fault added.
     UserCodeError
         When a user's own estimator or law does something wrong, under the smallest schedule found that makes it do so.
     """
-    undisturbed = invariant(_flown(given))
-    if undisturbed.verdict == "fail":
-        raise ScenarioError(f"{undisturbed}; it fails with no fault at all, and there is nothing to hunt for")
-    tried = _Tried(given, invariant, watch)
-    drawn = strategies.timelines(given, verbs)
-    # What is drawn depends on nothing but what is no schedule, until one breaks it: all fly side by side before.
-    ahead = list[Entries]()
-    _found(drawn, lambda faults: tried.plans(faults, ahead), budget, seed)
-    tried.fly(ahead)
-    found = _found(drawn, tried.breaks, budget, seed)
-    if found is None:
-        return None, tried.coverage
-    smallest = _without_the_needless(found, tried.breaks)
-    entries, coverage = _entries(smallest), tried.coverage
-    broken = extended(given, entries)
+    refuse_failing_undisturbed(quarry, each)
+    menus = {settings: menu(given, quarry.verbs) for settings, given in quarry.scenarios.items()}
+    drawn = Deck(quarry.scenarios, quarry.seeds, menus).drawn(seed, budget)
+    hunted, broken = _flown(quarry, [*_chunks(iter(corpus)), *_chunks(drawn)], each, watch)
+    for number, trial in broken.items():
+        hunted.found.append(_smallest(quarry, number, trial, hunted, watch))
+    return hunted
+
+
+def refuse_failing_undisturbed(quarry: Quarry, each: Each) -> None:
+    """Go on if no invariant fails with no fault added, in any setting and with any seed.
+
+    Raises
+    ------
+    ScenarioError
+        When one does.
+    """
+    pairs = [*product(quarry.scenarios, quarry.seeds)]
+    for (settings, seed), finding in zip(pairs, failing_undisturbed(quarry, pairs, each), strict=True):
+        if finding is not None:
+            where = "".join(f", with {words}" for words in settings) + (f", seed {seed}" if len(pairs) > 1 else "")
+            raise ScenarioError(f"{finding}; it fails with no fault at all{where}, and there is nothing to hunt for")
+
+
+def failing_undisturbed(quarry: Quarry, pairs: Sequence[tuple[Settings, int]], each: Each) -> list[CheckResult | None]:
+    """What fails with no fault added, with each of these settings and seeds; None where nothing does.
+
+    Raises
+    ------
+    UserCodeError, ScenarioError, PlanError
+        When one of them cannot fly.
+    """
+    bare = [Trial(settings, seed, ()) for settings, seed in pairs]
+    chunks = [[quarry.case(trial) for trial in chunk] for chunk in _chunks(iter(bare))]
+    with closing(each(partial(fly, quarry.make), chunks)) as found:
+        flown = [one for made in in_order(found) for one in made]
+    for trial, one in zip(bare, flown, strict=True):
+        if one is None or one.raised:  # by itself it says what is wrong
+            rehearse(planning.make(trial.in_scenario(quarry.case(trial).given)))
+    findings = [one.findings if one else () for one in flown]
+    return [next((finding for finding in some if finding.verdict == "fail"), None) for some in findings]
+
+
+def _chunks(trials: Iterator[Trial]) -> Iterator[list[Trial]]:
+    """Few trials at first, then more."""
+    size = _FIRST
+    while some := [*islice(trials, size)]:
+        yield some
+        size = min(2 * size, _MOST)
+
+
+def _flown(
+    quarry: Quarry, chunks: Sequence[Sequence[Trial]], each: Each, watch: Watch
+) -> tuple[Hunted, dict[int, Trial]]:
+    """Fly trials until every invariant is broken: the first that breaks each, by its number."""
+    invariants = quarry.make()
+    hunted, broken = Hunted(), dict[int, Trial]()
+    cases = [[quarry.case(trial) for trial in chunk] for chunk in chunks]
+    with closing(each(partial(fly, quarry.make), cases)) as found:
+        for chunk, flown in zip(chunks, in_order(found), strict=True):
+            for trial, one in zip(chunk, flown, strict=True):
+                if one is None:
+                    hunted.coverage.unfit += 1
+                    continue
+                new = hunted.coverage.add(one.covered, vacuous=one.untold)
+                those = [number for number in range(len(invariants)) if one.breaks(number)]
+                if new or those:
+                    hunted.worth.append((trial, tuple(invariants[number].name for number in those)))
+                watch(hunted.coverage, trial if set(those) - broken.keys() else None)
+                broken |= {number: trial for number in those if number not in broken}
+                if len(broken) == len(invariants):
+                    return hunted, dict(sorted(broken.items()))
+    return hunted, dict(sorted(broken.items()))
+
+
+def _smallest(quarry: Quarry, number: int, trial: Trial, hunted: Hunted, watch: Watch) -> Counterexample:
+    coverage = hunted.coverage
+
+    def breaks(trials: Sequence[Trial]) -> list[bool]:
+        flown = fly(quarry.make, [quarry.case(one) for one in trials])
+        coverage.shrinking += sum(one is not None for one in flown)
+        watch(coverage, None)
+        return [one is not None and one.breaks(number) for one in flown]
+
+    ground = Ground({**quarry.scenarios, **quarry.beyond}, quarry.seeds)
+    found = shrinking.smallest(trial, ground, breaks, lambda smaller: watch(coverage, smaller))
+    invariant = quarry.make()[number]
+    hunted.worth.append((found, (invariant.name,)))
+    broken = found.in_scenario(quarry.case(found).given)
     try:
-        evidence = _flown(broken)
+        evidence = rehearse(planning.make(broken))
     except UserCodeError as error:
-        error.during = f"with the timeline {json.dumps(entries)}"
+        error.during = f"with the timeline {json.dumps(found.entries)}"
         raise
-    return Counterexample(broken, invariant(evidence), str(evidence.outcome.digest)), coverage
-
-
-def _without_the_needless(faults: list[Entries], breaks: Callable[[list[Entries]], bool | None]) -> list[Entries]:
-    """The faults without which it would not break; Hypothesis leaves some before the last that it cannot delete."""
-    for place in range(len(faults) - 1, -1, -1):
-        fewer = faults[:place] + faults[place + 1 :]
-        if fewer and breaks(fewer):
-            faults = fewer
-    return faults
-
-
-def _found(
-    drawn: SearchStrategy[list[Entries]],
-    breaks: Callable[[list[Entries]], bool | None],
-    budget: int,
-    seed: int,
-) -> list[Entries] | None:
-    """The smallest of those drawn that breaks something, if one does; None of what is no schedule."""
-    patient = settings(
-        max_examples=budget,
-        database=None,
-        deadline=None,
-        suppress_health_check=list(HealthCheck),
-        phases=[Phase.generate, Phase.shrink],
-    )
-
-    def breaks_or_is_none(faults: list[Entries]) -> bool:
-        answer = breaks(faults)
-        return reject() if answer is None else answer
-
-    try:
-        return find(drawn, breaks_or_is_none, settings=patient, random=Random(seed))
-    except NoSuchExample:
-        return None
-
-
-@dataclass
-class _Tried:
-    """The schedules that have flown, and whether they break the invariant; None of one that is no schedule."""
-
-    given: Scenario
-    invariant: Checker
-    watch: Callable[[Coverage, Entries | None], None]
-    coverage: Coverage = field(default_factory=Coverage)
-    known: dict[str, bool | None] = field(default_factory=dict)
-    planned: dict[str, Plan | None] = field(default_factory=dict)
-
-    def plans(self, faults: list[Entries], ahead: list[Entries]) -> bool | None:
-        """Plan a schedule, which is to fly later with others: as if it broke nothing."""
-        entries = _entries(faults)
-        key = json.dumps(entries)
-        if key not in self.planned:
-            self.planned[key] = _plan(self.given, entries)
-            ahead.append(entries)
-        return None if self.planned[key] is None else False
-
-    def fly(self, ahead: Sequence[Entries]) -> None:
-        """Fly them side by side, up to the first that breaks it."""
-        first, size = 0, _FIRST
-        while first < len(ahead):
-            some = [entries for entries in ahead[first : first + size] if self.planned[json.dumps(entries)]]
-            first, size = first + size, min(2 * size, _MOST)
-            plans = [plan for entries in some if (plan := self.planned[json.dumps(entries)]) is not None]
-            try:
-                flown = rehearse_all(plans)
-            except UserCodeError:  # under which of them is found one by one
-                return
-            for entries, evidence in zip(some, flown, strict=True):
-                if self._judged(entries, evidence):
-                    return
-
-    def breaks(self, faults: list[Entries]) -> bool | None:
-        """Whether a schedule breaks it; None where it is no schedule of this scenario: a selector matches nothing."""
-        entries = _entries(faults)
-        key = json.dumps(entries)
-        if key not in self.known:
-            plan = self.planned[key] if key in self.planned else _plan(self.given, entries)
-            if plan is None:
-                self.known[key] = None
-                return None
-            try:
-                self._judged(entries, rehearse(plan))
-            except UserCodeError:
-                self._told(entries, breaks=True)
-        return self.known[key]
-
-    def _judged(self, entries: Entries, evidence: Evidence) -> bool:
-        found = self.invariant(evidence).verdict
-        untold = evidence.outcome.verdict == "vacuous" or found == "vacuous"
-        self.coverage.vacuous += untold
-        return self._told(entries, breaks=found == "fail" and not untold)
-
-    def _told(self, entries: Entries, *, breaks: bool) -> bool:
-        self.known[json.dumps(entries)] = breaks
-        self.coverage.add(entries)
-        self.watch(self.coverage, entries if breaks else None)
-        return breaks
-
-
-def _entries(faults: list[Entries]) -> Entries:
-    return [entry for fault in faults for entry in fault]
-
-
-def _plan(given: Scenario, entries: Entries) -> Plan | None:
-    try:
-        return planning.make(extended(given, entries))
-    except (ScenarioError, PlanError):
-        return None
-
-
-def _flown(given: Scenario) -> Evidence:
-    return rehearse(planning.make(given))
-
-
-def _words(entry: dict[str, object]) -> list[object]:
-    chosen = entry.get("links") or entry.get("agents") or [entry.get("groups")]
-    return list(chosen) if isinstance(chosen, list) else [chosen]
-
-
-def _kind(word: object) -> str:
-    text = str(word)
-    if text.isdecimal():
-        return "agent"
-    if text.replace("->", "").isdecimal():
-        return "one-way link"
-    return "edge" if text.replace("-", "").isdecimal() else text
+    return Counterexample(number, broken, invariant(evidence), str(evidence.outcome.digest), found)

@@ -14,6 +14,7 @@ import types
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, MutableSequence, Sequence
 from dataclasses import InitVar, is_dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 _LISTS = (list, Sequence, MutableSequence, Collection, Iterable)
@@ -60,11 +61,18 @@ def arguments(algorithm: type, given: Mapping[str, Any]) -> dict[str, Any]:
             raise ParameterError("is missing; it has no default", name)
     if not given:
         return {}
-    hints = get_type_hints(algorithm)
+    hints = _hints(algorithm)
     return {name: _inside(name, hints.get(name, Any), value) for name, value in given.items()}
 
 
-def _parameters(algorithm: type) -> dict[str, inspect.Parameter]:
+# Many plans are made of the same algorithms, one after the other.
+@lru_cache(maxsize=64)
+def _hints(algorithm: type) -> Mapping[str, Any]:
+    return get_type_hints(algorithm)
+
+
+@lru_cache(maxsize=64)
+def _parameters(algorithm: type) -> Mapping[str, inspect.Parameter]:
     variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     return {
         name: parameter

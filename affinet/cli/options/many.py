@@ -84,7 +84,7 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     hunt = commands.add_parser(
         "hunt",
         help="look for the smallest fault that breaks an invariant",
-        description="Draw schedules of faults, fly them in process, and shrink the first that breaks an invariant; "
+        description="Draw schedules of faults, fly them side by side, and shrink the first that breaks an invariant; "
         "the smallest is written as a scenario and confirmed over processes. Exit status 1 when one was found.",
     )
     add_scenario(hunt)
@@ -94,11 +94,20 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         required=True,
         action="append",
         metavar="CHECKER",
-        help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'",
+        help="what must not fail, like 'bounded(5)' or 'recovers(0.1, within=5) & collision_free(0.2)'; each of several "
+        "has its own smallest fault",
     )
     hunt.add_argument(
-        "--budget", type=values.count, default=100, metavar="N", help="schedules to draw (default: %(default)s)"
+        "--seeds", type=values.seeds, metavar="A-B", help="of the runs, to draw from (default: that of the scenario)"
     )
+    hunt.add_argument(
+        "--sweep",
+        action="append",
+        default=[],
+        metavar="KEY=V,V,...",
+        help="settings to draw from; several combine",
+    )
+    hunt.add_argument("--budget", type=values.count, metavar="N", help="schedules to draw (default: 100)")
     hunt.add_argument(
         "--verbs", type=lambda text: text.split(","), metavar="VERB,...", help="to draw from (default: all)"
     )
@@ -107,6 +116,36 @@ def _add_hunt(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         type=values.scenario_file,
         metavar="FILE",
         help="the smallest, as a scenario (default: hunted-SCENARIO.toml)",
+    )
+    hunt.add_argument(
+        "--every",
+        metavar="CLASS",
+        help="draw nothing, and fly all of a class of faults, like 'one link, up to 5 s, from any 0.5 s, with cut'; a "
+        "certificate where all hold",
+    )
+    hunt.add_argument(
+        "--certificate",
+        type=values.path,
+        metavar="FILE",
+        help="of --every, where nothing breaks (default: certified-SCENARIO.json)",
+    )
+    hunt.add_argument(
+        "--frontier",
+        type=values.drawing,
+        metavar="FILE",
+        help="draw nothing, and cut more and more links for longer and longer: a picture of what breaks",
+    )
+    hunt.add_argument(
+        "--corpus",
+        type=values.path,
+        metavar="DIR",
+        help="a folder: what broke something in earlier hunts, or covered what is rare, flies first; what does now is kept",
+    )
+    hunt.add_argument(
+        "--jobs",
+        type=values.count,
+        metavar="N",
+        help="in so many processes, where it takes long (default: as many as processors; 1: this one)",
     )
 
 

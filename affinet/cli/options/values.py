@@ -9,6 +9,8 @@ from pathlib import Path
 from affinet.scenario import programs
 from affinet.scenario.bounds import LARGEST, MOST, SMALLEST
 
+DRAWN = (".png", ".pdf", ".svg")
+
 
 def count(text: str) -> int:
     """A whole number above 0."""
@@ -76,6 +78,13 @@ def scenario_file(text: str) -> Path:
     """The path of a scenario that is to be written."""
     if not text.endswith(".toml"):
         raise argparse.ArgumentTypeError(f"a scenario is a TOML file: call it {text}.toml")
+    return Path(text)
+
+
+def drawing(text: str) -> Path:
+    """The path of a picture that is to be drawn."""
+    if not text.endswith(DRAWN):
+        raise argparse.ArgumentTypeError(f"{text!r}: give a name that ends in {', '.join(DRAWN)}")
     return Path(text)
 
 

@@ -47,8 +47,9 @@ def still(tmp_path, monkeypatch):
         (directories.for_run, "runs/name-20260101-000000", "runs/name-20260101-000000-2"),
         (directories.for_study, "studies/name", "studies/name-2"),
         (directories.for_hunt, "hunted-name.toml", "hunted-name-2.toml"),
+        (directories.for_certificate, "certified-name.json", "certified-name-2.json"),
     ],
-    ids=["run", "study", "hunt"],
+    ids=["run", "study", "hunt", "certificate"],
 )
 def test_who_asks_together_gets_each_their_own(ask, first, second):
     given = at_once(lambda: ask("name"))
@@ -62,8 +63,9 @@ def test_who_asks_together_gets_each_their_own(ask, first, second):
     [
         (lambda out: outcome.prepare(plan_of("corridor"), out), "holds a run already"),
         (directories.for_hunt, "is there already"),
+        (directories.for_certificate, "is there already"),
     ],
-    ids=["run", "hunt"],
+    ids=["run", "hunt", "certificate"],
 )
 def test_of_those_who_name_the_same_one_gets_it(ask, refusal, out):
     given = at_once(lambda: ask(out))
