@@ -16,6 +16,7 @@ from affinet.scenario.section import Section
 from affinet.scenario.source import Source
 from affinet.scenario.units import NotNegative, Positive
 from affinet.scenario.wrong import ScenarioError
+from analysis.models import elementary
 from analysis.models.arrays import Array
 
 STEPS = 6  # halvings of the range in which a break-down point lies
@@ -81,6 +82,18 @@ class Worsening(Section):
         for _ in range(STEPS):
             tried = self.between(np.array(self.least), tried)
         return float(tried)
+
+    def around(self, found: float) -> tuple[float, float]:
+        """Between which values one lies that bisection has found."""
+        if not np.isfinite(found):
+            return found, found
+        if found <= self.least:
+            return self.least, self.least_tried
+        parts = float(1 << (STEPS + 1))
+        if self.least == 0.0:
+            return found - self.most / parts, found + self.most / parts
+        factor = float(elementary.power(self.most / self.least, 1.0 / parts))
+        return found / factor, found * factor
 
     def at(self, worse: float) -> list[str]:
         """The overrides that make it so bad."""

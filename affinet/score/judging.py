@@ -131,6 +131,7 @@ def _compared(raw: Raw) -> Iterator[Compared]:
 
 
 def _break_downs(raw: Raw) -> Iterator[BreakDown]:
+    worsenings = {one.name: one for one in raw.worsenings}
     comparisons = sum(who != raw.scored for _, _, who in raw.points)
     for (task, worsening, who), points in raw.points.items():
         own = raw.points.get((task, worsening, raw.scored))
@@ -139,7 +140,13 @@ def _break_downs(raw: Raw) -> Iterator[BreakDown]:
             if who == raw.scored or own is None
             else paired.larger(np.array(own), np.array(points), comparisons, CONFIDENCE)
         )
-        yield BreakDown(task, worsening, who, paired.median(np.array(points), CONFIDENCE), decision)
+        yield BreakDown(task, worsening, who, break_down(points, worsenings[worsening]), decision)
+
+
+def break_down(points: Sequence[float], worse: Worsening) -> Interval:
+    """How bad it has to be for half of the swarms to be lost, when it was found for each by bisection."""
+    median = paired.median(np.array(points), CONFIDENCE)
+    return Interval(median.found, worse.around(median.low)[0], worse.around(median.high)[1])
 
 
 def _unsuited(raw: Raw) -> Iterator[str]:

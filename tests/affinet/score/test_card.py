@@ -86,3 +86,21 @@ def test_worse_is_half_way_by_halves_or_by_factors():
     np.testing.assert_allclose(factors.between(np.array([2.0]), np.array([200.0])), [20.0])
     assert halves.at(0.25) == ["network.availability=0.75"]
     assert factors.at(20.0) == ["x=20"]
+
+
+@pytest.mark.parametrize("least", [0.0, 2.0])
+def test_what_bisection_finds_lies_somewhere_in_the_range_that_is_left(least):
+    worse = Worsening(name="loss", says="", set=["x={x}"], least=least, most=200.0)
+    for point in np.linspace(least + 1e-3, 199.0, 57):
+        low, high = np.array(least), np.array(200.0)
+        for _ in range(cards.STEPS):
+            middle = worse.between(low, high)
+            low, high = (low, middle) if middle >= point else (middle, high)
+        at_once = float(low) == least
+        found = least if at_once else float(worse.between(low, high))
+        around = worse.around(found)
+        assert around[0] - 1e-9 <= point <= around[1] + 1e-9
+        assert around[1] - around[0] == pytest.approx(float(high - low), rel=0.01)
+        assert around[0] >= least
+    assert worse.around(np.inf) == (np.inf, np.inf)
+    assert worse.around(-np.inf) == (-np.inf, -np.inf)
