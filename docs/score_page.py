@@ -19,7 +19,7 @@ from marked import Lines, code, filled, table, titled
 from matplotlib.figure import Figure
 
 from affinet.score import card as cards
-from affinet.score.judging import ASTRAY, CONFIDENCE, MATTERS, point
+from affinet.score.judging import ASTRAY, CONFIDENCE, MATTERS, break_down, point
 from analysis.claims import paired
 from analysis.claims.intervals import Interval
 from analysis.claims.paired import Comparison
@@ -55,13 +55,20 @@ def take_in(score: Path) -> None:
         "seeds": said["seeds"],
         "flies": said["flies"],
         "cells": list(_best(said)),
-        "points": [
-            {name: one[name] for name in ("task", "worsening", "entrant", "median")} for one in said["break_downs"]
-        ],
+        "points": list(_points(said)),
         "verdict": said["verdict"],
     }
     KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     _draw(kept)
+
+
+def _points(said: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Of each task, of what is made worse, and of each entrant: how bad it has to be for half of the swarms to be lost."""
+    worse = {one.name: one for one in cards.load(CARD).worsenings}
+    for one in said["break_downs"]:
+        found = break_down([_number(value) for value in one["runs"]], worse[one["worsening"]])
+        median = {name: str(value) if np.isinf(value) else value for name, value in found._asdict().items()}
+        yield {**{name: one[name] for name in ("task", "worsening", "entrant")}, "median": median}
 
 
 def _best(said: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

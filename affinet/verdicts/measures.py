@@ -55,15 +55,38 @@ def over_time(plan: Plan, timeline: Timeline, arrays: Arrays) -> tuple[str, Arra
     return "tracking error (m²)", arrays["error"]
 
 
+def by_agent(plan: Plan, timeline: Timeline, arrays: Arrays) -> tuple[str, Array]:
+    """How far off each agent is in each tick, shape (T, N), in metres, in what matters of the run, with its name."""
+    ticks = len(arrays["error"])
+    if plan.localizes:
+        edges = _first_measured(plan, timeline, arrays).edges()
+        found = localization.beside(arrays[channels.PLACE], edges) - localization.optimal(edges)
+        return "localization error", _length(found)
+    if plan.pursues:
+        return "target error", _length(_off_the_target(plan, arrays))
+    return "error", _length(arrays["position"][:ticks] - arrays["target"])
+
+
 def _off_places(plan: Plan, timeline: Timeline, arrays: Arrays) -> Array:
-    known = FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
-    return localization.distance(arrays[channels.PLACE], known.edges())
+    return localization.distance(arrays[channels.PLACE], _first_measured(plan, timeline, arrays).edges())
+
+
+def _first_measured(plan: Plan, timeline: Timeline, arrays: Arrays) -> FirstMeasurements:
+    return FirstMeasurements.of(plan.world, timeline, arrays["measured"], arrays["verdicts"][:, 0])
 
 
 def _off_target(plan: Plan, arrays: Arrays) -> Array:
-    target = arrays["target"] - plan.world.formation.nominal
-    off = arrays["reference"][:, :, 0] - target
+    off = _off_the_target(plan, arrays)
     return root_mean_square(off, np.asarray(~np.isnan(off).any(axis=-1)))
+
+
+def _off_the_target(plan: Plan, arrays: Arrays) -> Array:
+    off: Array = arrays["reference"][:, :, 0] - (arrays["target"] - plan.world.formation.nominal)
+    return off
+
+
+def _length(off: Array) -> Array:
+    return np.asarray(np.linalg.norm(off, axis=-1), dtype=np.float64)
 
 
 def _edge_errors(world: World, arrays: Arrays) -> dict[str, Figures]:

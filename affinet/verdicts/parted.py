@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from affinet.verdicts import measures
 from affinet.verdicts.evidence import Evidence
 from analysis.models.arrays import Array, Mask
 from netem.medium.verdict import Verdict
@@ -126,7 +127,8 @@ def parted(failing: Evidence, passing: Evidence, at: int | None = None) -> Parte
         raise NotAlike("the runs talk over different channels: their verdicts cannot be held against each other")
     ticks = min(failing.ticks, passing.ticks)
     one, other = (_quantities(run, ticks) for run in (failing, passing))
-    off = _excess(one["error"][0], other["error"][0])
+    matters = next(iter(one))
+    off = _excess(one[matters][0], other[matters][0])
     if at is not None:
         off = np.where(np.arange(ticks)[:, None] == min(at, ticks - 1), off, 0.0)
     if not (off > 0).any():
@@ -147,9 +149,11 @@ def parted(failing: Evidence, passing: Evidence, at: int | None = None) -> Parte
 
 def _quantities(run: Evidence, ticks: int) -> Mapping[str, tuple[Array, str]]:
     """Of every agent in every tick, shape (T, N)."""
-    error = np.linalg.norm(run.position[:ticks] - run.arrays["target"][:ticks], axis=-1)
+    with np.errstate(over="ignore", invalid="ignore"):  # of one that has diverged
+        name, off = measures.by_agent(run.plan, run.timeline, run.arrays)
+    error = off[:ticks]
     return {
-        "error": (
+        name: (
             np.where(run.present[:ticks] & np.isfinite(error), error, np.where(run.present[:ticks], np.inf, 0.0)),
             "m",
         ),

@@ -11,6 +11,7 @@ from affinet import load
 from affinet.cli.commands import main
 from affinet.cli.differing import _warn
 from affinet.runtimes.rehearsing import rehearse
+from affinet.verdicts import measures
 from affinet.verdicts.parted import NotAlike, parted
 from netem.medium.verdict import Verdict
 
@@ -125,3 +126,25 @@ def test_nobody_who_looks_at_a_run_changes_what_the_next_one_sees(runs):
     for values in looked_at:
         with pytest.raises(ValueError, match="read-only"):
             values[...] = 0
+
+
+def test_what_matters_is_where_agents_think_they_are_or_the_target_is():
+    cut = 'timeline=[{verb="cut",at=0.5,lasts=2,links=["1->4","6->4"]}]'
+    found = parted(rehearse(plan_of("localization", cut)), rehearse(plan_of("localization")))
+    assert (found.left[0].quantity, found.left[0].agent) == ("localization error", 4)
+    assert {one.link for one in found.before} == {"1->4", "6->4"}
+    short = "time.duration=0.4"
+    found = parted(rehearse(plan_of("target", short)), rehearse(plan_of("target", short, "seed=2")))
+    assert "target error" in {one.quantity for one in found.left}
+
+
+@pytest.mark.parametrize(("name", "more"), [("localization", ()), ("target", ("time.duration=0.4",))])
+def test_that_of_every_agent_comes_to_that_of_all(name, more):
+    run = rehearse(plan_of(name, *more))
+    _, whole = measures.over_time(run.plan, run.timeline, run.arrays)
+    _, each = measures.by_agent(run.plan, run.timeline, run.arrays)
+    told = ~np.isnan(each)
+    expected = np.sqrt(np.where(told, each * each, 0.0).sum(axis=1) / told.sum(axis=1))
+    there = ~np.isnan(whole)
+    assert there.any()
+    np.testing.assert_allclose(whole[there], expected[there], rtol=1e-9)
