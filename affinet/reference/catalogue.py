@@ -17,6 +17,7 @@ from affinet.scenario.events import Lasting
 from affinet.scenario.section import Section
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line, shown
+from affinet.score import card
 from affinet.studies import checks, study
 from affinet.verdicts.checking import Checker
 from affinet.verdicts.invariants import NAMED
@@ -111,6 +112,19 @@ def figures() -> Iterator[Entry]:
     return (Entry(name, says) for name, says in checks.FIGURES.items())
 
 
+def scorecards() -> Iterator[Entry]:
+    """Scorecards that come with affinet, with their tasks and airs."""
+    for name in files.shipped(card.FOLDER):
+        read = card.load(name)
+        groups: Mapping[str, Sequence[card.Task | card.Air | card.Worsening]] = {
+            "task": read.tasks,
+            "air": read.airs,
+            "made worse": read.worsenings,
+        }
+        told = [Parameter(one.name, "", False, kind, "", one.says) for kind, group in groups.items() for one in group]
+        yield Entry(name, read.title, tuple(told))
+
+
 KINDS: Mapping[str, Callable[[], Iterator[Entry]]] = {
     "scenarios": scenarios,
     "estimators": estimators,
@@ -121,6 +135,7 @@ KINDS: Mapping[str, Callable[[], Iterator[Entry]]] = {
     "checkers": checker_entries,
     "studies": studies,
     "figures": figures,
+    "cards": scorecards,
 }
 
 

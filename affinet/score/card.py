@@ -21,7 +21,7 @@ from analysis.models.arrays import Array
 
 STEPS = 6  # halvings of the range in which a break-down point lies
 
-_FOLDER = "scorecards"
+FOLDER = "scorecards"
 _Count = Annotated[int, Field(ge=2)]
 
 
@@ -164,7 +164,7 @@ def load(name: str) -> Scorecard:
     ScenarioError
         When there is none, or something in it is wrong: in which key.
     """
-    read = files.read(name, _FOLDER, "scorecard")
+    read = files.read(name, FOLDER, "scorecard")
     try:
         card = Scorecard.model_validate(read.says)
     except ValidationError as error:

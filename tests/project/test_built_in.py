@@ -1,10 +1,13 @@
 """The page of the built-in estimators: it is what its script writes of the score, and what it answers is what came out."""
 
 import json
+import re
 
 import pytest
 import score_page
 from paths import DOCS
+
+from affinet.scenario import files
 
 KEPT = json.loads((DOCS / "built-in.json").read_text(encoding="utf-8"))
 PLANE = ("corridor", "turns")
@@ -75,3 +78,9 @@ def test_ral_and_none_bear_no_losses_and_nobody_bears_nineteen_in_twenty():
 def test_covariances_are_too_small_as_often_as_it_says():
     assert too_small("ga-rkf") == pytest.approx(1 / 3, abs=0.06)
     assert too_small("conral") > 0.5
+
+
+def test_every_card_that_is_shipped_is_on_the_page_of_scores():
+    page = (DOCS / "score.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == ["edges", "faults", "places", "pursuit"]
+    assert set(files.shipped("scorecards")) == {"edges", "faults", "places", "pursuit"}

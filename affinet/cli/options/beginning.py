@@ -5,7 +5,18 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-LISTED = ("scenarios", "estimators", "laws", "profiles", "impairments", "verbs", "checkers", "studies", "figures")
+LISTED = (
+    "scenarios",
+    "estimators",
+    "laws",
+    "profiles",
+    "impairments",
+    "verbs",
+    "checkers",
+    "studies",
+    "figures",
+    "cards",
+)
 BEGUN = ("scenario", "estimator", "law", "study", "test", "project")
 SCHEMAS = ("scenario", "study")
 SHELLS = ("bash", "zsh", "fish")
