@@ -103,7 +103,7 @@ class Descent:
 
 
 class Flown(NamedTuple):
-    """What came of a cell: of each run what is measured; or why the entrant does not suit the task."""
+    """What came of a cell: of each run what is measured; or why the entrant does not suit the task, or the air."""
 
     runs: dict[str, list[float]]
     unsuited: str | None
@@ -127,7 +127,9 @@ def cell(given: Cell) -> Flown:
     """
     if (why := unsuited(given)) is not None:
         return Flown({}, why)
-    plans = given.plans(given.seeds)
+    plans = _suited(given, given.seeds)
+    if isinstance(plans, str):
+        return Flown({}, plans)
     found = [measures.of(run, given.task) for run in rehearse_all(plans)]
     return Flown({name: [float(getattr(one, name)) for one in found] for name in Measured._fields}, None)
 
@@ -136,13 +138,15 @@ def descent(given: Descent) -> list[float]:
     """How bad it has to be for the swarm of each seed to be lost, by bisection.
 
     Infinite where it is not lost at the worst, and the least where it is at all that is tried. Nothing of an entrant that
-    does not suit the task.
+    does not suit the task, or what is made worse.
 
     Draws are the same however bad it is: a run at a higher loss loses what one at a lower one does, and more.
     """
     if unsuited(given.cell) is not None:
         return []  # the cells of the same task say why
     seeds, worse = given.cell.seeds, given.worsening
+    if isinstance(_suited(given.cell, seeds[:1], worse.at(worse.most)), str):
+        return []
     low, high = np.full(len(seeds), worse.least), np.full(len(seeds), worse.most)
     survived = ~_lost(given, seeds, high.tolist())
     for _ in range(STEPS):
@@ -176,6 +180,15 @@ def unsuited(given: Cell) -> str | None:
     if (plan.localizes, plan.pursues) == given.asks_for():
         return None
     return "what it reports is not what the task is about: places of agents, a target, or neither"
+
+
+def _suited(given: Cell, seeds: Sequence[int], more: Sequence[str] = ()) -> list[Plan] | str:
+    """The plans of an entrant that suits the task; or why it does not suit the air, through which others can fly."""
+    try:
+        return given.plans(seeds, more)
+    except (ScenarioError, PlanError) as error:
+        given.nobody(more)
+        return str(error)
 
 
 def _lost(given: Descent, seeds: Sequence[int], worse: Sequence[float]) -> Any:

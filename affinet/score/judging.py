@@ -53,9 +53,13 @@ class Raw:
         """Who is scored."""
         return self.entrants[0]
 
-    def flies(self, task: str, entrant: str) -> bool:
-        """Whether an entrant suits a task."""
-        return self.cells[task, self.airs[0], entrant].unsuited is None
+    def flies(self, task: str, entrant: str, air: str | None = None) -> bool:
+        """Whether an entrant suits a task: at all, or through an air."""
+        return any(self.cells[task, each, entrant].unsuited is None for each in ([air] if air else self.airs))
+
+    def flown(self, task: str, entrant: str) -> list[str]:
+        """Airs that it flies a task through."""
+        return [air for air in self.airs if self.flies(task, entrant, air)]
 
     def runs(self, task: str, air: str, entrant: str, what: str) -> Array:
         """What was measured of each run, shape (R,)."""
@@ -119,10 +123,9 @@ def _compared(raw: Raw) -> Iterator[Compared]:
     pairs = [
         (task, air, rival)
         for task in raw.tasks
-        if raw.flies(task.name, raw.scored)
-        for air in raw.airs
+        for air in raw.flown(task.name, raw.scored)
         for rival in raw.entrants[1:]
-        if raw.flies(task.name, rival)
+        if raw.flies(task.name, rival, air)
     ]
     for task, air, rival in pairs:
         one, other = (raw.runs(task.name, air, who, "error") for who in (raw.scored, rival))
@@ -153,13 +156,15 @@ def _unsuited(raw: Raw) -> Iterator[str]:
     for task in raw.tasks:
         if not raw.flies(task.name, raw.scored):
             yield f"{task.name}: {raw.scored} does not suit it: {raw.cells[task.name, raw.airs[0], raw.scored].unsuited}"
+            continue
+        for air in raw.airs:
+            if (why := raw.cells[task.name, air, raw.scored].unsuited) is not None:
+                yield f"{task.name}, {air}: {raw.scored} does not suit it: {why}"
 
 
 def _vacuous(raw: Raw) -> Iterator[str]:
     for task in raw.tasks:
-        if not raw.flies(task.name, raw.scored):
-            continue
-        for air in raw.airs:
+        for air in raw.flown(task.name, raw.scored):
             share = raw.runs(task.name, air, raw.scored, "vacuous").mean()
             if share > 0.0:
                 runs = "all runs" if share == 1.0 else f"{share:.0%} of the runs"
@@ -211,15 +216,16 @@ def _honest(raw: Raw) -> Iterator[str]:
     flown = [task for task in raw.tasks if raw.flies(task.name, raw.scored)]
     tests = max(1, len(flown) * len(raw.airs))
     for task in flown:
+        airs = raw.flown(task.name, raw.scored)
         found = {
             air: intervals.mean(raw.runs(task.name, air, raw.scored, "nees"), tests=tests, confidence=CONFIDENCE)
-            for air in raw.airs
+            for air in airs
         }
         sure = {air: one for air, one in found.items() if one.low > _TELLS_THE_TRUTH[1]}
         if sure:
             most = max(sure.items(), key=lambda item: item[1].found)
             yield (
-                f"{task.name}: overconfident in {len(sure)} of {len(raw.airs)} airs ({', '.join(sure)}): squared errors are "
+                f"{task.name}: overconfident in {len(sure)} of {len(airs)} airs ({', '.join(sure)}): squared errors are "
                 f"{most[1].found:.3g} times what its covariances say in {most[0]}"
             )
         if (task.name, raw.scored) in raw.noisier:

@@ -51,7 +51,7 @@ def _task(raw: Raw, score: Score, task: str, says: str) -> Iterator[str]:
     head = ["air", f"{raw.scored} (m)", *(f"against {name}" for name in who[1:])]
     rows = []
     for air in raw.airs:
-        cells = [_factor(told[air, rival]) for rival in who[1:]]
+        cells = [_factor(told[air, rival]) if (air, rival) in told else "<td>-</td>" for rival in who[1:]]
         rows.append(f"<tr><th>{escape(air)}</th><td>{_error(raw, task, air, raw.scored)}</td>{''.join(cells)}</tr>")
     top = "".join(f"<th>{escape(one)}</th>" for one in head)
     yield f'<div class="wide"><table><tr>{top}</tr>{"".join(rows)}</table></div>'
@@ -71,11 +71,15 @@ def _factor(one: Compared) -> str:
 
 
 def _error(raw: Raw, task: str, air: str, name: str) -> str:
+    if not raw.flies(task, name, air):
+        return "-"
     error, lost = raw.runs(task, air, name, "error"), raw.runs(task, air, name, "lost").mean()
     return f"{np.median(error):.3g}" + (f", {lost:.0%} lost" if lost else "")
 
 
 def _figures(raw: Raw, task: str, air: str, name: str) -> list[str]:
+    if not raw.flies(task, name, air):
+        return 3 * ["-"]
     nees, recovery, delivered = (raw.runs(task, air, name, what) for what in ("nees", "recovery", "delivered"))
     return [
         "-" if np.isnan(nees).any() else f"{nees.mean():.3g}",

@@ -222,6 +222,25 @@ def test_another_code_of_ones_own_flies_anew_and_the_others_do_not(place, capsys
     assert left in scored(capsys, *words)[2]
 
 
+@pytest.mark.parametrize(("one", "other"), [("crkf", "rkf"), ("rkf", "crkf")])
+def test_one_that_does_not_suit_an_air_is_judged_in_the_others(place, capsys, one, other):
+    """Before, the score ended with the error of that air, after all else had flown."""
+    gone = """[[airs]]
+name = "gone"
+says = "one dies"
+set = ['timeline=[{verb="kill",at=1,agents=[5]}]']
+quick = true
+"""
+    (place / "mine.toml").write_text(CARD.replace("[[worsenings]]", f"{gone}[[worsenings]]"))
+    status, said, _ = scored(capsys, one, "--against", other, "--quick")
+    assert status == 0
+    assert [compared["air"] for compared in said["compared"]] == ["cut"]
+    unsuited = {(cell["entrant"], cell["air"]) for cell in said["cells"] if cell["unsuited"]}
+    assert unsuited == {("crkf", "gone")}
+    told = [sentence for sentence in said["verdict"] if "does not suit it" in sentence]
+    assert [sentence.partition(" does")[0] for sentence in told] == (["corridor, gone: crkf"] if one == "crkf" else [])
+
+
 @pytest.mark.usefixtures("place")
 def test_a_law_is_scored_likewise(capsys):
     _, said, _ = scored(capsys, "varying-velocity", "--law", "--quick")
