@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from affinet.traces.fields import numbers_only
+from affinet.traces.fields import FARTHEST, LATEST, MOST_NODES, numbers_only
 from affinet.traces.link_data import LinkData, Waypoints
 from analysis.models.arrays import Array
 from netem.impairments.measured import Lines, MeasuredError, shown
@@ -37,7 +39,12 @@ def read(lines: Lines) -> LinkData:
     widths = _widths(lines)
     if not widths:
         raise MeasuredError(_why_none(lines))
+    if len(lines.texts) > MOST_NODES:
+        raise MeasuredError(
+            f"line {lines.numbers[MOST_NODES]}: more than {MOST_NODES} nodes: leave out those that are no agents"
+        )
     paths = [_path(text, widths[0]) for text in lines.texts]
+    _refuse_far(lines.numbers, paths)
     in_space = "taken as t x y" if widths[0] == 3 else "taken as t x y z"
     return LinkData(
         nodes=tuple(str(number) for number in range(1, len(paths) + 1)),
@@ -46,6 +53,16 @@ def read(lines: Lines) -> LinkData:
         everybody=True,
         assumed=(f"a node is called by the number of its line, from 1; a line is {in_space}, again and again",),
     )
+
+
+def _refuse_far(numbers: Sequence[int], paths: Sequence[Waypoints]) -> None:
+    for line, path in zip(numbers, paths, strict=True):
+        if path.time[-1] > LATEST:
+            raise MeasuredError(
+                f"line {line}: a time of {path.time[-1]:g} s: at most {LATEST:g} s: is its unit another?"
+            )
+        if (far := float(np.abs(path.position).max())) > FARTHEST:
+            raise MeasuredError(f"line {line}: a place {far:g} m away: at most {FARTHEST:g} m")
 
 
 def _table(text: str, width: int) -> Array | None:
