@@ -26,7 +26,7 @@ class Log(NamedTuple):
     stamp, line
         Of those whose answer has a time before it: when they were sent, in seconds, and where that stands.
     late, doubled
-        Those that were answered after one that was sent later, and how many came once more.
+        Those that were answered after one that was sent later, and how often which were answered once more.
     first, last
         Between what numbers all were sent.
     target
@@ -39,7 +39,7 @@ class Log(NamedTuple):
     stamp: Mapping[int, float]
     line: Mapping[int, int]
     late: Set[int]
-    doubled: int
+    doubled: Mapping[int, int]
     first: int
     last: int
     target: str
@@ -59,6 +59,8 @@ def link_data(log: Log) -> LinkData:
     delay[_places(log.took, log.first)] = np.fromiter(log.took.values(), dtype=np.float64) / 2000.0
     lost, late = np.isnan(delay), np.zeros(count, dtype=bool)
     late[_places(log.late, log.first)] = True
+    doubled = np.zeros(count, dtype=np.int64)
+    doubled[_places(log.doubled, log.first)] = list(log.doubled.values())
     time = _times(np.arange(log.first, log.last + 1, dtype=np.float64), log)
     nowhere = np.zeros(count, dtype=np.int64)
     pace = float(time[-1] / (count - 1)) if count > 1 else 1.0
@@ -69,14 +71,16 @@ def link_data(log: Log) -> LinkData:
             Quantity.AVAILABILITY: Steps(nowhere, time, nowhere, nowhere + 1, 1.0 - lost),
             Quantity.DELAY: Steps(nowhere, time, nowhere, nowhere + 1, delay).at(~lost),
         },
-        messages=Messages(time, lost, delay, late, log.doubled),
+        messages=Messages(time, lost, delay, late, doubled),
         one_link=True,
         paced=not log.stamp,
         assumed=(_HALF, *log.assumed),
     )
 
 
-def _places(numbers: Mapping[int, float] | Set[int], first: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _places(
+    numbers: Mapping[int, float] | Mapping[int, int] | Set[int], first: int
+) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     return np.fromiter(numbers, dtype=np.int64, count=len(numbers)) - first
 
 

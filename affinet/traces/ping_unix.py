@@ -29,7 +29,7 @@ class _Reading:
         self.stamp: dict[int, float] = {}
         self.line: dict[int, int] = {}
         self.late = set[int]()
-        self.doubled = 0
+        self.doubled: dict[int, int] = {}
         self.target = ""
         self.from_zero: bool | None = None
         self.sent: tuple[int, int] | None = None  # line, and how many
@@ -80,7 +80,7 @@ class _Reading:
 
     def _answer(self, line: int, text: str, this: int) -> None:
         if "(DUP!)" in text:
-            self.doubled += 1
+            self.doubled[this] = self.doubled.get(this, 0) + 1
             return
         if this in self.took:
             raise MeasuredError(

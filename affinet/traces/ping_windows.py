@@ -79,4 +79,4 @@ def read(lines: Lines) -> Log:
         )
     if not target:
         assumed.append("its first lines are not there: what was lost before is not known")
-    return Log(took, {}, {}, set(), 0, 0, count - 1, target or "there", tuple(assumed))
+    return Log(took, {}, {}, set(), {}, 0, count - 1, target or "there", tuple(assumed))

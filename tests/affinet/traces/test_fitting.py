@@ -133,7 +133,7 @@ def test_a_chain_in_finer_steps_has_the_same_loss_and_lasts_as_long():
     np.testing.assert_allclose(coarse, fit.chain.transition, atol=1e-12)
     assert (p, r) < tuple(fit.parameters[name].value for name in "pr")
     with pytest.raises(NotFitted, match="a chain of four states is of the steps it was fitted in"):
-        fitting.in_steps_of(fitting.Fit("markov", {}, 0.0, 0.0, MARKOV), 0.1)
+        fitting.in_steps_of(fitting.Fit("markov", {}, 100, 9, 0.0, 0.0, MARKOV), 0.1)
     flipping = np.arange(100) % 2 == 0
     with pytest.raises(NotFitted, match="too closely for any other step"):
         fitting.in_steps_of(fitting.fitted("gilbert", [flipping]), 0.1)

@@ -48,7 +48,7 @@ def test_ping(read):
     assert said.time.tolist() == list(range(8))
     np.testing.assert_allclose(said.delay[~said.lost], [0.005, 0.015, 0.007, 0.004, 0.006], atol=1e-12)
     assert said.late.tolist() == [False, True, False, False, False, False, False, False]
-    assert said.doubled == 1
+    assert said.doubled.tolist() == [0, 0, 0, 0, 1, 0, 0, 0]
     assert "half" in data.assumed[0]
     assert data.sent_every(0.2).messages.time.tolist() == pytest.approx([0.2 * n for n in range(8)])
     assert data.sent_every(0.2).ends == pytest.approx(1.6)
@@ -336,4 +336,8 @@ def test_a_file_of_two_formats_wants_to_be_told(read):
 
 def test_a_file_of_no_format_says_what_a_table_is(read):
     with pytest.raises(MeasuredError, match="line 1: the columns must be time,src,dst and one or more of"):
+        read("hello, world\n")
+    with pytest.raises(
+        MeasuredError, match=r"line 1: of no format that is known: 'hello'; say which, as its format.*ping"
+    ):
         read("hello\n")
