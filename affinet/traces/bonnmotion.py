@@ -11,11 +11,15 @@ from affinet.traces.link_data import LinkData, Waypoints
 from analysis.models.arrays import Array
 from netem.impairments.measured import Lines, MeasuredError, shown
 
+_WIDEST = 4  # numbers of a place and its time
+
 
 def recognised(lines: Lines) -> bool:
-    """Whether it is such a file."""
+    """Whether it is such a file: a row of one place is of a node at rest, and of such rows all begin at one time."""
     rows = [numbers_only(text) for text in lines.texts[:50]]
-    return bool(rows) and all(row is not None and row for row in rows) and bool(_widths(lines))
+    if not rows or any(not row for row in rows) or any("," in text for text in lines.texts) or not _widths(lines):
+        return False
+    return any(row and len(row) > _WIDEST for row in rows) or len({row[0] for row in rows if row}) == 1
 
 
 def read(lines: Lines) -> LinkData:

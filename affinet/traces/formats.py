@@ -89,4 +89,4 @@ def _which(lines: Lines, found: Sequence[str]) -> str:
             FORMATS[name].read(lines)
         except MeasuredError as error:
             wrong += f"; as {name} it is wrong in {error}"
-    return f"it could be of format {' or '.join(found)}: say which, as its format{wrong}"
+    return f"it could be of format {' or '.join(found)}: say which, by --format or format = ...{wrong}"

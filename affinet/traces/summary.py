@@ -12,7 +12,7 @@ from affinet.traces import runs
 from affinet.traces.link_data import INDIRECT, LinkData, Messages, Quantity, Steps
 from analysis.models.arrays import Array, Mask
 
-MOST_STEPS = 2_000_000  # of messages or of time, on all links, to which a chain is fitted
+MOST_STEPS = 1_000_000  # of messages or of time, on all links, to which a chain is fitted
 
 
 @dataclass(frozen=True)

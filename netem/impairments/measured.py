@@ -73,10 +73,23 @@ def shown(text: str) -> str:
     return repr(text if len(text) <= _SHOWN else f"{text[:_SHOWN]}...")
 
 
-def _content(file: Path) -> bytes:
+def refuse_endless(file: Path) -> None:
+    """Go on if it is no device and no pipe; of a directory, opening it says what it is.
+
+    Raises
+    ------
+    MeasuredError
+        If it is one.
+    OSError
+        When there is no such file.
+    """
     mode = file.stat().st_mode
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # what opening a directory says is told as it is
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise MeasuredError("no regular file but a device or a pipe, which may have no end: write it to a file first")
+
+
+def _content(file: Path) -> bytes:
+    refuse_endless(file)
     with file.open("rb") as opened:
         content = opened.read(LARGEST + 1)
     if len(content) > LARGEST:
