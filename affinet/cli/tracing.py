@@ -33,12 +33,11 @@ _LOOKS = 1.0  # s
 
 
 class Fitted(NamedTuple):
-    """A chain fitted to data, the BIC of each that was tried, how well it fits, and how many messages or steps there were."""
+    """A chain fitted to data, the BIC of each that was tried, and how well it fits."""
 
     fit: Fit
     tried: Mapping[str, float]
     goodness: Goodness
-    of: int
 
 
 def trace(parsed: argparse.Namespace) -> None:
@@ -81,6 +80,8 @@ def trace(parsed: argparse.Namespace) -> None:
 
 def _meaning(parsed: argparse.Namespace) -> TraceFile:
     said: dict[str, Any] = {"file": str(parsed.file), "format": parsed.format, "interval": parsed.interval}
+    if parsed.begins is not None:
+        said["begins"] = parsed.begins
     try:
         if parsed.curve is not None:
             said["curve"] = tomllib.loads(f"curve = {parsed.curve}")["curve"]
@@ -98,7 +99,7 @@ def _fitted(model: str, sequences: Sequence[Any]) -> Fitted:
     else:
         fit = fitting.fitted(model, sequences)
         tried = {model: fit.bic}
-    return Fitted(fit, tried, goodness.of(fit.chain, sequences), sum(len(one) for one in sequences))
+    return Fitted(fit, tried, goodness.of(fit.chain, sequences))
 
 
 def _scaled(fit: Fit, data: LinkData, dt: float | None) -> Fit:
@@ -113,7 +114,15 @@ def _profile_name(file: Path) -> str:
 
 
 def _why(name: str, data: LinkData, fit: Fit | None) -> str:
-    return f"{name}, {data.ends:g} s, {'followed as it is' if fit is None else f'{fit.model} fitted'}"
+    if fit is None:
+        return f"{name}, {data.ends:g} s, followed as it is"
+    said = f"{name}, {data.ends:g} s, {fit.model} fitted"
+    return f"{said}: {_too_little(fit)}" if fit.few else said
+
+
+def _too_little(fit: Fit) -> str:
+    bursts = f"{fit.bursts} burst{'s' * (fit.bursts != 1)} of losses in {fit.messages} steps"
+    return f"too little to fit a chain to, {bursts}: the intervals say what is known; with {fitting.FEW} bursts more is"
 
 
 def _told(
@@ -130,6 +139,9 @@ def _told(
         fit = fitted.fit
         said["fit"] = {
             "model": fit.model,
+            "steps": fit.messages,
+            "bursts": fit.bursts,
+            "too_little": fit.few,
             "parameters": {name: one._asdict() for name, one in fit.parameters.items()},
             "log_likelihood": fit.log_likelihood,
             "bic": dict(fitted.tried),
@@ -179,7 +191,7 @@ def _figure(value: float | None) -> str:
 
 def _show_fit(fitted: Fitted) -> None:
     fit, fits = fitted.fit, fitted.goodness
-    table = Table("parameter", "value", "95 % from", "to", title=f"{fit.model}, fitted to {fitted.of} steps")
+    table = Table("parameter", "value", "95 % from", "to", title=f"{fit.model}, fitted to {fit.messages} steps")
     for name, one in fit.parameters.items():
         table.add_row(name, f"{one.value:.4g}", f"{one.low:.4g}", f"{one.high:.4g}")
     Console().print(table)
@@ -192,7 +204,9 @@ def _show_fit(fitted: Fitted) -> None:
         f"spread over time {fits.spread:.3g})"
     )
     cannot = "the chain cannot have made these data: fit another, or follow the file"
-    _print(cannot if fits.refused else "nothing speaks against the chain")
+    _print(cannot if fits.refused else "too little to say" if fit.few else "nothing speaks against the chain")
+    if fit.few:
+        _print(f"note: {_too_little(fit)}")
 
 
 def _print(text: str) -> None:

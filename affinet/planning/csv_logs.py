@@ -15,6 +15,7 @@ import numpy as np
 from affinet.scenario.words import among
 from analysis.models.arrays import Array, Integers, Mask
 from netem.core.listing import listed
+from netem.impairments import measured
 from world.physics.recorded import RecordedFlight
 from world.physics.world import World
 
@@ -36,6 +37,10 @@ def read(path: Path, world: World) -> RecordedFlight:
     ValueError
         When it is no log of this formation's, or ends too early.
     """
+    try:
+        measured.refuse_endless(path)
+    except measured.MeasuredError as error:
+        raise ValueError(f"{path}: {error}") from error
     log = _Log(path, world)
     log.refuse_what_is_misplaced()
     log.refuse_what_is_short()

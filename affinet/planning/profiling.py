@@ -44,8 +44,8 @@ def profile(data: LinkData, file: TraceFile, fit: Fit | None, step: str, out: Pa
     if data.messages is not None:
         arrived = ~data.messages.lost
         said["delay"] = {"model": "table", "table": _quantiles(data.messages.delay[arrived])}
-        if data.messages.doubled:
-            said["duplicate"] = float(f"{data.messages.doubled / arrived.sum():.6g}")
+        if doubled := int(data.messages.doubled.sum()):
+            said["duplicate"] = float(f"{doubled / arrived.sum():.6g}")
         return said
     direct = file.model_dump(exclude_defaults=True, exclude={"file", "curve"})
     if Quantity.DELAY in data.steps:

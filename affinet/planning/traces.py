@@ -20,6 +20,9 @@ from netem.impairments.measured import MeasuredError
 from netem.impairments.trace import Measured
 
 _USUAL_INTERVAL = 1.0  # s, of ping
+_MOST_LOOKS = 10_000_000  # how far nodes are apart, over all pairs and times
+_MOST_ROWS = 20_000_000  # of what begins anew, over the run and all links
+_LONGEST_NUMBER = 9  # digits of an agent
 
 
 def measured(
@@ -43,19 +46,16 @@ def measured(
     OSError
         When it cannot be read.
     """
-    name, data = formats.read(Path(file.file), file.format)
-    data, notes = _in_seconds(data, file)
-    notes += data.assumed
+    name, data, notes = _read(file)
     more: list[str] = []
     if data.paths and what is Quantity.AVAILABILITY:
         given = _by_distance(data, file, links, rows, time)
     else:
         given, more = _of_links(_worth(data, what, file, name), data, file, links, rows)
-    given = _begun(given, file.begins)
     if what is Quantity.AVAILABILITY and data.everybody:
         given = _down_at_first(given, rows)
     if data.period is not None:
-        return _again_and_again(given, data.period, time.duration), [*notes, *more]
+        return _again_and_again(given, data.period, time), [*notes, *more]
     return given, [*notes, *more, *_at_its_end(given, rows, time)]
 
 
@@ -69,7 +69,7 @@ def said_delays(file: TraceFile) -> Array:
     OSError
         When it cannot be read.
     """
-    name, data = formats.read(Path(file.file), file.format)
+    name, data, _ = _read(file)
     return _worth(data, Quantity.DELAY, file, name).value
 
 
@@ -86,14 +86,18 @@ def told(file: TraceFile, every: float) -> tuple[str, LinkData, list[str]]:
     Raises
     ------
     MeasuredError
-        When it cannot be understood.
+        When it cannot be understood, or would take too many looks.
     OSError
         When it cannot be read.
     """
-    name, data = formats.read(Path(file.file), file.format)
-    data, notes = _in_seconds(data, file)
-    notes += data.assumed
+    name, data, notes = _read(file)
     if data.paths:
+        pairs = len(data.paths) * (len(data.paths) - 1)
+        if (looks := data.ends / every * pairs) > _MOST_LOOKS:
+            raise MeasuredError(
+                f"{len(data.paths)} nodes up to {data.ends:.10g} s are {looks:.3g} looks, one each {every:g} s: at most "
+                f"{_MOST_LOOKS} are taken; give a larger --dt, or --begins where they do not begin at 0"
+            )
         time: Array = np.arange(0.0, data.ends + every / 2.0, every)
         data = replace(data, steps={Quantity.DISTANCE: movement.between_all(data.paths, time)})
     if file.curve is not None:
@@ -113,6 +117,21 @@ def curve_of(said: object) -> Curve:
             return curves.LogDistance(said.range, said.exponent, said.shadowing)
     assert isinstance(said, list)
     return curves.Points(said)
+
+
+def _read(file: TraceFile) -> tuple[str, LinkData, list[str]]:
+    """The format, what the file says from where the run begins, and what is taken to be so."""
+    name, data = formats.read(Path(file.file), file.format)
+    data, notes = _in_seconds(data, file)
+    if data.period is None and file.begins > data.ends:
+        raise MeasuredError(f"begins = {file.begins:.10g}, and it ends at {data.ends:.10g} s: give a time of the file")
+    data = data.begun(file.begins)
+    notes += data.assumed
+    if (starts := data.starts) > max(0.0, data.ends - starts):
+        notes.append(
+            f"it says nothing before {starts:.10g} s, longer than all it tells of: begins = {starts:.10g} begins there"
+        )
+    return name, data, notes
 
 
 def _in_seconds(data: LinkData, file: TraceFile) -> tuple[LinkData, list[str]]:
@@ -156,7 +175,9 @@ def _agents(data: LinkData, file: TraceFile, links: Links, lines: Integers | Non
             if not 1 <= agent <= links.agents:
                 raise MeasuredError(f"agents: {name!r} cannot be agent {agent}: there are {links.agents}")
         return np.array([file.agents.get(name, 0) for name in data.nodes], dtype=np.int64)
-    agents = [int(name) - file.first + 1 if name.isdecimal() else -1 for name in data.nodes]
+    agents = [
+        int(name) - file.first + 1 if name.isdecimal() and len(name) <= _LONGEST_NUMBER else -1 for name in data.nodes
+    ]
     for place, (name, agent) in enumerate(zip(data.nodes, agents, strict=True)):
         if not 1 <= agent <= links.agents:
             where = "" if lines is None or not lines[place] else f"line {lines[place]}: "
@@ -212,21 +233,11 @@ def _by_distance(data: LinkData, file: TraceFile, links: Links, rows: Mask, time
     curve = curve_of(file.curve)
     parts = []
     for row in wanted.tolist():
-        far = movement.distance(path[int(links.src[row])], path[int(links.dst[row])], ticks + file.begins)
+        far = movement.distance(path[int(links.src[row])], path[int(links.dst[row])], ticks)
         value = np.asarray(curve(far))
         changes = np.append(True, value[1:] != value[:-1])
-        parts.append(Measured(ticks[changes] + file.begins, np.full(int(changes.sum()), row), value[changes]))
+        parts.append(Measured(ticks[changes], np.full(int(changes.sum()), row), value[changes]))
     return Measured(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _begun(given: Measured, begins: float) -> Measured:
-    """With the time at which the run begins as 0: what was measured last before it holds from it."""
-    time = given.time - begins
-    order = np.lexsort((time, given.link))
-    time, link, value = time[order], given.link[order], given.value[order]
-    last = np.append((link[1:] != link[:-1]) | (time[1:] > 0.0), True)[: len(link)]
-    held = (time >= 0.0) | last
-    return Measured(np.maximum(time[held], 0.0), link[held], value[held])
 
 
 def _down_at_first(given: Measured, rows: Mask) -> Measured:
@@ -242,8 +253,15 @@ def _down_at_first(given: Measured, rows: Mask) -> Measured:
     )
 
 
-def _again_and_again(given: Measured, period: float, duration: float) -> Measured:
-    times = int(np.ceil(duration / period)) + 1
+def _again_and_again(given: Measured, period: float, time: TimeSection) -> Measured:
+    if not np.diff(given.time).any():
+        return given  # one value, over and over
+    times = int(np.ceil(time.duration / period)) + 1
+    if (rows := times * len(given.time)) > _MOST_ROWS:
+        raise MeasuredError(
+            f"{period:g} s again and again in {time.duration:g} s are {rows} values on all links, at most {_MOST_ROWS}: "
+            "give a shorter run, or it to fewer links"
+        )
     turns = np.repeat(np.arange(times), len(given.time)) * period
     return Measured(np.tile(given.time, times) + turns, np.tile(given.link, times), np.tile(given.value, times))
 

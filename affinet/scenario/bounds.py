@@ -7,4 +7,5 @@ quotients of what a scenario says are far from where floats vanish and overflow,
 from __future__ import annotations
 
 SMALLEST, LARGEST = 1e-9, 1e9
+LATEST = 1e11  # s: a clock on the wall says 1.7e9
 MOST = 10**9

@@ -10,7 +10,7 @@ from pydantic import PlainValidator, model_validator
 from affinet.scenario.keys import key
 from affinet.scenario.reaches import Disk, LogDistance, Ramp
 from affinet.scenario.section import Section
-from affinet.scenario.units import Finite, NotNegative, Positive, Probability, Steps, Ticks
+from affinet.scenario.units import Finite, Moment, Positive, Probability, Steps, Ticks
 
 # As affinet.traces.formats has them, whose readers take a while to import.
 FormatName = Literal[
@@ -45,7 +45,7 @@ class TraceFile(Section):
         None, "which agent a node of the file is, by its name there; others are left out"
     )
     first: Ticks = key(1, "number of the node that is agent 1, where nodes are numbered")
-    begins: NotNegative = key(0.0, "time of the file at which the run begins", "s")
+    begins: Moment = key(0.0, "time of the file at which the run begins", "s")
     interval: Positive | None = key(None, "of a ping without times: from one message to the next", "s")
     curve: Points | Disk | Ramp | LogDistance | None = key(
         None, "how much passes at a distance, signal or pathloss: points, or a loss by distance"

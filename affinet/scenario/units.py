@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from affinet.scenario.bounds import LARGEST, MOST, SMALLEST
+from affinet.scenario.bounds import LARGEST, LATEST, MOST, SMALLEST
 
 _SHORTEST_TICK = 1e-6
 
@@ -30,6 +30,7 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False), After
 Below1 = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Moment = Annotated[float, Field(ge=0.0, le=LATEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
 Bearing = Annotated[float, Field(gt=0.0, le=pi, allow_inf_nan=False), AfterValidator(_not_tiny)]
 ShareOfDistance = Annotated[float, Field(gt=0.0, le=10.0, allow_inf_nan=False), AfterValidator(_not_tiny)]
 BitsPerSecond = Annotated[float, Field(gt=0.0, le=1e15, allow_inf_nan=False), AfterValidator(_not_tiny)]

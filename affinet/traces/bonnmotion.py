@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from affinet.traces.fields import numbers_only
+from affinet.traces.fields import FARTHEST, LATEST, MOST_NODES, numbers_only
 from affinet.traces.link_data import LinkData, Waypoints
 from analysis.models.arrays import Array
 from netem.impairments.measured import Lines, MeasuredError, shown
 
+_WIDEST = 4  # numbers of a place and its time
+
 
 def recognised(lines: Lines) -> bool:
-    """Whether it is such a file."""
+    """Whether it is such a file: a row of one place is of a node at rest, and of such rows all begin at one time."""
     rows = [numbers_only(text) for text in lines.texts[:50]]
-    return bool(rows) and all(row is not None and row for row in rows) and bool(_widths(lines))
+    if not rows or any(not row for row in rows) or any("," in text for text in lines.texts) or not _widths(lines):
+        return False
+    return any(row and len(row) > _WIDEST for row in rows) or len({row[0] for row in rows if row}) == 1
 
 
 def read(lines: Lines) -> LinkData:
@@ -37,7 +43,12 @@ def read(lines: Lines) -> LinkData:
     widths = _widths(lines)
     if not widths:
         raise MeasuredError(_why_none(lines))
+    if len(lines.texts) > MOST_NODES:
+        raise MeasuredError(
+            f"line {lines.numbers[MOST_NODES]}: more than {MOST_NODES} nodes: leave out those that are no agents"
+        )
     paths = [_path(text, widths[0]) for text in lines.texts]
+    _refuse_far(lines.numbers, paths)
     in_space = "taken as t x y" if widths[0] == 3 else "taken as t x y z"
     return LinkData(
         nodes=tuple(str(number) for number in range(1, len(paths) + 1)),
@@ -46,6 +57,16 @@ def read(lines: Lines) -> LinkData:
         everybody=True,
         assumed=(f"a node is called by the number of its line, from 1; a line is {in_space}, again and again",),
     )
+
+
+def _refuse_far(numbers: Sequence[int], paths: Sequence[Waypoints]) -> None:
+    for line, path in zip(numbers, paths, strict=True):
+        if path.time[-1] > LATEST:
+            raise MeasuredError(
+                f"line {line}: a time of {path.time[-1]:g} s: at most {LATEST:g} s: is its unit another?"
+            )
+        if (far := float(np.abs(path.position).max())) > FARTHEST:
+            raise MeasuredError(f"line {line}: a place {far:g} m away: at most {FARTHEST:g} m")
 
 
 def _table(text: str, width: int) -> Array | None:

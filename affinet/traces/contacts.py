@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from affinet.traces import meetings
-from affinet.traces.fields import number
+from affinet.traces.fields import moment, node
 from affinet.traces.link_data import LinkData
 from affinet.traces.meetings import Meeting
 from netem.impairments.measured import Lines, MeasuredError, shown
@@ -15,7 +15,7 @@ _HEADING = "time"
 def recognised(lines: Lines) -> bool:
     """Whether it is such a file."""
     rows = [_words(text) for text in _below_heading(lines).texts[:200]]
-    return bool(rows) and all(len(words) == 4 and words[3].lower() in _STATES for words in rows)
+    return any(len(words) == 4 and words[3].lower() in _STATES for words in rows)
 
 
 def read(lines: Lines) -> LinkData:
@@ -31,8 +31,8 @@ def read(lines: Lines) -> LinkData:
         words = _words(text)
         if len(words) != 4 or words[3].lower() not in _STATES:
             raise MeasuredError(f"line {line}: 'time one other up', or down, is due, got {shown(text)}")
-        time = number(line, words[0], "a time in s", least=0.0)
-        events.append(Meeting(line, time, words[1], words[2], _STATES[words[3].lower()]))
+        time = moment(line, words[0])
+        events.append(Meeting(line, time, node(words[1]), node(words[2]), _STATES[words[3].lower()]))
     return meetings.from_events(events, 0.0)
 
 

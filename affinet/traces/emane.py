@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 
-from affinet.traces.fields import number
+from affinet.traces.fields import LARGEST_DB, LATEST, moment, number
 from affinet.traces.link_data import LinkData, Quantity, once_each, steps
 from netem.impairments.measured import Lines, MeasuredError, shown
 
-_MODULE = re.compile(r"nem:(\d+)")
-_LARGEST = 1000.0  # dB
+_MODULE = re.compile(r"nem:(\d{1,18})")
 
 
 def recognised(lines: Lines) -> bool:
@@ -31,7 +30,7 @@ def read(lines: Lines) -> LinkData:
         words = text.partition("#")[0].split()
         if len(words) < 3:
             raise MeasuredError(f"line {line}: 'TIME nem:N pathloss nem:M,dB' is due, got {shown(text)}")
-        time = max(0.0, number(line, words[0], "a time in s"))  # what is before 0 holds from it
+        time = max(0.0, moment(line, words[0], least=-LATEST))  # what is before 0 holds from it
         sender = _module(line, words[1])
         ends = max(ends, time)
         if words[2] != "pathloss":
@@ -74,7 +73,4 @@ def _module(line: int, text: str) -> str:
 
 
 def _pathloss(line: int, text: str) -> float:
-    value = number(line, text, "a pathloss in dB", least=-_LARGEST)
-    if value > _LARGEST:
-        raise MeasuredError(f"line {line}: a pathloss of {value:g} dB: at most {_LARGEST:g} dB")
-    return value
+    return number(line, text, "a pathloss in dB", least=-LARGEST_DB, most=LARGEST_DB)

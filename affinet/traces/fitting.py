@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, stats
 
+from affinet.traces import runs
 from affinet.traces.maximum import CONFIDENCE, Hidden, Interval, maximal
 from analysis.models.arrays import Mask
 from netem.impairments import loss
 from netem.impairments.chain import Chain
 from netem.impairments.likelihood import log_likelihood
 
+FEW = 10  # bursts of losses: below, intervals are wide, and no fit can be told from another
 MODELS = ("bernoulli", "gilbert", "gilbert-elliott", "markov")
 
 
@@ -33,6 +35,8 @@ class Fit:
         As a profile calls it.
     parameters
         As a profile has them.
+    messages, bursts
+        How many there were, and how many bursts of losses in them.
     log_likelihood, bic
         Of the sequences; of the fits to the same ones that with the least BIC is to be preferred.
     chain
@@ -41,9 +45,16 @@ class Fit:
 
     model: str
     parameters: Mapping[str, Interval]
+    messages: int
+    bursts: int
     log_likelihood: float
     bic: float
     chain: Chain
+
+    @property
+    def few(self) -> bool:
+        """Whether there was too little to fit to."""
+        return self.bursts < FEW
 
 
 _GILBERT_ELLIOTT = Hidden(
@@ -68,7 +79,8 @@ def fitted(model: str, sequences: Sequence[Mask]) -> Fit:
     model
         One of `MODELS`: `bernoulli`, independent losses; `gilbert`, good periods without a loss and bad ones with nothing
         else, by counting what followed what; `gilbert-elliott` and `markov`, netem's four states, by maximum likelihood.
-        Of what is counted the intervals are Clopper and Pearson's; of the others they are where the likelihood, at its
+        Of what is counted the intervals are Clopper and Pearson's, their low ends given that it was seen at all, as nothing
+        is fitted else; of the others they are where the likelihood, at its
         highest over all other parameters, has dropped by what a chi-square of one degree exceeds in 5 %.
     sequences
         Which.
@@ -100,7 +112,7 @@ def best(sequences: Sequence[Mask]) -> tuple[Fit, Mapping[str, float]]:
 
 def _bernoulli(sequences: Sequence[Mask], _: bool) -> Fit:
     lost, of = _losses(sequences)
-    p = _share(lost, of)
+    p = _seen(lost, of)
     return _fitted("bernoulli", {"p": p}, loss.bernoulli(p.value), sequences)
 
 
@@ -111,7 +123,7 @@ def _gilbert(sequences: Sequence[Mask], _: bool) -> Fit:
     bad = np.sum([one[:-1].sum() for one in sequences])
     if not begins or not ends:
         raise NotFitted("no burst of losses begins and ends in it: take a longer log, or fit bernoulli")
-    p, r = _share(int(begins), int(good)), _share(int(ends), int(bad))
+    p, r = _seen(int(begins), int(good)), _seen(int(ends), int(bad))
     return _fitted("gilbert-elliott", {"p": p, "r": r}, loss.gilbert_elliott(p.value, r.value), sequences)
 
 
@@ -155,11 +167,15 @@ def in_steps_of(fit: Fit, share: float) -> Fit:
     def of(value: float) -> float:
         return value / (p + r) * (1.0 - stays**share)
 
-    scaled = {
-        name: Interval(*(min(1.0, one * of(at.value) / at.value) for one in at)) if name in "pr" else at
-        for name, at in fit.parameters.items()
-    }
-    return Fit(fit.model, scaled, fit.log_likelihood, fit.bic, _chain(scaled))
+    scaled = {name: _in_proportion(at, of(at.value)) if name in "pr" else at for name, at in fit.parameters.items()}
+    return replace(fit, parameters=scaled, chain=_chain(scaled))
+
+
+def _in_proportion(at: Interval, value: float) -> Interval:
+    """Another value, and its interval in proportion; where nothing is known, nothing is."""
+    if (at.low, at.high) == (0.0, 1.0):
+        return Interval(value, *at[1:])
+    return Interval(*(min(1.0, one * value / at.value) for one in at))
 
 
 def _chain(parameters: Mapping[str, Interval]) -> Chain:
@@ -177,10 +193,25 @@ def _share(hits: int, of: int) -> Interval:
     return Interval(hits / of, low, high)
 
 
+def _seen(hits: int, of: int) -> Interval:
+    """The share of something that was seen: had it never been, no share would be asked for, and its low end knows that."""
+    share, tail = _share(hits, of), (1.0 - CONFIDENCE) / 2.0
+
+    def beyond(chance: float) -> float:
+        seen = stats.binom.sf(0, of, chance)
+        return float(stats.binom.sf(hits - 1, of, chance) / seen) - tail
+
+    least = 1e-12
+    low = 0.0 if beyond(least) >= 0.0 else float(optimize.brentq(beyond, least, share.value))
+    return share._replace(low=low)
+
+
 def _fitted(model: str, parameters: Mapping[str, Interval], chain: Chain, sequences: Sequence[Mask]) -> Fit:
     total = float(np.sum([log_likelihood(chain, one) for one in sequences]))
-    messages = np.sum([len(one) for one in sequences])
-    return Fit(model, parameters, total, float(len(parameters) * np.log(messages) - 2.0 * total), chain)
+    messages = int(np.sum([len(one) for one in sequences]))
+    bursts = int(np.sum([len(runs.lengths(one[None])[0]) for one in sequences]))
+    bic = float(len(parameters) * np.log(messages) - 2.0 * total)
+    return Fit(model, parameters, messages, bursts, total, bic, chain)
 
 
 def _maximal(model: str, hidden: Hidden, sequences: Sequence[Mask], sure: bool) -> Fit:

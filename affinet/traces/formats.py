@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from affinet.traces import bonnmotion, contacts, emane, intervals, iperf3, mahimahi, one, ping, setdest, table
 from affinet.traces.link_data import LinkData
 from netem.impairments import measured
-from netem.impairments.measured import Lines, MeasuredError
+from netem.impairments.measured import Lines, MeasuredError, shown
 
 
 class Format(NamedTuple):
@@ -57,19 +57,36 @@ def read(file: Path, name: str | None) -> tuple[str, LinkData]:
     Raises
     ------
     MeasuredError
-        When it has no format that is known, or could have two, or is wrong in its own.
+        When it has no format that is known, or could have two, is wrong in its own, or tells of no link.
     OSError
         When it cannot be read.
     """
     lines = measured.read(file)
     chosen = name or _found(lines)
-    return chosen, FORMATS[chosen].read(lines)
+    data = FORMATS[chosen].read(lines)
+    if data.paths and len(data.paths) < 2:
+        raise MeasuredError(f"line {lines.numbers[0]}: one node in it, and no link: give the ways of two at least")
+    return chosen, data
 
 
 def _found(lines: Lines) -> str:
-    found = [name for name, one in FORMATS.items() if one.recognised(lines)]
+    found = [name for name, one in FORMATS.items() if lines.texts and one.recognised(lines)]
     if len(found) > 1:
-        raise MeasuredError(f"it could be of format {' or '.join(found)}: say which, as its format")
-    if not found:
-        return "table"  # which says what its columns must be
-    return found[0]
+        raise MeasuredError(_which(lines, found))
+    if not found and lines.texts and "," not in lines.texts[0]:
+        raise MeasuredError(
+            f"line {lines.numbers[0]}: of no format that is known: {shown(lines.texts[0])}; say which, as its format, to "
+            f"see what is wrong: {', '.join(FORMATS)}"
+        )
+    return found[0] if found else "table"  # which says what its columns must be
+
+
+def _which(lines: Lines, found: Sequence[str]) -> str:
+    """That nothing tells these formats apart, and what is wrong if it is of one."""
+    wrong = ""
+    for name in found:
+        try:
+            FORMATS[name].read(lines)
+        except MeasuredError as error:
+            wrong += f"; as {name} it is wrong in {error}"
+    return f"it could be of format {' or '.join(found)}: say which, by --format or format = ...{wrong}"

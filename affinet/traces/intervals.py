@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from affinet.traces import meetings
-from affinet.traces.fields import number, numbers_only
+from affinet.traces.fields import LATEST, moment, node, numbers_only
 from affinet.traces.link_data import LinkData
 from affinet.traces.meetings import Meeting
 from netem.impairments.measured import Lines, MeasuredError, shown
 
 
 def recognised(lines: Lines) -> bool:
-    """Whether it is such a file."""
+    """Whether it has the form of such a file: what is wrong in one that has is told of the line, and is no other format."""
     rows = [numbers_only(text) for text in lines.texts[:200]]
-    return bool(rows) and all(
-        row is not None
-        and len(row) in (4, 5, 6)
-        and row[0] % 1.0 == row[1] % 1.0 == 0.0
-        and row[0] != row[1]
-        and row[2] <= row[3]
-        for row in rows
-    )
+    return all(
+        row is not None and len(row) in (4, 5, 6) and row[0] % 1.0 == row[1] % 1.0 == 0.0 for row in rows
+    ) and any(row is not None and row[0] != row[1] for row in rows)
 
 
 def read(lines: Lines) -> LinkData:
@@ -35,13 +30,14 @@ def read(lines: Lines) -> LinkData:
         words = text.replace(",", " ").split()
         if len(words) < 4:
             raise MeasuredError(f"line {line}: 'one other begin end' is due, got {shown(text)}")
-        begin = number(line, words[2], "the begin of a contact in s", least=0.0)
-        end = number(line, words[3], "the end of a contact in s")
+        begin = moment(line, words[2], "the begin of a contact in s")
+        end = moment(line, words[3], "the end of a contact in s", least=-LATEST)
         if end < begin:
             raise MeasuredError(f"line {line}: the contact ends at {end:g} s, before it begins at {begin:g} s")
-        if words[0] == words[1]:
-            raise MeasuredError(f"line {line}: {words[0]} meets itself: two nodes are due")
-        told.setdefault((min(words[:2]), max(words[:2])), []).append((begin, end, line))
+        one, other = node(words[0]), node(words[1])
+        if one == other:
+            raise MeasuredError(f"line {line}: {one} meets itself: two nodes are due")
+        told.setdefault((min(one, other), max(one, other)), []).append((begin, end, line))
     events = [event for pair, contacts in told.items() for event in _apart(pair, sorted(contacts))]
     events.sort(key=lambda event: (event.time, event.up))
     return meetings.from_events(events, 0.0)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
-import numpy as np
-
+from affinet.traces.fields import FASTEST, LATEST
 from affinet.traces.link_data import LinkData, Quantity, Steps, steps
-from netem.impairments.measured import Lines, MeasuredError
+from netem.impairments.measured import LONGEST, Lines, MeasuredError, shown
+
+_HEADING = re.compile(r"^(?:\[ *ID\]\s+Interval|Connecting to host |Server listening on )")
+_LOOKED_AT = 20
 
 
 def recognised(lines: Lines) -> bool:
     """Whether it is such a file."""
-    return bool(lines.texts) and lines.texts[0].lstrip().startswith("{") and any("intervals" in t for t in lines.texts)
+    return bool(lines.texts) and (lines.texts[0].lstrip().startswith("{") or _spoken(lines) is not None)
 
 
 def read(lines: Lines) -> LinkData:
@@ -24,9 +27,11 @@ def read(lines: Lines) -> LinkData:
     MeasuredError
         When it is none, or failed.
     """
+    if (line := _spoken(lines)) is not None:
+        raise MeasuredError(f"line {line}: what iperf3 says to people, and rounds: write it by iperf3 --json")
     said = _parsed(lines)
     if "error" in said:
-        raise MeasuredError(f"the test failed: iperf3 says {said['error']!r}: run it again")
+        raise MeasuredError(f"the test failed: iperf3 says {shown(str(said['error']))}: run it again")
     sums, assumed = _intervals(said)
     rate = [(0, begins, 0, 1, _number(one, "bits_per_second", place)) for place, begins, one in sums]
     held = {Quantity.RATE: steps(rate)}
@@ -41,12 +46,11 @@ def read(lines: Lines) -> LinkData:
             "it says nothing of losses: test with UDP (-u), and take the receiver's JSON or --get-server-output"
         )
     assumed.append("the rate is what passed, and no more than what was offered: the link may carry more")
-    connected = said.get("start", {}).get("connected") or [{}]
-    ends = connected[0] if isinstance(connected[0], dict) else {}
+    ends = _first(_table(said.get("start")).get("connected"))
     last = sums[-1]
     return LinkData(
         nodes=(str(ends.get("local_host", "here")), str(ends.get("remote_host", "there"))),
-        ends=last[1] + _number(last[2], "seconds", last[0]),
+        ends=last[1] + _number(last[2], "seconds", last[0], most=LATEST),
         steps=held,
         one_link=True,
         offered=True,
@@ -54,10 +58,18 @@ def read(lines: Lines) -> LinkData:
     )
 
 
+def _spoken(lines: Lines) -> int | None:
+    """The line of a heading that is not of its JSON."""
+    for line, text in zip(lines.numbers[:_LOOKED_AT], lines.texts[:_LOOKED_AT], strict=True):
+        if _HEADING.match(text):
+            return line
+    return None
+
+
 def _parsed(lines: Lines) -> dict[str, Any]:
     try:
         said = json.loads("\n".join(lines.texts))
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: of whole numbers without end, too
         at = min(getattr(error, "lineno", 1), len(lines.numbers) or 1)
         line = lines.numbers[at - 1] if lines.numbers else 1
         raise MeasuredError(
@@ -82,7 +94,7 @@ def _intervals(said: dict[str, Any]) -> tuple[list[tuple[int, float, dict[str, A
         total = one.get("sum") if isinstance(one, dict) else None
         if not isinstance(total, dict):
             raise MeasuredError(f"intervals.{place}: it has no sum: take the JSON as iperf3 wrote it")
-        begins = _number(total, "start", place)
+        begins = _number(total, "start", place, most=LATEST)
         if sums and begins <= sums[-1][1]:
             raise MeasuredError(f"intervals.{place}.sum.start: {begins:g} s comes before the interval before it")
         if not total.get("omitted"):
@@ -95,16 +107,22 @@ def _intervals(said: dict[str, Any]) -> tuple[list[tuple[int, float, dict[str, A
     return [(place, begins - first, total) for place, begins, total in sums], assumed
 
 
+def _table(said: Any) -> dict[str, Any]:
+    return said if isinstance(said, dict) else {}
+
+
+def _first(said: Any) -> dict[str, Any]:
+    return _table(said[0]) if isinstance(said, list) and said else {}
+
+
 def _tells_losses(intervals: Any) -> bool:
-    return isinstance(intervals, list) and any(
-        isinstance(one, dict) and "lost_packets" in (one.get("sum") or {}) for one in intervals
-    )
+    return isinstance(intervals, list) and any("lost_packets" in _table(_table(one).get("sum")) for one in intervals)
 
 
 def _availability(sums: list[tuple[int, float, dict[str, Any]]]) -> Steps:
     rows = []
     for place, begins, total in sums:
-        sent, lost = _number(total, "packets", place), _number(total, "lost_packets", place, least=-np.inf)
+        sent, lost = _number(total, "packets", place), _number(total, "lost_packets", place, least=-FASTEST)
         if lost > sent:
             raise MeasuredError(f"intervals.{place}.sum: {lost:g} packets of {sent:g} are lost: one of them is wrong")
         if sent:  # below 0 where more came late than were lost
@@ -118,20 +136,27 @@ def _round_trips(said: dict[str, Any]) -> Steps | None:
     """Half of the rtt of the first stream, in each interval that counts."""
     rows = []
     for place, one in enumerate(said["intervals"] if isinstance(said.get("intervals"), list) else [], start=1):
-        streams = one.get("streams") if isinstance(one, dict) else None
-        first = streams[0] if isinstance(streams, list) and streams and isinstance(streams[0], dict) else {}
+        first = _first(_table(one).get("streams"))
         if "rtt" in first and not first.get("omitted"):
-            rows.append((0, _number(first, "start", place), 0, 1, _number(first, "rtt", place) / 2e6))
+            rows.append(
+                (
+                    0,
+                    _number(first, "start", place, most=LATEST),
+                    0,
+                    1,
+                    _number(first, "rtt", place, most=1e6 * LONGEST) / 2e6,
+                )
+            )
     if not rows:
         return None
     held = steps(rows)
     return held._replace(time=held.time - held.time[0])
 
 
-def _number(total: dict[str, Any], name: str, place: int, least: float = 0.0) -> float:
+def _number(total: dict[str, Any], name: str, place: int, least: float = 0.0, most: float = FASTEST) -> float:
     value = total.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= float(value) < np.inf:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
         raise MeasuredError(
-            f"intervals.{place}.sum.{name}: a number is due, got {value!r}: take the JSON as it was written"
+            f"intervals.{place}.sum.{name}: a number is due, got {shown(str(value))}: take the JSON as it was written"
         )
     return float(value)

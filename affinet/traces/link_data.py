@@ -76,14 +76,18 @@ class Messages(NamedTuple):
     late
         Those that came after one that was sent later, shape (n,).
     doubled
-        How many came once more.
+        How often each came once more, shape (n,).
     """
 
     time: Array
     lost: Mask
     delay: Array
     late: Mask
-    doubled: int
+    doubled: Integers
+
+    def at(self, rows: Mask) -> Messages:
+        """Some of them."""
+        return Messages(self.time[rows], self.lost[rows], self.delay[rows], self.late[rows], self.doubled[rows])
 
 
 class Waypoints(NamedTuple):
@@ -143,11 +147,55 @@ class LinkData:
     period: float | None = None
     assumed: tuple[str, ...] = ()
 
+    @property
+    def starts(self) -> float:
+        """The first time of which a line of it tells, in seconds."""
+        told = [one.time[one.line > 0] for one in self.steps.values()] + [path.time[:1] for path in self.paths]
+        times = np.concatenate([*told, np.empty(0)])
+        return float(times.min()) if len(times) else 0.0
+
+    def begun(self, at: float) -> LinkData:
+        """The same from a time on, in seconds, which is 0 then: what held at it holds from 0."""
+        if not at:
+            return self
+        if self.period is not None:
+            turned = {what: _turned(one, at, self.period) for what, one in self.steps.items()}
+            return replace(self, steps=turned)
+        messages = self.messages and self.messages.at(self.messages.time >= at)
+        return replace(
+            self,
+            steps={what: _held_from(one, at) for what, one in self.steps.items()},
+            messages=messages and messages._replace(time=messages.time - at),
+            paths=[path._replace(time=path.time - at) for path in self.paths],
+            ends=self.ends - at,
+        )
+
     def sent_every(self, seconds: float) -> LinkData:
         """The same, where a message was sent every so many seconds."""
         steps = {what: one._replace(time=one.time * seconds) for what, one in self.steps.items()}
         messages = self.messages and self.messages._replace(time=self.messages.time * seconds)
         return replace(self, steps=steps, messages=messages, ends=self.ends * seconds, paced=False)
+
+
+def _held_from(given: Steps, at: float) -> Steps:
+    order = np.lexsort((given.time, given.dst, given.src))
+    own = given.at(order)
+    after = own.time[1:] > at
+    last = np.append((own.src[1:] != own.src[:-1]) | (own.dst[1:] != own.dst[:-1]) | after, True)[: len(order)]
+    return own._replace(time=np.maximum(own.time - at, 0.0)).at((own.time >= at) | last)
+
+
+def _turned(given: Steps, at: float, period: float) -> Steps:
+    """Steps of one link over a period, from a time of it on."""
+    own = given._replace(time=(given.time - at) % period)
+    own = own.at(np.argsort(own.time, kind="stable"))
+    if own.time[0] == 0.0:
+        return own
+    whole = own.at(
+        np.append(len(own.time) - 1, np.arange(len(own.time)))
+    )  # what is last in it holds when it begins anew
+    whole.time[0] = 0.0
+    return whole
 
 
 def steps(rows: Sequence[tuple[int, float, int, int, float]]) -> Steps:

@@ -9,6 +9,7 @@ from netem.impairments.measured import Lines, MeasuredError, shown
 
 _BITS = 8 * 1500
 _MS = 1e-3
+_SOON = 1000  # ms
 
 
 def recognised(lines: Lines) -> bool:
@@ -40,6 +41,11 @@ def read(lines: Lines) -> LinkData:
     begins = begins[begins < at[-1]]
     value = np.zeros(len(begins))
     value[np.searchsorted(begins, cell)] = packets * _BITS / _MS
+    assumed = ["it says of one way when 1500 bytes may pass, nothing of losses or delays; at its end it begins anew"]
+    if at[0] > _SOON:
+        assumed.append(
+            f"nothing passes in its first {at[0] * _MS:g} s: if its beginning is missing, take that off all lines"
+        )
     nowhere = np.zeros(len(begins), dtype=np.int64)
     return LinkData(
         nodes=("here", "there"),
@@ -47,7 +53,5 @@ def read(lines: Lines) -> LinkData:
         steps={Quantity.RATE: Steps(nowhere, begins * _MS, nowhere, nowhere + 1, value)},
         one_link=True,
         period=float(at[-1]) * _MS,
-        assumed=(
-            "it says of one way when 1500 bytes may pass, nothing of losses or delays; at its end it begins anew",
-        ),
+        assumed=tuple(assumed),
     )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from affinet.traces.fields import MOST_NODES
 from affinet.traces.link_data import LinkData, Quantity, Steps, steps
 from netem.impairments.measured import MeasuredError
 
@@ -60,6 +61,8 @@ def from_events(events: Sequence[Meeting], ends: float, assumed: Sequence[str] =
             )
         up[pair], before = event.up, event.time
         one, other = (nodes.setdefault(name, len(nodes)) for name in (event.one, event.other))
+        if len(nodes) > MOST_NODES:
+            raise MeasuredError(f"line {event.line}: more than {MOST_NODES} nodes: leave out those that are no agents")
         rows += [(event.line, event.time, src, dst, float(event.up)) for src, dst in ((one, other), (other, one))]
     held = down_at_first(steps(rows), len(nodes))
     return LinkData(

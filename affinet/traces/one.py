@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 
 from affinet.traces import meetings
-from affinet.traces.fields import number
+from affinet.traces.fields import moment
 from affinet.traces.link_data import LinkData
 from affinet.traces.meetings import Meeting
 from netem.impairments.measured import Lines, MeasuredError, shown
 
 _OF_MESSAGES = ("C", "S", "DE", "A", "DR", "R")
-_HOST = re.compile(r"\D*(\d+)")
+_HOST = re.compile(r"\D*(\d{1,18})")
 
 
 def recognised(lines: Lines) -> bool:
@@ -30,7 +30,7 @@ def read(lines: Lines) -> LinkData:
     events, skipped, ends = [], 0, 0.0
     for line, text in zip(*lines, strict=True):
         words = text.split()
-        ends = max(ends, number(line, words[0], "a time in s", least=0.0))
+        ends = max(ends, moment(line, words[0]))
         action = words[1] if len(words) > 1 else ""
         if action in _OF_MESSAGES:
             skipped += 1

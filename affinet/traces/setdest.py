@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from affinet.traces.fields import number
+from affinet.traces.fields import LATEST, MOST_NODES, moment, number
 from affinet.traces.link_data import LinkData, Waypoints
 from analysis.models.arrays import Array
 from netem.impairments.measured import Lines, MeasuredError, shown
 
-_SET = re.compile(r"\$node_\((\d+)\)\s+set\s+([XYZ])_\s+(\S+)\s*")
-_AT = re.compile(r'\$ns_?\s+at\s+(\S+)\s+"\$node_\((\d+)\)\s+(setdest|set)\s+(.*?)\s*"\s*')
+_SET = re.compile(r"\$node_\((\d{1,18})\)\s+set\s+([XYZ])_\s+(\S+)\s*")
+_AT = re.compile(r'\$ns_?\s+at\s+(\S+)\s+"\$node_\((\d{1,18})\)\s+(setdest|set)(\s[^"]*)"\s*')
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _OTHER = ("$god_", "set ", "$ns_ initial", "$topo", "puts ")
 
@@ -59,6 +59,10 @@ def read(lines: Lines) -> LinkData:
             raise MeasuredError(f"line {own[0].line}: node {node} moves and has no place at first: set its X_ and Y_")
     if not start:
         raise MeasuredError("line 1: no node in it: $node_(N) set X_ ... says where one is")
+    if len(start) > MOST_NODES:
+        raise MeasuredError(
+            f"it has {len(start)} nodes, and at most {MOST_NODES} are read: leave out those that are none"
+        )
     for node, position in start.items():
         if np.isnan(position[:2]).any():
             raise MeasuredError(f"node {node} has no {'X_' if np.isnan(position[0]) else 'Y_'} at first: set it")
@@ -76,10 +80,10 @@ def read(lines: Lines) -> LinkData:
 def _leg(line: int, time: str, said: str) -> _Leg:
     words = said.split()
     if len(words) != 3:
-        raise MeasuredError(f"line {line}: setdest takes X, Y and a speed, got {shown(said)}")
+        raise MeasuredError(f"line {line}: setdest takes X, Y and a speed, got {shown(said.strip())}")
     x, y = (number(line, word, f"{axis} in m") for word, axis in zip(words, "XY", strict=False))
     speed = number(line, words[2], "a speed in m/s", least=0.0)
-    return _Leg(line, number(line, time, "a time in s", least=0.0), np.array([x, y]), speed)
+    return _Leg(line, moment(line, time), np.array([x, y]), speed)
 
 
 def _way(start: Array, legs: list[_Leg]) -> Waypoints:
@@ -96,6 +100,10 @@ def _way(start: Array, legs: list[_Leg]) -> Waypoints:
         lasts = far / leg.speed
         share = 1.0 if following is None else min(1.0, (following.time - leg.time) / lasts)
         here = here + share * ahead
+        if leg.time + share * lasts > LATEST:
+            raise MeasuredError(
+                f"line {leg.line}: at {leg.speed:g} m/s the way takes {lasts:.3g} s: give a higher speed"
+            )
         times.append(leg.time + share * lasts)
         places.append(here)
     return Waypoints(np.array(times), np.array(places))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from affinet.traces import runs
 from affinet.traces.link_data import INDIRECT, LinkData, Messages, Quantity, Steps
 from analysis.models.arrays import Array, Mask
+
+MOST_STEPS = 1_000_000  # of messages or of time, on all links, to which a chain is fitted
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,13 @@ def summaries(data: LinkData) -> list[LinkSummary]:
     """Every link of the data, in the order of its names; of messages, their only one."""
     if data.messages is not None:
         return [_of_messages(f"{data.nodes[0]}->{data.nodes[1]}", data.messages)]
-    return [_of_steps(data, src, dst) for src, dst in _pairs(data)]
+    by_link = {what: _by_link(one) for what, one in data.steps.items()}
+    pairs = sorted({pair for links in by_link.values() for pair in links})
+    return [
+        _of_steps(f"{data.nodes[pair[0]]}->{data.nodes[pair[1]]}", data.ends, own)
+        for pair in pairs
+        if (own := {what: links[pair] for what, links in by_link.items() if pair in links})
+    ]
 
 
 def sequences(data: LinkData, step: float | None) -> list[Mask]:
@@ -75,9 +84,11 @@ def sequences(data: LinkData, step: float | None) -> list[Mask]:
     Raises
     ------
     ValueError
-        When it does not say what was lost, or there is no step.
+        When it does not say what was lost, there is no step, or there are too many.
     """
     if data.messages is not None:
+        if (messages := len(data.messages.lost)) > MOST_STEPS:
+            raise ValueError(f"{messages} messages, and a chain is fitted to at most {MOST_STEPS}: cut it into parts")
         return [data.messages.lost]
     if Quantity.AVAILABILITY not in data.steps:
         raise ValueError("it says nothing of losses: there is nothing to fit a chain to")
@@ -89,20 +100,34 @@ def sequences(data: LinkData, step: float | None) -> list[Mask]:
         )
     if step is None:
         raise ValueError("it says when links are up: give the step of the chain by --dt, in seconds")
+    links = _by_link(availability)
+    if (count := data.ends / step * len(links)) > MOST_STEPS:
+        raise ValueError(
+            f"{count:.3g} steps of {step:g} s on {len(links)} links up to {data.ends:.10g} s, and a chain is fitted to at "
+            f"most {MOST_STEPS}: give a larger --dt, or --begins where it does not begin at 0"
+        )
     time: Array = np.arange(0.0, data.ends - step / 2.0, step)
     if len(time) < 2:
         raise ValueError(f"it ends at {data.ends:g} s: give a --dt that is much less")
     found: dict[tuple[int, int], Mask] = {}
-    for src, dst in _pairs(data):
-        down = _held_at(_of_link(availability, src, dst), time) == 0.0
+    for (src, dst), own in links.items():
+        down = _held_at(own, time) == 0.0
         if (dst, src) not in found or (found[dst, src] != down).any():
             found[src, dst] = down
     return list(found.values())
 
 
-def _pairs(data: LinkData) -> Sequence[tuple[int, int]]:
-    told = {pair for one in data.steps.values() for pair in zip(one.src.tolist(), one.dst.tolist(), strict=True)}
-    return sorted(told)
+def _by_link(given: Steps) -> Mapping[tuple[int, int], Steps]:
+    """The steps of each link, in the order of time; sorted once, as there may be many links."""
+    order = np.lexsort((given.time, given.dst, given.src))
+    held = given.at(order)
+    turns = np.flatnonzero((np.diff(held.src) != 0) | (np.diff(held.dst) != 0)) + 1
+    edges = [0, *turns.tolist(), len(order)]
+    return {
+        (int(held.src[begin]), int(held.dst[begin])): held.at(np.arange(begin, end))
+        for begin, end in pairwise(edges)
+        if begin < end
+    }
 
 
 def _of_messages(link: str, said: Messages) -> LinkSummary:
@@ -114,30 +139,23 @@ def _of_messages(link: str, said: Messages) -> LinkSummary:
         outages=_outages(bursts.astype(np.float64)),
         delays_s=_delays(said.delay[~said.lost]),
         reordered=float(said.late.sum() / arrived),
-        doubled=said.doubled / arrived,
+        doubled=float(said.doubled.sum() / arrived),
     )
 
 
-def _of_steps(data: LinkData, src: int, dst: int) -> LinkSummary:
-    own = {what: _of_link(one, src, dst) for what, one in data.steps.items()}
-    own = {what: one for what, one in own.items() if len(one.time)}
+def _of_steps(link: str, ends: float, own: Mapping[Quantity, Steps]) -> LinkSummary:
     loss = outages = delays = rate = measured = None
     if (worth := own.get(Quantity.AVAILABILITY)) is not None:
-        loss, outages = 1.0 - _mean(worth, data.ends), _outages(_down(worth, data.ends))
+        loss, outages = 1.0 - _mean(worth, ends), _outages(_down(worth, ends))
     if (late := own.get(Quantity.DELAY)) is not None:
         delays = _delays(late.value)
     if (passing := own.get(Quantity.RATE)) is not None:
-        rate = _mean(passing, data.ends)
+        rate = _mean(passing, ends)
     for what in INDIRECT:
         if what in own:
             value = own[what].value
-            measured = (float(value.min()), _mean(own[what], data.ends), float(value.max()))
-    return LinkSummary(f"{data.nodes[src]}->{data.nodes[dst]}", loss, outages, delays, rate, measured=measured)
-
-
-def _of_link(given: Steps, src: int, dst: int) -> Steps:
-    own = given.at((given.src == src) & (given.dst == dst))
-    return own.at(np.argsort(own.time, kind="stable"))
+            measured = (float(value.min()), _mean(own[what], ends), float(value.max()))
+    return LinkSummary(link, loss, outages, delays, rate, measured=measured)
 
 
 def _lasts(given: Steps, ends: float) -> Array:

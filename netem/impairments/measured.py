@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +14,8 @@ from analysis.models.arrays import Array
 
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _SHOWN = 60
+LARGEST = 200_000_000  # bytes of a file
+LONGEST = 86400.0  # s: a delay of more than a day is a mistake
 
 
 class MeasuredError(ValueError):
@@ -36,11 +39,11 @@ def read(file: Path) -> Lines:
     Raises
     ------
     MeasuredError
-        When it is no text.
+        When it is no text, or has no end.
     OSError
         When it cannot be read.
     """
-    every = _decoded(file.read_bytes()).splitlines()
+    every = _decoded(_content(file)).splitlines()
     numbers = [number for number, text in enumerate(every, start=1) if text.strip() and text.lstrip()[0] != "#"]
     return Lines(numbers, [every[number - 1] for number in numbers])
 
@@ -70,6 +73,30 @@ def shown(text: str) -> str:
     return repr(text if len(text) <= _SHOWN else f"{text[:_SHOWN]}...")
 
 
+def refuse_endless(file: Path) -> None:
+    """Go on if it is no device and no pipe; of a directory, opening it says what it is.
+
+    Raises
+    ------
+    MeasuredError
+        If it is one.
+    OSError
+        When there is no such file.
+    """
+    mode = file.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise MeasuredError("no regular file but a device or a pipe, which may have no end: write it to a file first")
+
+
+def _content(file: Path) -> bytes:
+    refuse_endless(file)
+    with file.open("rb") as opened:
+        content = opened.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise MeasuredError(f"it is larger than {LARGEST / 1e6:g} MB, and no more is read: cut it into parts")
+    return content
+
+
 def _delay(line: int, text: str) -> float:
     seconds = _number(text)
     if seconds is None and ("time=" in text or text.startswith("PING ")):
@@ -79,6 +106,8 @@ def _delay(line: int, text: str) -> float:
         )
     if seconds is None or not 0.0 <= seconds < np.inf:
         raise MeasuredError(f"line {line}: one delay in seconds is due, at least 0, like 0.012; got {shown(text)}")
+    if seconds > LONGEST:
+        raise MeasuredError(f"line {line}: {seconds:g} s are more than a day: one delay in seconds is due, like 0.012")
     return seconds
 
 

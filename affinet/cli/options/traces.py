@@ -25,6 +25,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--interval", type=values.positive, metavar="S", help="of a ping without times (default: 1 s, and it is said)"
     )
     trace.add_argument(
+        "--begins",
+        type=values.moment,
+        metavar="S",
+        help="time of the file that is 0: of a clock on the wall (default: 0)",
+    )
+    trace.add_argument(
         "--curve", metavar="TOML", help="what passes at a distance, signal or pathloss: [[-90,0],[-70,1]]"
     )
     trace.add_argument(

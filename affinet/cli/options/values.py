@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from affinet.scenario import programs
-from affinet.scenario.bounds import LARGEST, MOST, SMALLEST
+from affinet.scenario.bounds import LARGEST, LATEST, MOST, SMALLEST
 
 DRAWN = (".png", ".pdf", ".svg")
 
@@ -46,6 +46,7 @@ def between(low: float, high: float) -> Callable[[str], float]:
 
 
 positive = between(SMALLEST, LARGEST)
+moment = between(SMALLEST, LATEST)
 
 
 def seed(text: str) -> int:

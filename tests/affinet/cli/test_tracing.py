@@ -143,6 +143,19 @@ def test_what_is_wrong_is_one_line(text, given, says, tmp_path, capsys):
     assert says in line
 
 
+def test_a_fit_to_too_little_says_so(told, tmp_path):
+    (tmp_path / "three.txt").write_text(
+        "PING b (10.0.0.2) 56(84) bytes of data.\n64 bytes from b: icmp_seq=1 ttl=64 time=4.0 ms\n"
+        "64 bytes from b: icmp_seq=3 ttl=64 time=4.0 ms\n\n3 packets transmitted, 2 received\n"
+    )
+    said = json.loads(told(tmp_path / "three.txt", "--fit", "gilbert", "--json"))["fit"]
+    assert (said["steps"], said["bursts"], said["too_little"]) == (3, 1, True)
+    shown = told(tmp_path / "three.txt", "--fit", "gilbert", "--profile", tmp_path / "three.toml")
+    assert "note: too little to fit a chain to, 1 burst of losses in 3 steps" in shown
+    assert "nothing speaks against" not in shown
+    assert "too little to fit a chain to" in (tmp_path / "three.toml").read_text().splitlines()[0]
+
+
 def test_no_file(tmp_path, capsys):
     assert commands.main(["trace", str(tmp_path / "none.txt")]) == 2
     assert "none.txt': No such file or directory" in capsys.readouterr().err

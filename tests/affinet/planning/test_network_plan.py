@@ -155,7 +155,7 @@ HEADER = "time,src,dst,availability\n"
     ("text", "expected"),
     [
         ("time,src\n", "line 1: the columns must be"),
-        (HEADER, "must begin at time 0"),
+        (HEADER, "line 1: a heading and no row below it"),
         (HEADER + "0,1,2,0.5\n", "no availability at time 0 for"),
         (HEADER + "0,1,7,0.5\n", "1->7 is not a link"),
         (HEADER + "0,1,2,1.5\n", "line 2: time must be at least 0 s, and availability lie in [0, 1]"),

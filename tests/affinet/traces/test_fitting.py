@@ -1,5 +1,7 @@
 """Chains fitted to sequences: planted ones are found within their intervals, and what no chain made is refused."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,30 @@ def test_what_tells_too_little_is_refused_with_what_is_known(lost, says):
         fitting.fitted("gilbert", [lost])
 
 
+@pytest.mark.parametrize("model", fitting.MODELS)
+@pytest.mark.parametrize(
+    ("lost", "bursts"),
+    [([False, True, False], 1), ([True, False, True, False], 2), ([False] * 9 + [True, False] * 9, 9)],
+)
+def test_of_a_few_messages_little_is_known_and_the_fit_says_so(model, lost, bursts):
+    fit = fitting.fitted(model, [np.array(lost)])
+    assert (fit.messages, fit.bursts, fit.few) == (len(lost), bursts, True)
+    assert all(one.low <= one.value <= one.high for one in fit.parameters.values())
+    if bursts == 1:
+        assert all(one.high - one.low > 0.6 for one in fit.parameters.values())
+    assert not fitting.fitted(model, [np.tile(np.array([False, False, True]), 10)]).few
+
+
+def test_intervals_of_short_sequences_cover_the_truth_although_most_are_not_fitted():
+    """Before: in 90 % of sequences of 10 messages, as those in which nothing was seen are refused."""
+    each = []
+    for one in planted(GILBERT, 10, 1500):
+        with suppress(NotFitted):
+            each.append(covered(fitting.fitted("gilbert", [one]), {"p": 0.03, "r": 0.3}))
+    assert len(each) > 150
+    assert (np.mean(each, axis=0) > 0.94).all()
+
+
 def test_a_chain_in_finer_steps_has_the_same_loss_and_lasts_as_long():
     (lost,) = planted(GILBERT, 2000, 1)
     fit = fitting.fitted("gilbert", [lost])
@@ -133,7 +159,7 @@ def test_a_chain_in_finer_steps_has_the_same_loss_and_lasts_as_long():
     np.testing.assert_allclose(coarse, fit.chain.transition, atol=1e-12)
     assert (p, r) < tuple(fit.parameters[name].value for name in "pr")
     with pytest.raises(NotFitted, match="a chain of four states is of the steps it was fitted in"):
-        fitting.in_steps_of(fitting.Fit("markov", {}, 0.0, 0.0, MARKOV), 0.1)
+        fitting.in_steps_of(fitting.Fit("markov", {}, 100, 9, 0.0, 0.0, MARKOV), 0.1)
     flipping = np.arange(100) % 2 == 0
     with pytest.raises(NotFitted, match="too closely for any other step"):
         fitting.in_steps_of(fitting.fitted("gilbert", [flipping]), 0.1)

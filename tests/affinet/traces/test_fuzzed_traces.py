@@ -20,7 +20,8 @@ RIGHT = {
     "contacts": "2.0 1 2 up\n5.0 1 2 down\n",
     "intervals": "1 2 2 4 1 0\n2 1 3 5 1 0\n",
     "emane": "-10 nem:1 pathloss nem:2,90.5 nem:3,110,112\n0 nem:1 location gps 1,2\n",
-    "setdest": '$node_(0) set X_ 0.0\n$node_(0) set Y_ 0\n$ns_ at 1.0 "$node_(0) setdest 30.0 40.0 10.0"\n',
+    "setdest": "$node_(1) set X_ 9\n$node_(1) set Y_ 9\n$node_(0) set X_ 0.0\n$node_(0) set Y_ 0\n"
+    '$ns_ at 1.0 "$node_(0) setdest 30.0 40.0 10.0"\n',
     "bonnmotion": "0 0 0 10 100 0\n0 5 5\n",
 }
 

@@ -48,7 +48,7 @@ def test_ping(read):
     assert said.time.tolist() == list(range(8))
     np.testing.assert_allclose(said.delay[~said.lost], [0.005, 0.015, 0.007, 0.004, 0.006], atol=1e-12)
     assert said.late.tolist() == [False, True, False, False, False, False, False, False]
-    assert said.doubled == 1
+    assert said.doubled.tolist() == [0, 0, 0, 0, 1, 0, 0, 0]
     assert "half" in data.assumed[0]
     assert data.sent_every(0.2).messages.time.tolist() == pytest.approx([0.2 * n for n in range(8)])
     assert data.sent_every(0.2).ends == pytest.approx(1.6)
@@ -230,6 +230,9 @@ WRONG = {
         (HEADER + answer(1, 1.0) + answer(2, 1.0) + "1 packets transmitted, 1 received\n", "line 4: 1 packets were"),
         (HEADER + answer(1, 1.0, "[5.0] ") + answer(2, 1.0), "line 3: only some answers have a time .* use ping -D"),
         (HEADER + answer(1, 1.0, "[5.0] ") + answer(2, 1.0, "[4.0] "), "line 3: the times in brackets do not go up"),
+        (HEADER + answer(1, 1e300), "line 2: a round trip in ms is due, at most 8.64e.07; got '1e.300'"),
+        (HEADER + answer(1, -1.0), "line 2: a number is due for a round trip in ms, at least 0; got '-1.0'"),
+        (HEADER + answer(1, "nan"), "line 2: a number is due for a round trip in ms, at least 0; got 'nan'"),
     ],
     "iperf3": [
         ('{"intervals": [\n{"sum": }]}', "line 2: no JSON: .*; write it by iperf3 --json"),
@@ -241,6 +244,10 @@ WRONG = {
         (udp((1e6, 10, 0, True)), "all its intervals are omitted"),
         (json.dumps({"intervals": [{"streams": []}]}), "intervals.1: it has no sum"),
         (udp((1e6, 0, 0, False)), "no packet was sent in any interval"),
+        (udp((1e300, 1, 0, False)), "intervals.1.sum.bits_per_second: a number is due, got '1e.300'"),
+        (udp((10**400, 1, 0, False)), "intervals.1.sum.bits_per_second: a number is due, got '1000"),
+        ('{"intervals": [' + "1" * 5000 + "]}", "line 1: no JSON: .*; write it by iperf3 --json"),
+        (udp((float("nan"), 1, 0, False)), "intervals.1.sum.bits_per_second: a number is due, got 'nan'"),
     ],
     "mahimahi": [
         ("1\n2.5\n", "line 2: a whole number of milliseconds is due, got '2.5'"),
@@ -258,6 +265,8 @@ WRONG = {
         ("1 CONN 1 2 down\n", "line 1: 1 and 2 go down and were not up: a line is missing"),
         ("1 CONN a1b 2 up\n", "line 1: a host is a number, with letters before it at most"),
         ("1 C M1 1 2 5\n", "nobody ever meets in it"),
+        ("1e300 CONN 1 2 up\n", "line 1: a time in s is due, at most 1e.11; got '1e300': is its unit another"),
+        ("1 CONN " + "1" * 5000 + " 2 up\n", "line 1: a host is a number"),
     ],
     "contacts": [
         ("1 1 2 open\n", "line 1: 'time one other up', or down, is due"),
@@ -266,6 +275,9 @@ WRONG = {
         ("1 2 2 up\n", "line 1: 2 meets itself: two nodes are due"),
         ("1 1 2 up\n2 2 1 up\n", "line 2: 1 and 2 go up and were up already"),
         ("time one other state\n", "nobody ever meets in it"),
+        ("1700000000000 1 2 up\n", "line 1: a time in s is due, at most 1e.11; got '1700000000000': is its unit another"),
+        ("1 1 01 up\n", "line 1: 1 meets itself"),
+        ("".join(f"{n} 0 {n} up\n" for n in range(1, 2000)), "line 1000: more than 1000 nodes: leave out those that"),
     ],
     "intervals": [
         ("1 2 3\n", "line 1: 'one other begin end' is due"),
@@ -274,6 +286,8 @@ WRONG = {
         ("1 2 0 4\n1 2 5 4\n", "line 2: the contact ends at 4 s, before it begins at 5 s"),
         ("1 1 0 4\n", "line 1: 1 meets itself"),
         ("1 2 3 3\n", "nobody ever meets in it"),
+        ("1 2 3 1e300\n", "line 1: the end of a contact in s is due, at most 1e.11"),
+        ("1 1.0 0 4\n", "line 1: 1 meets itself"),
     ],
     "emane": [
         ("0 nem:1\n", "line 1: 'TIME nem:N pathloss nem:M,dB' is due"),
@@ -284,6 +298,8 @@ WRONG = {
         ("0 nem:1 pathloss nem:2,90\n0 nem:2 pathloss nem:1,91\n", "line 2: .* has two values at 0 s"),
         ("0 nem:1 location gps 1,2,3\n", "no event of pathloss in it"),
         ("0 nem:1 pathloss\n", "line 1: nobody is told the pathloss of nem:1"),
+        ("0 nem:1 pathloss nem:2,1e300\n", "line 1: a pathloss in dB is due, at most 1000"),
+        ("0 nem:" + "1" * 5000 + " pathloss nem:2,9\n", "line 1: an NEM is due"),
     ],
     "setdest": [
         ('$ns_ at 1.0 "$node_(0) setdest 1 2 3"\n', "line 1: node 0 moves and has no place at first"),
@@ -293,6 +309,10 @@ WRONG = {
         (SETDEST + '$ns_ at 4 "$node_(0) set X_ 3"\n', "line 10: a node that jumps"),
         (without(SETDEST, "$node_(1) set Y_ 40.0\n"), "node 1 has no Y_ at first: set it"),
         ("$node_(0) set X_ here\n", "line 1: a number is due for X_ in m"),
+        ("$node_(0) set X_ 1e300\n", "line 1: X_ in m is due, at most 1e.09"),
+        (SETDEST + '$ns_ at 9 "$node_(0) setdest 1 2 1e-300"\n', "line 10: at 1e-300 m/s the way takes .* give a higher speed"),
+        (SETDEST + '$ns_ at 4 "$node_(0) setdest ' + " " * 200_000 + "\n", "line 10: .* is due, got"),
+        ("$node_(0) set X_ 1\n$node_(0) set Y_ 1\n", "line 1: one node in it, and no link"),
     ],
     "bonnmotion": [
         ("0 0 0\n0 0\n", r"line 2: 2 numbers are no whole triples \(t x y\), nor t x y z"),
@@ -300,6 +320,10 @@ WRONG = {
         ("5 0 0 4 0 0\n", "line 1: its times do not go up"),
         ("0 0 0\n0 0 0 0\n", "some lines are t x y and others t x y z: make them alike"),
         ("0 0 inf\n", "line 1: only numbers are due"),
+        ("0 0 1e300\n0 0 0\n", "line 1: a place 1e.300 m away: at most 1e.09 m"),
+        ("0 0 0\n1e300 0 0\n", "line 2: a time of 1e.300 s: at most 1e.11 s"),
+        ("0 0 0\n" * 2000, "line 1001: more than 1000 nodes: leave out"),
+        ("0 0 0 1 5 5\n", "line 1: one node in it, and no link: give the ways of two"),
         ("", "line 1: no node in it"),
     ],
     "table": [
@@ -310,6 +334,18 @@ WRONG = {
         ("time,src,dst,pathloss\n0,1,2,nan\n", "line 2: .* pathloss a number, in dB"),
         ("time,src,dst,rssi\n0,1,2,-60\n0,1,2,-70\n", "line 3: 1->2 has two values at 0 s"),
         ("time,src,dst\n0,1,2\n", "line 1: the columns must be"),
+        ("time,src,dst,delay\n0,1,2,1e300\n", "line 2: delay is 1e.300 s: at most 86400 s; is its unit another"),
+        ("time,src,dst,delay,rate\n0,1,2,nan,1\n", "line 2: .* delay at least 0 s"),
+        ("time,src,dst,delay,rate\n0,1,2,,1\n0,2,1,nan,1\n", "line 3: .* delay at least 0 s"),
+        ("time,src,dst,delay,rate\n0,1,2,-1,1\n", "line 2: .* delay at least 0 s"),
+        ("time,src,dst,rate\n0,1,2,1e300\n", "line 2: rate is 1e.300 bit/s: at most 1e.15 bit/s"),
+        ("time,src,dst,rssi\n0,1,2,-1e300\n", "line 2: rssi is -1e.300 dBm: at most 1000 dBm"),
+        ("time,src,dst,distance\n0,1,2,1e300\n", "line 2: distance is 1e.300 m: at most 1e.09 m"),
+        ("time,src,dst,delay\n1e300,1,2,1\n", "line 2: time is 1e.300 s: at most 1e.11 s"),
+        ("time,src,dst,delay\n0,1,1,1\n", "line 2: 1->1 is not a link: two nodes are due"),
+        ("time,src,dst,delay\n0,b,a,1\n0,a,a,1\n", "line 3: a->a is not a link"),
+        ("# mine\ntime,src,dst,delay\n\n", "line 2: a heading and no row below it"),
+        ("time,src,dst,delay,rate\n0,1,2,,\n0,2,1,,\n", "line 2: no value of delay, rate here or below"),
     ],
 }  # fmt: skip
 
@@ -328,12 +364,85 @@ def test_every_format_has_at_least_five_malformed_files():
 
 
 def test_a_file_of_two_formats_wants_to_be_told(read):
-    text = "1 2 3 4\n2 3 5 6\n"
-    with pytest.raises(MeasuredError, match="it could be of format intervals or bonnmotion: say which, as its format"):
+    text = "1 2 3 4\n1 3 5 6\n"
+    with pytest.raises(MeasuredError, match=r"it could be of format intervals or bonnmotion: say which, by --format"):
         read(text)
     assert read(text, "intervals")[1].nodes == ("1", "2", "3")
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("1 2 5 4\n2 3 9 8\n", "line 1: the contact ends at 4 s, before it begins at 5 s"),
+        ("1 2 0 4\n3 4 5 4\n", "line 2: the contact ends at 4 s, before it begins at 5 s"),
+        (
+            "1 2 0 4\n1 2 5 4\n",
+            "of format intervals or bonnmotion: .*as intervals it is wrong in line 2: the contact ends",
+        ),
+        ("1 2 5 4 0 0\n", "of format intervals or bonnmotion: .*as intervals it is wrong in line 1: the contact ends"),
+        ("1 2 5 4 0\n", "line 1: the contact ends"),
+        ("1 1 0 4 0\n1 2 0 4 0\n", "line 1: 1 meets itself"),
+        ("0,1,2,0.9\n0.05,1,2,0.5\n", "line 1: the columns must be time,src,dst"),  # a table without its heading
+        ("0 1 2 0.9\n0.05 1 2 0.5\n", "line 1: of no format that is known: '0 1 2 0.9'"),
+        ("1 1 2 up\n2 1 2 open\n", "line 2: 'time one other up', or down, is due"),
+        ("1 2 up\n1 1 2 up\n", "line 1: 'time one other up', or down, is due"),
+        ("1\n2\nx\n", "line 1: of no format that is known: '1'; say which"),
+        ("0 0 0 1 5 5\n0 0 0 1 x 5\n", "line 1: of no format that is known"),
+    ],
+)
+def test_a_format_is_not_guessed_from_lines_that_contradict_another(text, says, read):
+    """Before: contacts of which one ends before it begins, and tables without a heading, were movements."""
+    with pytest.raises(MeasuredError, match=says):
+        read(text)
+
+
 def test_a_file_of_no_format_says_what_a_table_is(read):
     with pytest.raises(MeasuredError, match="line 1: the columns must be time,src,dst and one or more of"):
+        read("hello, world\n")
+    with pytest.raises(
+        MeasuredError, match=r"line 1: of no format that is known: 'hello'; say which, as its format.*ping"
+    ):
         read("hello\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "says"),
+    [
+        (
+            json.dumps({"start": {}, "error": "unable to connect"}),
+            "iperf3",
+            "iperf3 says 'unable to connect': run it again",
+        ),
+        (json.dumps({"error": "interrupt - the server has terminated", "intervals": []}), "iperf3", "the test failed"),
+        ("Connecting to host b, port 5201\n[ ID] Interval\n", "iperf3", "line 1: .* write it by iperf3 --json"),
+        ("[ ID] Interval           Transfer     Bitrate\n", "iperf3", "line 1: .* write it by iperf3 --json"),
+        ("64 Bytes von b: icmp_seq=1 ttl=64 Zeit=0.03 ms\n", "ping", "line 1: .* LC_ALL=C ping"),
+        (HEADER + "64 octets de b : icmp_seq=1 ttl=64 temps=0.03 ms\n", "ping", "line 2: .* LC_ALL=C ping"),
+        (HEADER + "64 bytes desde b: icmp_seq=1 ttl=64 tiempo=0.03 ms\n", "ping", "line 2: .* LC_ALL=C ping"),
+        ("64 bytes from b: icmp_seq=1 ttl=64 Zeit=0.03 ms\n", "ping", "line 1: .* LC_ALL=C ping"),
+        ("64 字节，来自 b: icmp_seq=1 ttl=64 时间=0.030 毫秒\n", "ping", "line 1: .* LC_ALL=C ping"),
+        (
+            "Ping für b mit 32 Bytes:\nAntwort von b: Bytes=32 Zeit=12ms TTL=64\n",
+            "ping",
+            "line 2: .* log it in English",
+        ),
+    ],
+)
+def test_what_a_tool_says_otherwise_is_known_and_the_way_out_is_its_own(text, name, says, read):
+    """Before: all of them were bad tables."""
+    for told in (None, name):
+        with pytest.raises(MeasuredError, match=says) as caught:
+            read(text, told)
+        assert "columns" not in str(caught.value)
+
+
+def test_a_column_without_a_value_says_nothing(read):
+    _, data = read("time,src,dst,availability,delay\n0,1,2,1,\n0,2,1,0.5,\n")
+    assert data.steps.keys() == {AVAILABILITY}
+    assert data.assumed == ("it has a column of delay and no value in it: it says nothing of that",)
+
+
+def test_large_numbers_of_nodes_are_told_apart(read):
+    """Before: 1234567 and 1234568 were both 1.23457e+06."""
+    for rows in ("0,1234567,1234568,1\n", "0,1234567,1234568,1\n0,a,b,1\n"):
+        assert read(f"time,src,dst,availability\n{rows}")[1].nodes[:2] == ("1234567", "1234568")
