@@ -28,7 +28,7 @@ DOCS = Path(__file__).parent
 KEPT, PAGE, PICTURE = DOCS / "built-in.json", DOCS / "built-in.md", DOCS / "pictures" / "break-down.png"
 CARD = "edges"
 # From no estimator to the most elaborate.
-_ORDER = ["none", "rkf", "imm", "ral", "conral", "ga-rkf"]
+_ORDER = ["none", "rkf", "imm", "ral", "conral", "ga-rkf", "edge-kf", "joint-kf", "silent-kf"]
 # Of the scores taken in; tests/project/test_built_in.py holds each sentence against them.
 _ANSWER = (
     "`ga-rkf`, for nearly all: it is among the best more often than any other, and nobody beats it in bursts, blackouts, "
@@ -43,7 +43,7 @@ _ANSWER = (
     "Nobody's covariances tell the truth under all of this: those of `ga-rkf` are too small in a third of the airs, those of "
     "`conral` in more than half.",
 )
-_COLOURS = ("C7", "C1", "C4", "C2", "C0", "C3", "C5", "C6")
+_COLOURS = ("C7", "C1", "C4", "C2", "C0", "C3", "C5", "C6", "C8")
 
 
 def take_in(score: Path) -> None:
@@ -115,8 +115,10 @@ def _page(kept: Mapping[str, Any], card: cards.Scorecard) -> Lines:
     yield from titled(
         "Which estimator, and when?",
         filled(
-            f"The estimators of paper 000 that come with affinet, scored against each other: {len(card.tasks)} tasks, "
-            f"{len(card.airs)} airs, {kept['seeds']} runs of each, the same draws for all ([score](score.md)). "
+            "The estimators of relative positions that come with affinet, those of paper 000 and the filters of edges of "
+            f"papers 001 and 004, scored against each other: {len(card.tasks)} tasks, {len(card.airs)} airs, "
+            f"{kept['seeds']} runs of each, the same draws for all ([score](score.md)). Filters of edges predict by velocities, "
+            "and fly single integrators; `crkf`, which hears everybody past the air, is not among them. "
             f"Who is among the best is nowhere beaten by more than a factor of {MATTERS:g}, as far as {CONFIDENCE:.0%} "
             "confidence for all comparisons at once can tell. Ticks are 0.05 s long. `docs/score_page.py` writes this page "
             "from `docs/built-in.json`, which it takes from a score."
@@ -202,7 +204,7 @@ def _draw(kept: Mapping[str, Any]) -> None:
     """A panel for each task and what is made worse, a row for each estimator."""
     card, who = cards.load(CARD), _entrants(kept)
     mpl.rcParams.update({"font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
-    figure = Figure(figsize=(10.0, 1.0 + 1.5 * len(card.tasks)), layout="constrained", dpi=160)
+    figure = Figure(figsize=(10.0, 1.0 + 0.2 * len(who) * len(card.tasks)), layout="constrained", dpi=160)
     panels = figure.subplots(len(card.tasks), len(card.worsenings), squeeze=False, sharey=True)
     for row, task in enumerate(card.tasks):
         for column, worse in enumerate(card.worsenings):

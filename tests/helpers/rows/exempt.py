@@ -111,7 +111,7 @@ EXEMPT = {
         world.books.realised.GraphWatch.follow world.books.realised.realise world.recording.stage.Stage.points
         world.recording.stage.Stage.scalars world.recording.stage.Stage.arrows world.recording.stage.Stage.segments
         world.recording.curves.EachAgent.log world.books.counted.per_tick world.formation.nominal.Formation.ends
-        analysis.figures.axes.finish analysis.figures.swarm.film
+        analysis.figures.axes.finish analysis.figures.swarm.film analysis.figures.frontier.frontier
         analysis.claims.checks.flat analysis.claims.paired.ratio analysis.claims.paired.median
         analysis.claims.paired.larger
         analysis.claims.checks.approaches
