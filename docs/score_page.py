@@ -117,8 +117,8 @@ def _page(kept: Mapping[str, Any], card: cards.Scorecard) -> Lines:
         filled(
             "The estimators of relative positions that come with affinet, those of paper 000 and the filters of edges of "
             f"papers 001 and 004, scored against each other: {len(card.tasks)} tasks, {len(card.airs)} airs, "
-            f"{kept['seeds']} runs of each, the same draws for all ([score](score.md)). Filters of edges predict by velocities, "
-            "and fly single integrators; `crkf`, which hears everybody past the air, is not among them. "
+            f"{kept['seeds']} runs of each, the same draws for all ([score](score.md)). Filters of edges predict by "
+            "velocities, and fly single integrators; `crkf`, which hears everybody past the air, is not among them. "
             f"Who is among the best is nowhere beaten by more than a factor of {MATTERS:g}, as far as {CONFIDENCE:.0%} "
             "confidence for all comparisons at once can tell. Ticks are 0.05 s long. `docs/score_page.py` writes this page "
             "from `docs/built-in.json`, which it takes from a score."
