@@ -51,6 +51,7 @@ _HEAD = (
     "|---|---|---|---|---|---|---|---|---|---|",
 )
 _CHECKS_AT_MOST, _SEEDS_APART = 10, 10_000
+_LEAST = 10_000  # verdicts, below which intervals say nothing
 
 
 def main() -> int:
@@ -61,6 +62,10 @@ def main() -> int:
     parser.add_argument("--only", type=lambda names: names.split(","), default=list(_CHECKS), metavar="loss,delay,...")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="where the tables are kept, beside their page")
     given = parser.parse_args()
+    if given.verdicts < _LEAST:
+        parser.error(f"--verdicts {given.verdicts}: give {_LEAST} or more, of which something can be told")
+    if not 0 <= given.seed < 1 << 32:
+        parser.error(f"--seed {given.seed}: give a whole number from 0 to 2^32 - 1")
     if unknown := {*given.only} - {*_CHECKS}:
         parser.error(f"--only: no {', '.join(sorted(unknown))}; there is {', '.join(_CHECKS)}")
     ok = True

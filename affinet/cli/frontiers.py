@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,7 +12,7 @@ from rich import progress as bar
 
 from affinet.cli.progress import Bar
 from affinet.cli.quarry import flown_by, quarry_of
-from affinet.cli.status import PASS
+from affinet.cli.status import FAIL, PASS
 from affinet.runtimes import directories
 from affinet.scenario.wrong import ScenarioError
 from affinet.testing.frontier import CONFIDENCE, Frontier, fly_frontier, of_one_setting
@@ -54,6 +55,9 @@ def fly_and_draw(parsed: argparse.Namespace) -> int:
     for name, shares in zip(names, cells, strict=True):
         print(f"{name}: {_least(found, shares)}")  # noqa: T201
     print(f"{parsed.frontier}, and its numbers: {numbers}")  # noqa: T201
+    if untold := [name for name, told in zip(names, found.told, strict=True) if not told.any()]:
+        print(f"{untold[0]}: no run put it to the test, which proves nothing", file=sys.stderr)  # noqa: T201
+        return FAIL
     if parsed.json:
         print(json.dumps(says))  # noqa: T201
     return PASS

@@ -84,7 +84,7 @@ def as_json(found: Hunted, places: Sequence[Path], quarry: Quarry) -> dict[str, 
             "vacuous": coverage.vacuous,
             "unfit": coverage.unfit,
             "shrinking": coverage.shrinking,
-            "met": {kind: coverage.of(kind) for kind in covered.KINDS},
+            "met": {kind: dict(sorted(coverage.of(kind).items())) for kind in covered.KINDS},
             "never": _never(coverage, quarry),
         },
     }

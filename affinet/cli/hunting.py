@@ -34,7 +34,7 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
     ScenarioError, PlanError, UserCodeError, OSError
         When the hunt cannot begin, or what it finds not be written.
     """
-    if parsed.every:
+    if parsed.every is not None:
         return certified.fly_and_certify(parsed)
     if parsed.certificate:
         raise ScenarioError("--certificate: one is left of all faults of a class; say of which with --every")
@@ -65,6 +65,10 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
         confirm(one, quarry, places[one.number])
     if parsed.json:
         print(json.dumps(hunted.as_json(found, places, quarry)))  # noqa: T201
+    coverage = found.coverage
+    if not found.found and coverage.vacuous + coverage.unfit >= coverage.schedules:
+        _note("nothing was put to the test: in every schedule a fault touched nothing, or an invariant could not tell")
+        return FAIL
     return FAIL if found.found else PASS
 
 

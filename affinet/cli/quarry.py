@@ -9,11 +9,12 @@ from itertools import product
 from pathlib import Path
 
 from affinet.cli import show
-from affinet.cli.given import scenario
+from affinet.cli.given import overrides, scenario
 from affinet.planning import making as planning
 from affinet.runtimes import directories
 from affinet.runtimes.run import evidence, fly
 from affinet.scenario import files, loading
+from affinet.scenario.overrides import read
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import among
 from affinet.scenario.wrong import ScenarioError
@@ -36,8 +37,10 @@ def quarry_of(parsed: argparse.Namespace) -> Quarry:
         When something in it is wrong.
     """
     make = flights.said(parsed.invariant)
-    if parsed.seeds is not None and parsed.seed is not None:
-        raise ScenarioError("--seed and --seeds: give the one or the other")
+    fixed = overrides(parsed)
+    if parsed.seeds is not None and any(one.key == "seed" for one in read(fixed)):
+        raise ScenarioError("--seeds and a seed: give the one or the other")
+    sweeping.refuse_twice(parsed.sweep, fixed)
     verbs = parsed.verbs or list(menu.VERBS)
     if strangers := sorted(set(verbs) - set(menu.VERBS)):
         raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], menu.VERBS)}")

@@ -125,7 +125,7 @@ def _compared(raw: Raw) -> Iterator[Compared]:
         for task in raw.tasks
         for air in raw.flown(task.name, raw.scored)
         for rival in raw.entrants[1:]
-        if raw.flies(task.name, rival, air)
+        if raw.flies(task.name, rival, air) and not raw.runs(task.name, air, raw.scored, "vacuous").all()
     ]
     for task, air, rival in pairs:
         one, other = (raw.runs(task.name, air, who, "error") for who in (raw.scored, rival))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from affinet.scenario.wrong import ScenarioError
 from affinet.score import flying
 from affinet.score.card import Scorecard, Task
 from affinet.score.flying import Cell, Descent, Entrant, Flown, Timed
@@ -95,7 +96,15 @@ class Kept:
 
 
 def entrants(card: Scorecard, name: str, against: Sequence[str], *, laws: bool) -> dict[str, list[str]]:
-    """Who flies each task, the one that is scored first; without any to compare with, those that the card names."""
+    """Who flies each task, the one that is scored first; without any to compare with, those that the card names.
+
+    Raises
+    ------
+    ScenarioError
+        When it is to be compared with itself.
+    """
+    if name in against:
+        raise ScenarioError(f"--against {name}: that is the one that is scored; leave it out")
     return {
         task.name: list(dict.fromkeys([name, *(against or (task.laws if laws else task.rivals))]))
         for task in card.tasks

@@ -51,6 +51,18 @@ class Signal:
     of: Callable[[Evidence], Truths]
     says: Callable[[Evidence, int], str]
 
+    def __bool__(self) -> bool:
+        """No signal is true by itself: `and`, `or`, `not` and `1 < q < 4` would keep one half, and drop the other.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError(
+            f"{self.name} is no truth value: write & for and, | for or, ~ for not, and (1 < q) & (q < 4) for 1 < q < 4"
+        )
+
     def __and__(self, other: Signal) -> Signal:
         """Both hold."""
 

@@ -126,3 +126,17 @@ def test_one_that_suits_no_task_says_why(scored):
     assert not raw.flies("corridor", "target")
     assert score.compared == ()
     assert said(score, "corridor: target does not suit it: ")
+
+
+def test_an_air_in_which_a_fault_touches_nothing_decides_nothing(folder, monkeypatch):
+    monkeypatch.syspath_prepend(str(folder))
+    late = Air(
+        name="late", says="after the end", set=['timeline=[{verb="cut",at=60,lasts=1,links=["all"]}]'], quick=True
+    )
+    card = CARD.model_copy(update={"airs": [*CARD.airs, late], "worsenings": []})
+    who = scoring.entrants(card, "rkf", ["none"], laws=False)
+    todo = [one for one in scoring.pieces(card, who, "agents.estimator", folder) if one.kind != "timed"]
+    kept = Kept(folder, dict.fromkeys(("rkf", "none"), "planted"), pytest.fail)
+    score = judging.judge(scoring.together(card, who, todo, scoring.fly(todo, Here(), kept, lambda _: None)))
+    assert {one.air for one in score.compared} == {"perfect", "lossy"}
+    assert said(score, "corridor, late: in all runs a fault touched nothing, which proves nothing")

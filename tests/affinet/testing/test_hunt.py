@@ -1,6 +1,7 @@
 """The hunt for the smallest fault that breaks an invariant."""
 
 import json
+import re
 import sys
 import time
 
@@ -466,3 +467,28 @@ def test_two_faults_that_break_it_together_are_each_as_short_small_and_weak_as_c
     ((cut,), (lose,)) = sorted((one, other), key=lambda fault: fault[0]["verb"])
     assert (cut["links"], cut["at"], cut["lasts"]) == (["2->4"], 0.0, 0.15)
     assert (lose["links"], lose["at"], lose["lasts"], lose["loss"]) == (["3->5"], 0.0, 0.15, 0.2)
+
+
+@pytest.mark.usefixtures("den")
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--sweep", "seed=5,6"), "--sweep seed: the seeds of runs are given by --seeds"),
+        (("--sweep", "network.availability=1", "--sweep", "network.availability=0.5"), "it is swept twice"),
+        (("--sweep", "network.availability=1", "--availability", "0.3"), "network.availability=0.3 is given as well"),
+        (("--seeds", "1-2", "--set", "seed=3"), "--seeds and a seed: give the one or the other"),
+        (("--every", ""), "--every"),
+    ],
+)
+def test_what_would_be_dropped_without_a_word_is_refused(capsys, words, says):
+    assert commands.main(["hunt", "corridor", *BRIEF, "--invariant", "bounded(5000)", "--budget", "2", *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert says in line
+
+
+@pytest.mark.parametrize(
+    "more", [("--budget", "3"), ("--frontier", "x.png", "--seeds", "1-2")], ids=["hunt", "frontier"]
+)
+def test_where_nothing_was_put_to_the_test_nothing_is_proved(capsys, more):
+    assert commands.main(["hunt", "corridor", *BRIEF, "--duration", "1", "--invariant", "found(0.1, 1)", *more]) == 1
+    assert re.search("put (it )?to the test", capsys.readouterr().err)

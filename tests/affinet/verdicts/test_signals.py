@@ -265,3 +265,18 @@ def test_what_is_no_signal_in_words_is_one_line(words, says):
         invariants.parse(words)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda error: 1 < error < 4,
+        lambda error: (error < 0.0001) and (error < 5),
+        lambda error: (error < 5) or (error < 0.0001),
+        lambda error: not error < 5,
+    ],
+    ids=["chained", "and", "or", "not"],
+)
+def test_words_of_python_that_would_drop_one_half_of_a_signal_are_refused(write):
+    with pytest.raises(TypeError, match=r"is no truth value: write & for and, \| for or, ~ for not, and \(1 < q\) & "):
+        always(write(quantity("error")))
