@@ -35,6 +35,7 @@ def fly_and_draw(parsed: argparse.Namespace) -> int:
     if others := [name for name in _OTHER if getattr(parsed, name)]:
         raise ScenarioError(f"--frontier and --{others[0]}: it cuts links of one scenario, and draws; leave one out")
     numbers = parsed.frontier.with_suffix(".json")
+    directories.refuse_nowhere(parsed.frontier, "--frontier")
     for file in (parsed.frontier, numbers):
         directories.refuse_there(file, "--frontier")
     quarry = of_one_setting(quarry_of(parsed))

@@ -99,6 +99,18 @@ def refuse_there(file: Path, option: str = "--out") -> None:
         raise FileExistsError(f"{str(file)!r} is there already; name another with {option}, or remove it")
 
 
+def refuse_nowhere(file: Path, option: str) -> None:
+    """Go on if there is a directory in which a file can be written, before all is flown that it is to hold.
+
+    Raises
+    ------
+    FileNotFoundError
+        When there is none.
+    """
+    if not file.absolute().parent.is_dir():
+        raise FileNotFoundError(f"{option} {file}: there is no directory {file.parent}")
+
+
 @contextmanager
 def unless_empty(path: Path) -> Iterator[None]:
     """A directory or file made for what the block finds; it goes again where that was nothing."""

@@ -478,10 +478,11 @@ def test_two_faults_that_break_it_together_are_each_as_short_small_and_weak_as_c
         (("--sweep", "network.availability=1", "--availability", "0.3"), "network.availability=0.3 is given as well"),
         (("--seeds", "1-2", "--set", "seed=3"), "--seeds and a seed: give the one or the other"),
         (("--every", ""), "--every"),
+        (("--frontier", "nodir/x.png"), "--frontier nodir/x.png: there is no directory nodir"),
     ],
 )
 def test_what_would_be_dropped_without_a_word_is_refused(capsys, words, says):
-    assert commands.main(["hunt", "corridor", *BRIEF, "--invariant", "bounded(5000)", "--budget", "2", *words]) == 2
+    assert commands.main(["hunt", "corridor", *BRIEF, "--invariant", "bounded(5000)", *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert says in line
 
