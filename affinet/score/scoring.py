@@ -98,6 +98,13 @@ class Kept:
 def entrants(card: Scorecard, name: str, against: Sequence[str], *, laws: bool) -> dict[str, list[str]]:
     """Who flies each task, the one that is scored first; without any to compare with, those that the card names.
 
+    Parameters
+    ----------
+    card, name, against
+        The card, who is scored, and with whom it is compared.
+    laws
+        Whether laws are compared.
+
     Raises
     ------
     ScenarioError
