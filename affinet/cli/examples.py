@@ -100,12 +100,12 @@ EXAMPLES: Mapping[str, Sequence[Example]] = {
         Example(
             "affinet hunt corridor --invariant 'bounded(1000)' --verbs dropout --budget 20 --set time.dt=0.05 --duration 5",
             "exit status 1 when something breaks it",
-            "--budget 1 --duration 0.5",
+            "--budget 2 --duration 1",
         ),
         Example(
             "affinet hunt corridor --invariant 'bounded(5)' --seeds 1-20 --corpus corpus --set time.dt=0.05 --duration 20",
             "of many seeds; what it finds flies first the next time",
-            "--budget 1 --duration 0.5 --seeds 1-2",
+            "--budget 2 --duration 1 --seeds 1-2",
         ),
         Example(
             "affinet hunt corridor --invariant 'bounded(5)' --every 'one link, up to 1 s, from any 0.5 s' --set time.dt=0.05 "

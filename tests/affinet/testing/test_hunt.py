@@ -487,6 +487,7 @@ def test_what_would_be_dropped_without_a_word_is_refused(capsys, words, says):
     assert says in line
 
 
+@pytest.mark.usefixtures("den")
 @pytest.mark.parametrize(
     "more", [("--budget", "3"), ("--frontier", "x.png", "--seeds", "1-2")], ids=["hunt", "frontier"]
 )
