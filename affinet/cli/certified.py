@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 
 from rich import progress as bar
 from rich.console import Console
 
+from affinet.cli.notes import note
 from affinet.cli.progress import Bar
 from affinet.cli.quarry import confirm, flown_by, places_of, quarry_of, write
 from affinet.cli.show import plain
@@ -40,10 +40,7 @@ def fly_and_certify(parsed: argparse.Namespace) -> int:
         )
     those, quarry = every.parse(parsed.every), quarry_of(parsed)
     trials = [*those.trials(quarry.scenarios, quarry.seeds)]
-    print(  # noqa: T201
-        f"{those}: {len(trials)} runs of {max(one.time.ticks for one in quarry.scenarios.values())} ticks",
-        file=sys.stderr,
-    )
+    note(f"{those}: {len(trials)} runs of {max(one.time.ticks for one in quarry.scenarios.values())} ticks")
     places = places_of(parsed, quarry)
     file = directories.for_certificate(parsed.certificate or Path(parsed.scenario).stem)
     with ExitStack() as claimed:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import asdict
 
 from affinet.cli import moments
+from affinet.cli.notes import note
 from affinet.planning import making
 from affinet.runtimes.rehearsing import rehearse
 from affinet.scenario import files
-from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import parted, reading
 from affinet.verdicts.evidence import Evidence
@@ -47,10 +46,9 @@ def _warn(failing: Evidence, passing: Evidence) -> None:
     """What would be misread; by its own verdict alone a run that a test failed may pass."""
     verdict, reasons = passing.outcome.verdict, "; ".join(passing.outcome.reasons)
     if verdict == "fail":
-        print(one_line(f"note: the other run fails too: {reasons}"), file=sys.stderr)  # noqa: T201
+        note(f"note: the other run fails too: {reasons}")
     if failing.ticks > passing.ticks:
-        flown = f"note: the other run has {passing.ticks} ticks: nothing is said of what came after them"
-        print(flown, file=sys.stderr)  # noqa: T201
+        note(f"note: the other run has {passing.ticks} ticks: nothing is said of what came after them")
 
 
 def _flown(parsed: argparse.Namespace) -> Evidence:

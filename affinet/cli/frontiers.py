@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Mapping
 
 import numpy as np
 from rich import progress as bar
 
+from affinet.cli.notes import note
 from affinet.cli.progress import Bar
 from affinet.cli.quarry import flown_by, quarry_of
 from affinet.cli.status import FAIL, PASS
@@ -56,12 +56,12 @@ def fly_and_draw(parsed: argparse.Namespace) -> int:
     for name, shares in zip(names, cells, strict=True):
         print(f"{name}: {_least(found, shares)}")  # noqa: T201
     print(f"{parsed.frontier}, and its numbers: {numbers}")  # noqa: T201
-    if untold := [name for name, told in zip(names, found.told, strict=True) if not told.any()]:
-        print(f"{untold[0]}: no run put it to the test, which proves nothing", file=sys.stderr)  # noqa: T201
-        return FAIL
     if parsed.json:
         print(json.dumps(says))  # noqa: T201
-    return PASS
+    untold = [name for name, told in zip(names, found.told, strict=True) if not told.any()]
+    for name in untold:
+        note(f"{name}: no run put it to the test, which proves nothing")
+    return FAIL if untold else PASS
 
 
 def _cells(found: Frontier, number: int) -> Array:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 from affinet.cli import certified, frontiers, hunted
 from affinet.cli.given import scenario
+from affinet.cli.notes import note
 from affinet.cli.quarry import confirm, flown_by, places_of, quarry_of, write
 from affinet.cli.status import FAIL, PASS
 from affinet.planning import making as planning
 from affinet.planning.plan import PlanError
 from affinet.runtimes import directories
-from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.testing import corpus, hunt
 from affinet.testing.corpus import Found
@@ -59,7 +58,7 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
             write(one.scenario, places[one.number])
     if parsed.corpus:
         new = corpus.keep(parsed.corpus, Path(parsed.scenario).stem, found.worth)
-        _note(f"{parsed.corpus}: {len(trials)} flown first, {new} new")
+        note(f"{parsed.corpus}: {len(trials)} flown first, {new} new")
     hunted.show(found, [one.name for one in quarry.make()], quarry)
     for one in found.found:
         confirm(one, quarry, places[one.number])
@@ -67,7 +66,7 @@ def hunt_and_report(parsed: argparse.Namespace) -> int:
         print(json.dumps(hunted.as_json(found, places, quarry)))  # noqa: T201
     coverage = found.coverage
     if not found.found and coverage.vacuous + coverage.unfit >= coverage.schedules:
-        _note("nothing was put to the test: in every schedule a fault touched nothing, or an invariant could not tell")
+        note("nothing was put to the test: in every schedule a fault touched nothing, or an invariant could not tell")
         return FAIL
     return FAIL if found.found else PASS
 
@@ -82,17 +81,13 @@ def _with_corpus(parsed: argparse.Namespace, quarry: Quarry) -> tuple[Quarry, li
                 quarry = replace(quarry, beyond={**quarry.beyond, **settings})
             planning.make(one.trial.in_scenario(quarry.case(one.trial).given))
         except (ScenarioError, PlanError) as error:
-            _note(f"{one.file}: left out, as it does not fit {parsed.scenario}: {error}")
+            note(f"{one.file}: left out, as it does not fit {parsed.scenario}: {error}")
             continue
         known[one.trial.key] = one
     pairs = [(one.trial.settings, one.trial.seed) for one in known.values()]
     failing = hunt.failing_undisturbed(quarry, pairs, flown_by(parsed.jobs)) if pairs else []
     for one, finding in zip(list(known.values()), failing, strict=True):
         if finding is not None:
-            _note(f"{one.file}: left out, as its seed and settings fail with no fault at all: {finding}")
+            note(f"{one.file}: left out, as its seed and settings fail with no fault at all: {finding}")
             del known[one.trial.key]
     return quarry, [one.trial for one in known.values()]
-
-
-def _note(line: str) -> None:
-    print(one_line(line), file=sys.stderr)  # noqa: T201

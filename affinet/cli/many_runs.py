@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -12,11 +11,11 @@ import numpy as np
 from rich import progress as bar
 from rich.console import Console
 
-from affinet.cli import given, means
+from affinet.cli import means, varied
+from affinet.cli.notes import note
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
 from affinet.runtimes.rehearsing import why_alone
-from affinet.scenario import overrides
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
@@ -39,10 +38,7 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
     UserCodeError
         When a user's own code does something wrong.
     """
-    fixed = given.overrides(parsed)
-    if parsed.seeds is not None and any(one.key == "seed" for one in overrides.read(fixed)):
-        raise ScenarioError("--seeds and a seed: give the one or the other")
-    sweeping.refuse_twice(parsed.sweep, fixed)
+    sweeps = varied.swept(parsed)
     of_one_run = [name for name in _OF_ONE_RUN if getattr(parsed, name)]
     if of_one_run or parsed.runtime == "processes":
         raise ScenarioError(
@@ -50,13 +46,12 @@ def fly(parsed: argparse.Namespace, load: Callable[[Sequence[str]], Scenario]) -
             "and --seeds, --sweep and --check fly many in this process: leave it out"
         )
     checker = None if parsed.check is None else invariants.parse(parsed.check)
-    sweeps = [sweeping.values_of(sweep) for sweep in parsed.sweep]
     plans = sweeping.planned(load, sweeps, None if parsed.seeds is None else parsed.seeds.start)
     runs = 1 if parsed.seeds is None else len(parsed.seeds)
     if runs > 1:
         reasons = dict.fromkeys(filter(None, (why_alone(plan) for _, plan in plans)))
         for why in reasons:
-            print(one_line(f"note: runs fly one by one, and not side by side: {why}"), file=sys.stderr)  # noqa: T201
+            note(f"note: runs fly one by one, and not side by side: {why}")
     name = Path(parsed.scenario).stem
     with Bar(name, len(plans), bar.BarColumn(), bar.TextColumn("{task.fields[says]}"), says="starting") as shown:
         found = sweeping.fly(

@@ -9,16 +9,16 @@ from itertools import product
 from pathlib import Path
 
 from affinet.cli import show
-from affinet.cli.given import overrides, scenario
+from affinet.cli.given import scenario
+from affinet.cli.varied import swept
 from affinet.planning import making as planning
 from affinet.runtimes import directories
 from affinet.runtimes.run import evidence, fly
 from affinet.scenario import files, loading
-from affinet.scenario.overrides import read
 from affinet.scenario.sections import Scenario
 from affinet.scenario.words import among
 from affinet.scenario.wrong import ScenarioError
-from affinet.studies import pool, sweeping
+from affinet.studies import pool
 from affinet.testing import flights, menu
 from affinet.testing.flights import Chunk, Each
 from affinet.testing.hunt import Counterexample, Quarry
@@ -37,16 +37,11 @@ def quarry_of(parsed: argparse.Namespace) -> Quarry:
         When something in it is wrong.
     """
     make = flights.said(parsed.invariant)
-    fixed = overrides(parsed)
-    if parsed.seeds is not None and any(one.key == "seed" for one in read(fixed)):
-        raise ScenarioError("--seeds and a seed: give the one or the other")
-    sweeping.refuse_twice(parsed.sweep, fixed)
     verbs = parsed.verbs or list(menu.VERBS)
     if strangers := sorted(set(verbs) - set(menu.VERBS)):
         raise ScenarioError(f"--verbs {','.join(strangers)}: {among(strangers[0], menu.VERBS)}")
-    swept = [sweeping.values_of(sweep) for sweep in parsed.sweep]
-    varied = product(*([f"{key}={value}" for value in values] for key, values in swept))
-    scenarios: dict[Settings, Scenario] = {settings: scenario(parsed, settings) for settings in varied}
+    combined = product(*([f"{key}={value}" for value in values] for key, values in swept(parsed)))
+    scenarios: dict[Settings, Scenario] = {settings: scenario(parsed, settings) for settings in combined}
     seeds = parsed.seeds or [next(iter(scenarios.values())).seed]
     return Quarry(make, scenarios, list(seeds), verbs)
 
@@ -89,8 +84,8 @@ def places_of(parsed: argparse.Namespace, quarry: Quarry) -> list[Path]:
         When it cannot be there, or is already.
     """
     out: Path | None = parsed.out
-    if out and not out.parent.is_dir():
-        raise ScenarioError(f"--out {out}: there is no directory {out.parent}")
+    if out:
+        directories.refuse_nowhere(out, "--out")
     folder = out.absolute().parent if out else files.working_directory()
     for name, lies_in in (pair for given in quarry.scenarios.values() for pair in given.own_modules.items()):
         if folder != lies_in:

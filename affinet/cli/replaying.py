@@ -10,11 +10,11 @@ from pathlib import Path
 from affinet.cli import show
 from affinet.cli.flying import fly_plan
 from affinet.cli.given import overrides, scenario
+from affinet.cli.notes import note
 from affinet.cli.status import FAIL, PASS, USER_CODE
 from affinet.planning import making as planning
 from affinet.runtimes.run import Runtime, fly
 from affinet.scenario import files, loading
-from affinet.scenario.words import one_line
 from affinet.scenario.wrong import ScenarioError
 from affinet.verdicts import compare
 from netem.medium.journal import JournalError
@@ -36,7 +36,7 @@ def replay(parsed: argparse.Namespace) -> int:
     before = history.load(flown) if flown.exists() and (by_the_clock or not changes) else None
     for finding in plan.findings:
         if finding.check == "inputs":
-            print(one_line(f"note: {finding.says}"), file=sys.stderr)  # noqa: T201
+            note(f"note: {finding.says}")
     try:
         status = fly_plan(plan, "replay", parsed)
     except JournalError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from rich import progress as bar
 from rich.console import Console
 
+from affinet.cli.notes import note
 from affinet.cli.progress import Bar
 from affinet.cli.show import plain
 from affinet.cli.status import PASS
@@ -53,7 +53,7 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
     with ended_by_signals(), _executor(parsed, own) as executor, _bar(parsed.name, len(todo)) as shown:
         found = scoring.fly(todo, executor, kept, lambda done: shown.see(done, f"{done}/{len(todo)} pieces"))
     if kept.there:
-        print(one_line(f"{kept.there} of {len(todo)} pieces were there"), file=sys.stderr)  # noqa: T201
+        note(f"{kept.there} of {len(todo)} pieces were there")
     raw = scoring.together(card, who, todo, found)
     score = judging.judge(raw)
     said = record.plain(card, raw, score, flies[parsed.name], quick=parsed.quick)
@@ -70,7 +70,7 @@ def fly_and_report(parsed: argparse.Namespace) -> int:
 
 
 def _damaged(file: Path) -> None:
-    print(one_line(f"{file} is not whole: it flies anew"), file=sys.stderr)  # noqa: T201
+    note(f"{file} is not whole: it flies anew")
 
 
 @contextmanager

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from affinet.cli import means, show
+from affinet.cli.notes import note
 from affinet.cli.status import FAIL, PASS
 from affinet.planning.plan import Plan
 from affinet.runtimes import directories
 from affinet.runtimes.interruption import ended_by_signals
-from affinet.scenario.words import one_line
 from affinet.studies import cells, cluster, identity, judging, labelled, pool, record, report
 from affinet.studies import study as studies
 from affinet.studies.cells import Cells
@@ -51,11 +50,11 @@ def _into_its_directory(
 ) -> bool:
     out = report.prepare(parsed.out or f"{Path(parsed.study).stem}{'-quick' if parsed.quick else ''}")
     of = identity.of_cells(study, [plan for _, plan in planned], quick=parsed.quick)
-    with directories.unless_empty(out), cells.held(out, of, _note) as kept:
+    with directories.unless_empty(out), cells.held(out, of, note) as kept:
         try:
             results = _flown(study, planned, parsed, executor, kept)
         except Lost as error:
-            _note(str(error))
+            note(str(error))
             _go_on(kept)
             return False
         except KeyboardInterrupt:
@@ -73,7 +72,7 @@ def _flown(
     runs, results = study.size(quick=parsed.quick).runs, list[Result]()
     before = flown_by_case([], [], kept.there, len(planned), runs)
     if kept.there:
-        _note(f"{study.title}: goes on from {kept.runs} of {len(planned) * runs} runs")
+        note(f"{study.title}: goes on from {kept.runs} of {len(planned) * runs} runs")
     with ended_by_signals():
         try:
             with show.Grid(study.title, [plan.world.ticks for _, plan in planned], there=before) as grid:
@@ -102,7 +101,7 @@ def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, o
     except Exception as error:  # noqa: BLE001 - whatever a verdict or a picture fails of, the data is there, and it is said
         log = report.failed(out)
         where = "" if log is None else f"; {log} says where"
-        _note(f"{out} has the data, but not all of the report: {error!r}{where}")
+        note(f"{out} has the data, but not all of the report: {error!r}{where}")
         return False
     return True
 
@@ -110,8 +109,4 @@ def _reported(study: Study, results: list[Result], parsed: argparse.Namespace, o
 def _go_on(kept: Cells) -> None:
     if kept.runs:
         out = directories.on_a_command_line(kept.folder.parent)
-        _note(f"{kept.runs} runs are kept: the same command goes on from them with --out {out}")
-
-
-def _note(line: str) -> None:
-    print(one_line(line), file=sys.stderr)  # noqa: T201
+        note(f"{kept.runs} runs are kept: the same command goes on from them with --out {out}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,11 +10,12 @@ from typing import Any, NamedTuple
 
 from affinet.scenario.wrong import ScenarioError
 from affinet.score import flying
-from affinet.score.card import Scorecard, Task
+from affinet.score.card import Scorecard, Task, Worsening
 from affinet.score.flying import Cell, Descent, Entrant, Flown, Timed
 from affinet.score.judging import Raw
 from affinet.studies import identity
 from affinet.studies.executor import Executor
+from affinet.studies.sealed import opened, sealed
 from netem.processes.system_errors import about
 from netem.processes.whole import whole
 
@@ -65,29 +65,30 @@ class Kept:
             if not file.exists():
                 continue
             with about(file):
-                seal, _, said = file.read_bytes().partition(b"\n")
-            if seal != _seal(file, said):
+                packed = opened(file.read_bytes())
+            name, made = json.loads(packed) if packed is not None else (None, None)
+            if name != file.name:
                 self.damaged(file)
                 continue
-            found[number] = _made(piece.kind, json.loads(said))
+            found[number] = _made(piece.kind, made)
         self.there = len(found)
         return found
 
     def keep(self, piece: Piece, made: Made) -> None:
         """Keep it."""
-        file, said = self._file(piece), json.dumps(made).encode()
+        file = self._file(piece)
         with about(file), whole(file) as unfinished:
-            unfinished.write_bytes(_seal(file, said) + b"\n" + said)
+            unfinished.write_bytes(sealed(json.dumps([file.name, made]).encode()))
 
     def _file(self, piece: Piece) -> Path:
-        given = piece.given.cell if isinstance(piece.given, Descent) else piece.given
-        judged_by = (given.task.lost, given.task.recovered)
-        of = [self.flies[piece.entrant], piece.kind, *given.entrant[:2], given.seeds, judged_by, self._air(piece.given)]
-        return self.folder / f"{identity.digest(of)}.json"
-
-    def _air(self, given: Cell | Descent) -> str:
-        """What is flown, whoever flies: from files of a user's own, which may say something else by now."""
+        given = piece.given
         cell, worse = (given.cell, given.worsening) if isinstance(given, Descent) else (given, None)
+        judged_by = (cell.task.lost, cell.task.recovered)
+        of = [self.flies[piece.entrant], piece.kind, *cell.entrant[:2], cell.seeds, judged_by, self._air(cell, worse)]
+        return self.folder / f"{identity.digest(of)}.piece"
+
+    def _air(self, cell: Cell, worse: Worsening | None) -> str:
+        """What is flown, whoever flies: from files of a user's own, which may say something else by now."""
         of = (cell.task.name, cell.set, worse and worse.name)
         if of not in self._airs:
             ends = [[]] if worse is None else [worse.at(worse.least_tried), worse.at(worse.most)]
@@ -227,10 +228,6 @@ def _fly(piece: Piece) -> Made:
     if isinstance(given, Descent):
         return flying.descent(given)
     return flying.timed(given) if piece.kind == "timed" else flying.cell(given)
-
-
-def _seal(file: Path, said: bytes) -> bytes:
-    return hashlib.sha256(file.name.encode() + said).hexdigest().encode()
 
 
 def _made(kind: str, said: Any) -> Any:

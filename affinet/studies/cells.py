@@ -8,7 +8,6 @@ flies anew. Who flies into the directory holds it as long as it lives.
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import io
 import json
 import os
@@ -23,6 +22,7 @@ import pyarrow as pa
 
 from affinet.studies.batch import Runs
 from affinet.studies.identity import Identity, differences
+from affinet.studies.sealed import opened, sealed
 from affinet.studies.sharing import Piece
 from analysis.metrics.indicator import Bounds
 from analysis.models.arrays import Array
@@ -31,7 +31,6 @@ from netem.processes.system_errors import about
 FOLDER = "cells"  # in the directory of a study that is not done
 _DONE = "cells-done"
 _ENDING, _UNFINISHED = ".cell", ".part"
-_SEAL = hashlib.sha256().digest_size
 _COMPRESSION = "zstd"
 
 
@@ -65,7 +64,7 @@ class Cells:
         file = self.folder / f"{piece.case}-{piece.runs.start}-{piece.runs.stop}{_ENDING}"
         written = file.with_suffix(_UNFINISHED)
         with about(written), written.open("wb") as cell:
-            cell.write(_sealed(_packed(self.of, piece, runs)))
+            cell.write(sealed(_packed(self.of, piece, runs)))
             cell.flush()
             os.fsync(cell.fileno())
         written.rename(file)
@@ -126,7 +125,7 @@ def _read(folder: Path, of: Identity, says: Callable[[str], None]) -> Iterator[t
     for part in folder.glob(f"*{_UNFINISHED}"):
         part.unlink()
     for file in sorted(folder.glob(f"*{_ENDING}")):
-        packed = _opened(file.read_bytes())
+        packed = opened(file.read_bytes())
         if packed is None:
             says(f"{file} is not whole: its runs fly anew")
             file.unlink()
@@ -136,16 +135,6 @@ def _read(folder: Path, of: Identity, says: Callable[[str], None]) -> Iterator[t
             others = f"{str(folder)!r} has cells of another grid, different in {', '.join(differences(theirs, of))}"
             raise FileExistsError(f"{others}; name another directory with --out, or remove them to fly anew")
         yield piece, runs
-
-
-def _sealed(packed: bytes) -> bytes:
-    return packed + hashlib.sha256(packed).digest()
-
-
-def _opened(sealed: bytes) -> bytes | None:
-    """What was sealed; nothing if it is no longer what it was."""
-    packed = sealed[:-_SEAL]
-    return packed if packed and _sealed(packed) == sealed else None
 
 
 def _packed(of: Identity, piece: Piece, runs: Runs) -> bytes:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from affinet.planning.plan import Plan
 from affinet.scenario.words import one_line
@@ -15,6 +17,7 @@ from analysis.models.arrays import Array, Mask
 from netem.faults.timeline import Timeline
 from world.books.history import Arrays
 
+Kind = TypeVar("Kind", bound=np.generic)
 _DIGITS = 12  # of a digest, where it is there to tell runs apart
 
 
@@ -38,7 +41,7 @@ class Evidence:
 
     def __post_init__(self) -> None:
         for values in self.arrays.values():
-            values.flags.writeable = False  # nobody who looks at a run changes what the next one sees
+            _kept(values)
 
     def __repr__(self) -> str:
         source, digest = self.plan.scenario.source, self.outcome.digest or ""
@@ -108,6 +111,6 @@ class Evidence:
         return round(seconds / self.dt)
 
 
-def _kept(mask: Mask) -> Mask:
-    mask.flags.writeable = False
-    return mask
+def _kept(values: NDArray[Kind]) -> NDArray[Kind]:
+    values.flags.writeable = False  # nobody who looks at a run changes what the next one sees
+    return values

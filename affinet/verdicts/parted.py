@@ -126,8 +126,7 @@ def parted(failing: Evidence, passing: Evidence, at: int | None = None) -> Parte
     if failing.plan.channels != passing.plan.channels:
         raise NotAlike("the runs talk over different channels: their verdicts cannot be held against each other")
     ticks = min(failing.ticks, passing.ticks)
-    one, other = (_quantities(run, ticks) for run in (failing, passing))
-    matters = next(iter(one))
+    (matters, one), (_, other) = (_quantities(run, ticks) for run in (failing, passing))
     off = _excess(one[matters][0], other[matters][0])
     if at is not None:
         off = np.where(np.arange(ticks)[:, None] == min(at, ticks - 1), off, 0.0)
@@ -147,12 +146,12 @@ def parted(failing: Evidence, passing: Evidence, at: int | None = None) -> Parte
     return Parted(failing.dt, tuple(left), _links(failing, passing, agent, slice(begins, ends)), begins, ends)
 
 
-def _quantities(run: Evidence, ticks: int) -> Mapping[str, tuple[Array, str]]:
-    """Of every agent in every tick, shape (T, N)."""
+def _quantities(run: Evidence, ticks: int) -> tuple[str, Mapping[str, tuple[Array, str]]]:
+    """The name of the one that matters, and all of them, of every agent in every tick, shape (T, N)."""
     with np.errstate(over="ignore", invalid="ignore"):  # of one that has diverged
         name, off = measures.by_agent(run.plan, run.timeline, run.arrays)
     error = off[:ticks]
-    return {
+    return name, {
         name: (
             np.where(run.present[:ticks] & np.isfinite(error), error, np.where(run.present[:ticks], np.inf, 0.0)),
             "m",

@@ -21,6 +21,7 @@ from affinet.cli import commands
 from affinet.studies import cells, identity, pool, record, study
 from affinet.studies.batch import Runs
 from affinet.studies.executor import Here, Lost
+from affinet.studies.sealed import opened
 from affinet.studies.sharing import Piece
 from analysis.figures import curves
 from analysis.metrics.indicator import Bounds
@@ -229,7 +230,7 @@ def test_nobody_else_flies_into_the_directory_meanwhile(small, interrupted, caps
 
 
 def read(out):
-    return [cells._unpacked(cells._opened(path.read_bytes())) for path in (out / cells.FOLDER).iterdir()]
+    return [cells._unpacked(opened(path.read_bytes())) for path in (out / cells.FOLDER).iterdir()]
 
 
 def test_a_report_that_failed_is_made_again_without_flying(small, uninterrupted, tmp_path, monkeypatch):
